@@ -1,0 +1,48 @@
+"""Read-only NumPy arrays for frozen records."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wakewise.errors import InputError
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+
+def frozen(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
+    """Copy `value` into a read-only, C-contiguous float64 array of the given shape.
+
+    Parameters
+    ----------
+    value : array_like
+    shape : tuple
+        Expected shape; `None` lets that axis have any length.
+    name : str
+        What the value is called in the error message.
+
+    Raises
+    ------
+    InputError
+        If the shape differs or an element is not finite.
+    """
+    array = np.array(value, dtype=np.float64, order="C")
+    if array.ndim != len(shape) or any(
+        want is not None and got != want for got, want in zip(array.shape, shape, strict=True)
+    ):
+        wanted = "(" + ", ".join("n" if s is None else str(s) for s in shape) + ")"
+        raise InputError(f"{name}: shape {array.shape}, allowed {wanted}")
+    if not np.all(np.isfinite(array)):
+        raise InputError(f"{name}: holds NaN or infinity, every element must be finite")
+    array.setflags(write=False)
+    return array
+
+
+def freeze(record: Any, **shapes: tuple[int | None, ...]) -> None:
+    """Replace the named array fields of a frozen dataclass by checked, read-only copies (call in `__post_init__`)."""
+    for name, shape in shapes.items():
+        object.__setattr__(record, name, frozen(getattr(record, name), shape, name))

@@ -1,0 +1,13 @@
+"""The exceptions that Wakewise raises; the command line turns them into one line and exit code 2."""
+
+
+class WakewiseError(Exception):
+    """Base of every error that Wakewise raises on purpose."""
+
+
+class InputError(WakewiseError):
+    """What the user gave cannot be used: the message names the file or field, what was found and what is allowed."""
+
+
+class StageError(WakewiseError):
+    """A stage of a trial could not finish on valid input, such as photographs that do not register."""

@@ -1,0 +1,207 @@
+"""What the rooms say to each other: small records and Protocols.
+
+Controller and simulated world never import one another; both speak the types of this page, and `operation` joins them.
+World W is NED, body B is FRD, camera C has OpenCV axes. SI units and radians.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+
+from wakewise.arrays import Array, freeze
+from wakewise.geometry import Pose
+
+S = TypeVar("S")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BodyState:
+    """Where the vehicle is and how it moves.
+
+    `nu_B` is the twist of B relative to the world (not to the water), linear then angular, expressed in B, shape (6,).
+    """
+
+    X_WB: Pose
+    nu_B: Array = field(default_factory=lambda: np.zeros(6))
+
+    def __post_init__(self) -> None:
+        freeze(self, nu_B=(6,))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Measurement:
+    """What the sensors said at one instant. A sensor that was silent is None.
+
+    `X_WB` is a camera-based pose, `omega_B_rad_s` the gyro, shape (3,), `depth_m` the pressure sensor (positive down).
+    """
+
+    time_s: float
+    X_WB: Pose | None = None
+    omega_B_rad_s: Array | None = None
+    depth_m: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Goal:
+    """What the mission or the pilot wants now.
+
+    `nu_B` is the wished twist, expressed in the goal's own body frame, shape (6,). `exposure_in_s` is the time until
+    the shutter next opens (infinite if it will not, zero while it is open), so that a controller can keep the water
+    still then.
+    """
+
+    X_WB: Pose
+    nu_B: Array = field(default_factory=lambda: np.zeros(6))
+    exposure_in_s: float = float("inf")
+
+    def __post_init__(self) -> None:
+        freeze(self, nu_B=(6,))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Command:
+    """What a controller decided.
+
+    `thrusts_N`, shape (n,), one per thruster, positive along its force axis. `wrench_B` is the wrench asked of the
+    allocation, shape (6,). `disturbance` is D as the controller's own wake model sees it, None if it has none.
+    `fallback` says that the answer is not the one the method wanted (late, infeasible), and why.
+    """
+
+    thrusts_N: Array
+    wrench_B: Array
+    disturbance: float | None = None
+    fallback: str | None = None
+
+    def __post_init__(self) -> None:
+        freeze(self, thrusts_N=(None,), wrench_B=(6,))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ScalarGrid:
+    """A scalar field on a regular grid of the world, such as silt concentration in kg/m3.
+
+    `values`, shape (nx, ny, nz), sits at `origin_W_m + spacing_m * (i, j, k)`; outside the grid the field is zero.
+    """
+
+    origin_W_m: Array
+    spacing_m: float
+    values: Array
+
+    def __post_init__(self) -> None:
+        freeze(self, origin_W_m=(3,), values=(None, None, None))
+
+
+class WakeModel(Protocol):
+    """What a controller believes a thruster's jet does to the water; speed grows with the square root of thrust."""
+
+    @property
+    def name(self) -> str:
+        """Name used in scenario files and tables."""
+        ...
+
+    def unit_velocity(self, points_W_m: Array, origins_W_m: Array, directions_W: Array, area_m2: Array) -> Array:
+        """Velocity per square root of newton.
+
+        Parameters
+        ----------
+        points_W_m : ndarray, shape (n, 3)
+        origins_W_m, directions_W : ndarray, shape (m, 3)
+            Where each jet starts and the unit direction *of the jet* (opposite to the force on the vehicle).
+        area_m2 : ndarray, shape (m,)
+            Disk area of each jet's thruster.
+
+        Returns
+        -------
+        ndarray, shape (m, n, 3), in m/s/sqrt(N)
+            Multiply row i by sqrt(|T_i|) for the velocity that jet i adds at each point.
+        """
+        ...
+
+
+class Flow(Protocol):
+    """Moving water: the truth of a trial at its present instant."""
+
+    def velocity(self, points_W_m: Array) -> Array:
+        """Velocity in m/s at points, both shape (n, 3), expressed in the world."""
+        ...
+
+
+class Controller(Protocol, Generic[S]):
+    """Turns an estimate and a goal into thrusts. State goes in and comes out; nothing is hidden."""
+
+    @property
+    def name(self) -> str:
+        """Method name used in scenario files and tables."""
+        ...
+
+    def init(self) -> S:
+        """State before the first step."""
+        ...
+
+    def step(self, state: S, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[S, Command]:
+        """Decide the thrusts for the next `dt_s` seconds."""
+        ...
+
+
+class Estimator(Protocol, Generic[S]):
+    """Turns measurements into an estimate of the state."""
+
+    def init(self, start: BodyState) -> S:
+        """State at the start, from a first guess."""
+        ...
+
+    def step(
+        self, state: S, dt_s: float, measurements: tuple[Measurement, ...], thrusts_N: Array
+    ) -> tuple[S, BodyState]:
+        """Advance by `dt_s` under the commanded thrusts, take in what was measured, and say where the vehicle is."""
+        ...
+
+
+class Plant(Protocol):
+    """The vehicle in its water: simulated tank, autopilot or sea."""
+
+    def step(self, thrusts_N: Array, dt_s: float) -> tuple[Measurement, ...]:
+        """Hold the commanded thrusts for `dt_s` and return what the sensors said meanwhile, oldest first."""
+        ...
+
+
+class Pilot(Protocol):
+    """Where goals come from: a mission, a script or a person."""
+
+    def goal(self, time_s: float, estimate: BodyState) -> Goal:
+        """Say what is wanted at `time_s`."""
+        ...
+
+
+class Camera(Protocol):
+    """Maps between points before the camera and pixels, with pixel centres at +0.5 as COLMAP has them."""
+
+    @property
+    def width(self) -> int:
+        """Image width in pixels."""
+        ...
+
+    @property
+    def height(self) -> int:
+        """Image height in pixels."""
+        ...
+
+    def project(self, points_C_m: Array) -> Array:
+        """Pixels, shape (n, 2), of points, shape (n, 3), in the camera frame."""
+        ...
+
+    def rays(self, pixels: Array) -> Array:
+        """Directions with unit z, shape (n, 3), in the camera frame, of pixels, shape (n, 2)."""
+        ...
+
+
+Progress = Callable[..., None]
+"""A callable `(done, total, note)` that a long stage calls now and then; see `no_progress`."""
+
+
+def no_progress(done: float, total: float, note: str = "") -> None:
+    """Ignore progress."""
