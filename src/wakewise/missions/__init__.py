@@ -1,0 +1,18 @@
+"""What to look at, from where, in what order and when: viewpoints, layered orbits, timed routes."""
+
+from wakewise.missions.clearance import TankBounds, check_clearance
+from wakewise.missions.orbit import Orbit, layered_orbits
+from wakewise.missions.route import Leg, Route, RoutePilot, plan_route
+from wakewise.missions.settings import MissionSettings
+
+__all__ = [
+    "Leg",
+    "MissionSettings",
+    "Orbit",
+    "Route",
+    "RoutePilot",
+    "TankBounds",
+    "check_clearance",
+    "layered_orbits",
+    "plan_route",
+]

@@ -1,0 +1,89 @@
+"""Whether the vehicle can fly a route without touching floor, walls, surface or target."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from wakewise.arrays import Array, freeze
+from wakewise.errors import InputError
+from wakewise.geometry import Pose
+from wakewise.missions.route import Route
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TankBounds:
+    """The water a vehicle may be in: a box from `low_W_m` to `high_W_m`, shape (3,) each; z = high is the floor."""
+
+    low_W_m: Array
+    high_W_m: Array
+
+    def __post_init__(self) -> None:
+        freeze(self, low_W_m=(3,), high_W_m=(3,))
+
+
+def hull_corners(size_m: Array) -> Array:
+    """The eight corners, shape (8, 3), of a hull of this length, width and height centred on the body origin."""
+    return 0.5 * np.asarray(size_m) * np.array(list(product((-1.0, 1.0), repeat=3)))
+
+
+def box_distance(points_B_m: Array, size_m: Array) -> Array:
+    """Distance, shape (n,), of points, shape (n, 3), to a solid box centred on the origin; negative inside."""
+    outside = np.abs(points_B_m) - 0.5 * np.asarray(size_m)
+    return np.linalg.norm(np.maximum(outside, 0.0), axis=-1) + np.minimum(np.max(outside, axis=-1), 0.0)
+
+
+def check_clearance(
+    route: Route, X_BC: Pose, size_m: Array, bounds: TankBounds, target_W_m: Array, clearance_m: float
+) -> float:
+    """Least clearance of the hull along the route, in metres.
+
+    Parameters
+    ----------
+    route : Route
+    X_BC : Pose
+        Camera mount.
+    size_m : ndarray, shape (3,)
+        Length, width and height of the hull.
+    bounds : TankBounds
+    target_W_m : ndarray, shape (n, 3)
+        Points of the target, dense enough to stand for it (its mesh's vertices).
+    clearance_m : float
+        What is asked for.
+
+    Raises
+    ------
+    InputError
+        Naming the field of the mission to change, the leg, what it would touch and by how much.
+    """
+    corners = hull_corners(size_m)
+    near = target_W_m[:: max(1, len(target_W_m) // 4000)]
+    least = np.inf
+    for time_s in np.arange(route.starts_s[0], route.duration_s, 0.25):
+        X_WB = route.body(float(time_s), X_BC).X_WB
+        hull_W = X_WB.apply(corners)
+        gaps = {
+            "the floor": bounds.high_W_m[2] - hull_W[:, 2].max(),
+            "the water surface": hull_W[:, 2].min() - bounds.low_W_m[2],
+            "a wall": min(
+                float((hull_W[:, :2] - bounds.low_W_m[:2]).min()), float((bounds.high_W_m[:2] - hull_W[:, :2]).min())
+            ),
+            "the target": float(box_distance(X_WB.inverse().apply(near), size_m).min()),
+        }
+        what, gap = min(gaps.items(), key=lambda item: item[1])
+        if gap < clearance_m:
+            leg = route.legs[route.leg_at(float(time_s))].name
+            field, advice = {
+                "the floor": ("mission.elevations_deg", "raise the lowest elevation or lengthen mission.standoff_m"),
+                "the water surface": ("mission.standoff_m", "shorten it, or lower the highest elevation"),
+                "a wall": ("mission.standoff_m", "shorten it or use a wider tank.size_m"),
+                "the target": ("mission.standoff_m", "lengthen it"),
+            }[what]
+            raise InputError(
+                f"{field}: on leg '{leg}' the hull comes within {gap:.3f} m of {what}, "
+                f"allowed is {clearance_m:g} m or more (mission.clearance_m): {advice}"
+            )
+        least = min(least, gap)
+    return float(least)

@@ -1,0 +1,178 @@
+"""When to be where: legs joined into a timed route, with the instants at which the shutter opens."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wakewise.arrays import Array, freeze
+from wakewise.geometry import Pose
+from wakewise.interfaces import BodyState, Goal
+from wakewise.missions.orbit import Orbit, camera_pose, camera_twist, layered_orbits
+from wakewise.missions.settings import MissionSettings
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Leg:
+    """One stretch from rest to rest, straight in (azimuth, elevation, range).
+
+    On circles the camera's speed is exactly as timed; on climbs, which slant across the sphere, within a few percent.
+    `start` and `end` hold azimuth_rad, elevation_rad, range_m, shape (3,). `length_m` is that of the camera's path.
+    """
+
+    name: str
+    start: Array
+    end: Array
+    length_m: float
+    duration_s: float
+    speed_m_s: float
+    acceleration_m_s2: float
+
+    def __post_init__(self) -> None:
+        freeze(self, start=(3,), end=(3,))
+
+    def progress(self, time_s: float) -> tuple[float, float]:
+        """Fraction of the leg done and its rate of change in 1/s: speed up, cruise, slow down."""
+        if self.length_m <= 0.0 or self.duration_s <= 0.0:
+            return 1.0, 0.0
+        t = min(max(time_s, 0.0), self.duration_s)
+        a, v = self.acceleration_m_s2, self.speed_m_s
+        ramp_s = v / a
+        if t < ramp_s:
+            s, rate = 0.5 * a * t * t, a * t
+        elif t > self.duration_s - ramp_s:
+            left = self.duration_s - t
+            s, rate = self.length_m - 0.5 * a * left * left, a * left
+        else:
+            s, rate = v * (t - 0.5 * ramp_s), v
+        return s / self.length_m, rate / self.length_m
+
+    def time_at(self, fraction: float) -> float:
+        """Time into the leg at which this fraction of its length is done (inverse of `progress`)."""
+        a, v = self.acceleration_m_s2, self.speed_m_s
+        ramp_m = 0.5 * v * v / a
+        s = fraction * self.length_m
+        if s < ramp_m:
+            return float(np.sqrt(2 * s / a))
+        if s > self.length_m - ramp_m:
+            return self.duration_s - float(np.sqrt(2 * max(self.length_m - s, 0.0) / a))
+        return s / v + 0.5 * v / a
+
+
+def rest_to_rest(name: str, start: Array, end: Array, speed_m_s: float, acceleration_m_s2: float) -> Leg:
+    """Time a leg with trapezoidal speed; short legs never reach the full speed."""
+    # The path is a straight line in spherical coordinates; its length by fine chords.
+    fractions = np.linspace(0.0, 1.0, 257)[:, None]
+    az, el, rng = np.moveaxis((1 - fractions) * start + fractions * end, -1, 0)
+    points = np.stack([rng * np.cos(el) * np.cos(az), rng * np.cos(el) * np.sin(az), -rng * np.sin(el)], axis=-1)
+    length_m = float(np.sum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    peak = min(speed_m_s, float(np.sqrt(acceleration_m_s2 * length_m)))
+    duration_s = length_m / peak + peak / acceleration_m_s2 if length_m > 0 else 0.0
+    return Leg(
+        name=name,
+        start=start,
+        end=end,
+        length_m=length_m,
+        duration_s=duration_s,
+        speed_m_s=peak,
+        acceleration_m_s2=acceleration_m_s2,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Route:
+    """Legs in order, the target's centre they circle, and when the shutter opens.
+
+    `starts_s`, shape (legs,), is when each leg begins. `exposures_s`, shape (k,), increasing, is when the shutter
+    opens; `exposure_names` names the photographs and `X_WC_planned` says where each should be taken from.
+    """
+
+    centre_W_m: Array
+    legs: tuple[Leg, ...]
+    starts_s: Array
+    exposures_s: Array
+    exposure_names: tuple[str, ...]
+    X_WC_planned: tuple[Pose, ...]
+    duration_s: float
+
+    def __post_init__(self) -> None:
+        freeze(self, centre_W_m=(3,), starts_s=(None,), exposures_s=(None,))
+
+    def leg_at(self, time_s: float) -> int:
+        """Index of the leg under way; before the first leg begins it is the first, held at its start."""
+        return int(np.clip(np.searchsorted(self.starts_s, time_s, side="right") - 1, 0, len(self.legs) - 1))
+
+    def camera(self, time_s: float) -> tuple[Pose, Array, Array]:
+        """Wished camera pose X_WC, its velocity and its angular velocity in W (shape (3,) each)."""
+        leg = self.legs[i := self.leg_at(time_s)]
+        fraction, rate = leg.progress(time_s - float(self.starts_s[i]))
+        az, el, rng = (1 - fraction) * leg.start + fraction * leg.end
+        az_rate, el_rate, rng_rate = rate * (leg.end - leg.start)
+        v_W, omega_W = camera_twist(az, el, rng, az_rate, el_rate, rng_rate)
+        return camera_pose(self.centre_W_m, az, el, rng), v_W, omega_W
+
+    def body(self, time_s: float, X_BC: Pose) -> BodyState:
+        """Wished pose and twist of a body that carries the camera at X_BC."""
+        X_WC, v_WC, omega_W = self.camera(time_s)
+        X_WB = X_WC @ X_BC.inverse()
+        R_BW = X_WB.R.T
+        omega_B = R_BW @ omega_W
+        return BodyState(X_WB=X_WB, nu_B=np.concatenate([R_BW @ v_WC - np.cross(omega_B, X_BC.p_m), omega_B]))
+
+
+def plan_route(centre_W_m: Array, settings: MissionSettings) -> Route:
+    """Settle, approach, then fly each orbit and the climb to the next; photographs on the orbits only."""
+    orbits: tuple[Orbit, ...] = layered_orbits(settings)
+    far, near = settings.standoff_m + settings.approach_m, settings.standoff_m
+    here = np.array([orbits[0].azimuths_rad[0], orbits[0].elevation_rad, far])
+    legs: list[Leg] = []
+    starts: list[float] = []
+    exposures: list[float] = []
+    names: list[str] = []
+    planned: list[Pose] = []
+    clock_s = settings.settle_s
+
+    def go(name: str, end: Array) -> Leg:
+        nonlocal here, clock_s
+        leg = rest_to_rest(name, here, end, settings.speed_m_s, settings.acceleration_m_s2)
+        legs.append(leg)
+        starts.append(clock_s)
+        clock_s += leg.duration_s
+        here = end
+        return leg
+
+    for orbit in orbits:
+        first, last = float(orbit.azimuths_rad[0]), float(orbit.azimuths_rad[-1])
+        go("approach" if not exposures else f"climb to {orbit.name}", np.array([first, orbit.elevation_rad, near]))
+        begin_s = clock_s
+        leg = go(orbit.name, np.array([last, orbit.elevation_rad, near]))
+        for azimuth in orbit.azimuths_rad:
+            exposures.append(begin_s + leg.time_at((azimuth - first) / (last - first)))
+            names.append(f"{len(names):03d}.png")
+            planned.append(camera_pose(centre_W_m, float(azimuth), orbit.elevation_rad, near))
+    return Route(
+        centre_W_m=centre_W_m,
+        legs=tuple(legs),
+        starts_s=np.array(starts),
+        exposures_s=np.array(exposures),
+        exposure_names=tuple(names),
+        X_WC_planned=tuple(planned),
+        duration_s=clock_s + 0.5,  # the last shutter closes before the recording ends
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RoutePilot:
+    """A `Pilot` that follows a route by the clock and announces the shutter."""
+
+    route: Route
+    X_BC: Pose
+    exposure_s: float
+
+    def goal(self, time_s: float, estimate: BodyState) -> Goal:  # noqa: ARG002  (a clock needs no estimate)
+        """Wished body pose and twist now, and how long until the shutter opens."""
+        wished = self.route.body(time_s, self.X_BC)
+        k = int(np.searchsorted(self.route.exposures_s + self.exposure_s, time_s))
+        wait_s = float("inf") if k == len(self.route.exposures_s) else float(self.route.exposures_s[k]) - time_s
+        return Goal(X_WB=wished.X_WB, nu_B=wished.nu_B, exposure_in_s=max(wait_s, 0.0))
