@@ -1,0 +1,53 @@
+# Everything below sets itself up: a machine with Python >= 3.11 and pip is enough.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+
+.PHONY: help setup scan test check bench docs lock clean
+
+help:
+	@echo "make setup   virtual environment in .venv with everything but the 'nerf' extra"
+	@echo "make scan    fly, photograph, reconstruct and judge a coral; leaves runs/quick/report.html"
+	@echo "make test    ruff, mypy, the import contract and the tests"
+	@echo "make check   the same without the tests"
+	@echo "make bench   speed and quality, side by side with a peer"
+	@echo "make docs    regenerate docs/commands.md from the commands' own help"
+	@echo "make lock    resolve requirements.lock anew (needs uv, which setup installs)"
+
+setup: $(STAMP)
+
+$(STAMP): requirements.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "wakewise needs Python 3.11 or newer; PYTHON=/path/to/python3.11 make $(MAKECMDGOALS)"; exit 2; }
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || \
+		{ echo "python3-venv is missing: apt-get install python3-venv"; exit 2; }
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@$(BIN)/python tools/check_libraries.py
+	@touch $@
+
+scan: setup
+	$(BIN)/wakewise scan --preset quick --out runs/quick
+
+check: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+test: check
+	$(BIN)/pytest -n 2
+
+bench: setup
+	$(BIN)/python benchmarks/run.py
+
+docs: setup
+	$(BIN)/python tools/write_command_docs.py
+
+lock:
+	$(BIN)/python -m pip install --quiet uv
+	$(BIN)/uv pip compile pyproject.toml --group dev --universal --python-version 3.11 --generate-hashes --no-header --no-annotate -o requirements.lock
+
+clean:
+	rm -rf $(VENV) runs dist
