@@ -1,0 +1,186 @@
+"""The vehicle as a frozen record, and what follows from its geometry alone: allocation matrix and null space."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from wakewise.arrays import Array, freeze
+from wakewise.errors import InputError
+from wakewise.geometry import Pose
+from wakewise.vehicles.hydrodynamics import Hydrodynamics
+from wakewise.vehicles.thruster import Thruster
+
+
+@dataclass(frozen=True, kw_only=True)
+class Provenance:
+    """Where one group of a vehicle's numbers comes from, and whether they are estimates."""
+
+    group: str
+    source: str
+    estimate: bool
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Vehicle:
+    """Parameters of one vehicle; body frame B is FRD.
+
+    Parameters
+    ----------
+    name, title : str
+        Short name for files, and a name for people.
+    source, does_not_claim : str
+        Where the numbers come from, and what must not be concluded from them.
+    size_m : ndarray, shape (3,)
+        Length, width and height of the box around the vehicle, centred on the body origin.
+    mass_kg : float
+    inertia_kg_m2 : ndarray, shape (3, 3)
+        About the centre of gravity, in the axes of B.
+    displaced_volume_m3 : float
+    p_BG_m, p_BB_m : ndarray, shape (3,)
+        Centre of gravity and centre of buoyancy from the body origin.
+    hydrodynamics : Hydrodynamics
+    thrusters : tuple of Thruster
+    X_BC : Pose
+        Camera mount; the camera frame has OpenCV axes (x right, y down, z forward).
+    camera_fov_rad : float
+        Horizontal field of view in water.
+    provenance : tuple of Provenance
+        Source of each group of numbers.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite, mass or volume is not positive, the inertia is not symmetric positive definite, or
+        there are no thrusters or two of one name.
+    """
+
+    name: str
+    title: str
+    source: str
+    does_not_claim: str
+    size_m: Array
+    mass_kg: float
+    inertia_kg_m2: Array
+    displaced_volume_m3: float
+    p_BG_m: Array
+    p_BB_m: Array
+    hydrodynamics: Hydrodynamics
+    thrusters: tuple[Thruster, ...]
+    X_BC: Pose
+    camera_fov_rad: float = math.pi / 2
+    provenance: tuple[Provenance, ...] = ()
+
+    def __post_init__(self) -> None:
+        freeze(self, size_m=(3,), inertia_kg_m2=(3, 3), p_BG_m=(3,), p_BB_m=(3,))
+        for field in ("mass_kg", "displaced_volume_m3", "camera_fov_rad"):
+            value = float(getattr(self, field))
+            if not math.isfinite(value) or value <= 0.0:
+                raise InputError(f"{field}: {value:g}, must be finite and more than 0")
+        if self.camera_fov_rad >= math.pi:
+            raise InputError(f"camera_fov_rad: {self.camera_fov_rad:g}, must be less than pi")
+        if np.any(self.size_m <= 0.0):
+            raise InputError(f"size_m: {self.size_m.tolist()}, every length must be more than 0")
+        inertia = self.inertia_kg_m2
+        lowest = float(np.linalg.eigvalsh(0.5 * (inertia + inertia.T))[0])
+        if lowest <= 0.0 or not np.allclose(inertia, inertia.T, rtol=0.0, atol=1e-9 * float(np.abs(inertia).max())):
+            raise InputError(
+                f"inertia_kg_m2: smallest eigenvalue {lowest:g}, the matrix must be symmetric and positive definite"
+            )
+        if not self.thrusters:
+            raise InputError("thrusters: none, there must be at least one")
+        names = [t.name for t in self.thrusters]
+        twice = sorted({n for n in names if names.count(n) > 1})
+        if twice:
+            raise InputError(f"thrusters: {', '.join(twice)} named more than once, names must differ")
+
+    @cached_property
+    def allocation_matrix(self) -> Array:
+        """Wrench about the body origin per newton of each thruster, shape (6, n); built from the geometry."""
+        return _read_only(np.stack([t.wrench_per_newton_B for t in self.thrusters], axis=1))
+
+    @cached_property
+    def thrust_lower_N(self) -> Array:
+        """Lowest thrust of each thruster (negative), shape (n,)."""
+        return _read_only(np.array([-t.max_reverse_N for t in self.thrusters]))
+
+    @cached_property
+    def thrust_upper_N(self) -> Array:
+        """Highest thrust of each thruster, shape (n,)."""
+        return _read_only(np.array([t.max_forward_N for t in self.thrusters]))
+
+    @cached_property
+    def thrust_gains(self) -> Array:
+        """Newton delivered per newton commanded, shape (n,); ones unless these are a plant's parameters."""
+        return _read_only(np.array([t.gain for t in self.thrusters]))
+
+    @cached_property
+    def time_constants_s(self) -> Array:
+        """First-order lag of each thruster, shape (n,)."""
+        return _read_only(np.array([t.time_constant_s for t in self.thrusters]))
+
+    @cached_property
+    def thruster_positions_B_m(self) -> Array:
+        """Disk centres from the body origin, shape (n, 3)."""
+        return _read_only(np.stack([t.p_BT_m for t in self.thrusters]))
+
+    @cached_property
+    def thruster_axes_B(self) -> Array:
+        """Unit directions of the force for positive thrust, shape (n, 3)."""
+        return _read_only(np.stack([t.axis_B for t in self.thrusters]))
+
+    @cached_property
+    def disk_areas_m2(self) -> Array:
+        """Swept areas, shape (n,)."""
+        return _read_only(np.array([t.disk_area_m2 for t in self.thrusters]))
+
+    @cached_property
+    def null_space(self) -> Array:
+        """Thrusts that make no wrench, as orthonormal columns, shape (n, k); see `readable_null_space`."""
+        return _read_only(readable_null_space(self.allocation_matrix))
+
+
+def readable_null_space(matrix: Array, tolerance: float = 1e-9) -> Array:
+    """Orthonormal basis of the null space of a matrix, shape (m, n), with as many exact zeros as reduction finds.
+
+    The singular vectors give the space; its reduced echelon form gives vectors that a person can read, such as four
+    horizontal thrusters alone; Gram-Schmidt then makes them orthonormal (and leaves vectors that share no thruster as
+    they are). In each column the first entry that is not zero is positive.
+
+    Returns
+    -------
+    ndarray, shape (n, k)
+    """
+    _, singular, Vt = np.linalg.svd(matrix, full_matrices=True)
+    rank = int(np.sum(singular > tolerance * max(1.0, float(singular[0]))))
+    rows = Vt[rank:].copy()
+    k, n = rows.shape
+    done = 0
+    for column in range(n):
+        if done == k:
+            break
+        pivot = done + int(np.argmax(np.abs(rows[done:, column])))
+        if abs(rows[pivot, column]) < 1e-7:
+            continue
+        rows[[done, pivot]] = rows[[pivot, done]]
+        rows[done] /= rows[done, column]
+        others = np.arange(k) != done
+        rows[others] -= np.outer(rows[others, column], rows[done])
+        done += 1
+    basis = np.zeros((n, k))
+    for i in range(k):
+        vector = rows[i] - basis[:, :i] @ (basis[:, :i].T @ rows[i])
+        vector = vector / np.linalg.norm(vector)
+        vector[np.abs(vector) < 1e-12] = 0.0
+        first = vector[np.flatnonzero(vector)[0]]
+        basis[:, i] = vector * np.sign(first)
+    return basis
+
+
+def _read_only(array: Array) -> Array:
+    array = np.ascontiguousarray(array)
+    array.setflags(write=False)
+    return array
