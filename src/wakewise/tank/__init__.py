@@ -1,0 +1,36 @@
+"""The simulated world: a vehicle with its true parameters, water moved by its jets, silt on the bed, and sensors.
+
+The water is made of impulse parcels and knows nothing of the controllers' wake models; a controller sees only what
+`Tank.step` returns. Everything else on `Tank` is the truth of a trial, for its record and for the photographs.
+"""
+
+from wakewise.tank.grains import (
+    beam_attenuation_per_m,
+    erosion_rate_kg_m2_s,
+    friction_velocity_m_s,
+    settling_speed_m_s,
+    threshold_stress_Pa,
+)
+from wakewise.tank.plant import VehiclePlant
+from wakewise.tank.sediment import Silt, SiltLaws
+from wakewise.tank.sensors import Sensors
+from wakewise.tank.settings import TankSettings
+from wakewise.tank.tank import Tank, WaterMeasure
+from wakewise.tank.water import Water, WaterCounts
+
+__all__ = [
+    "Sensors",
+    "Silt",
+    "SiltLaws",
+    "Tank",
+    "TankSettings",
+    "VehiclePlant",
+    "Water",
+    "WaterCounts",
+    "WaterMeasure",
+    "beam_attenuation_per_m",
+    "erosion_rate_kg_m2_s",
+    "friction_velocity_m_s",
+    "settling_speed_m_s",
+    "threshold_stress_Pa",
+]

@@ -1,0 +1,227 @@
+"""Radial wall jets on the bed: where a free jet goes after it has struck the floor.
+
+A free jet that strikes a floor turns within about 0.14 of its height and runs out along the floor in a thin layer with
+u_max = 1.16 sqrt(M) / r and a half thickness of 0.09 r, r from the strike point, M = thrust / density (Beltaos and
+Rajaratnam 1974, J. Hydraul. Div. ASCE 100 HY10; Rajaratnam 1976, Turbulent Jets). Impulse parcels cannot
+form that layer, so each one that strikes becomes a *ring*: a stretch of the layer that carries the parcel's impulse
+outward at the layer's mean speed. Rings of one jet add up to the law when thrust is steady, and start, swell and fade
+with it otherwise.
+
+One ring's velocity in the sector at azimuth phi (height h above the bed, distance r from its centre) is
+    u_r = (A/r) g dF/dh,   u_up = -(A/r) dg/dr F,   g = exp(-ln(r/R)^2 / (2 L^2)),
+    F = delta sqrt(pi/2) erf(h / (sqrt 2 delta)) exp(-h/R),   delta = 0.093 R,
+which is free of divergence, runs along the bed at h = 0 and takes its water from above. A jet that comes in at a slant
+sends the share w(phi) = exp(kappa cos(phi - phi0)) / I0(kappa) of its momentum towards phi, with kappa such that the
+horizontal momentum is the jet's own; in that sector R becomes R w^(1/4) and A becomes A sqrt(w), as the law asks.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from scipy.special import i0
+
+from wakewise.arrays import Array, IntArray
+from wakewise.tank.chunks import over_points
+
+WALL_JET_SPEED = 1.16  # u_max r / sqrt(M), Rajaratnam 1976
+WALL_JET_SPREAD = 0.093  # delta over R for which the layer below, entrainment included, is half as fast at 0.09 R
+STRIKE_HEIGHT = 1.75  # of the parcel's sigma: 0.14 H, where the bed's pressure begins to turn the jet (Beltaos 1974)
+_LAYER_CONVECTION = 1 / math.sqrt(2)  # mean of u weighted with u over a Gaussian layer, as a share of u_max
+_LOG_WIDTH = 0.3  # L: neighbouring rings overlap; it sets how sharp a front is, not how fast
+_REACH = 4 * _LOG_WIDTH  # beyond it g is below 4e-4
+_RING_MERGE = 0.5  # rings of one jet closer than this share of L become one
+
+
+@dataclass(frozen=True, eq=False)
+class Rings:
+    """Rings of the wall jets, oldest first.
+
+    Parameters
+    ----------
+    centre_m : ndarray, shape (n, 2)
+        Where the jet struck, carried by the current since.
+    radius_m : ndarray, shape (n,)
+    impulse_m4_s : ndarray, shape (n,)
+    heading : ndarray, shape (n, 2)
+        Horizontal unit vector towards which a slanting jet leans.
+    kappa : ndarray, shape (n,)
+        How much it leans, 0 for an upright jet.
+    stream : ndarray of int, shape (n,)
+        The jet it came from.
+    """
+
+    centre_m: Array
+    radius_m: Array
+    impulse_m4_s: Array
+    heading: Array
+    kappa: Array
+    stream: IntArray
+
+    @classmethod
+    def none(cls) -> Rings:
+        """No rings at all."""
+        return cls(
+            np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros((0, 2)), np.zeros(0), np.zeros(0, dtype=np.int64)
+        )
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self.radius_m)
+
+    def take(self, keep: np.ndarray) -> Rings:
+        """Those that a mask or an index array picks."""
+        return Rings(
+            self.centre_m[keep],
+            self.radius_m[keep],
+            self.impulse_m4_s[keep],
+            self.heading[keep],
+            self.kappa[keep],
+            self.stream[keep],
+        )
+
+    def joined(self, later: Rings) -> Rings:
+        """These followed by the later ones."""
+        return Rings(
+            np.concatenate([self.centre_m, later.centre_m]),
+            np.concatenate([self.radius_m, later.radius_m]),
+            np.concatenate([self.impulse_m4_s, later.impulse_m4_s]),
+            np.concatenate([self.heading, later.heading]),
+            np.concatenate([self.kappa, later.kappa]),
+            np.concatenate([self.stream, later.stream]),
+        )
+
+
+def lean(horizontal_share: Array) -> Array:
+    """Concentration kappa of a von Mises distribution whose mean direction vector has the given length, shape (n,).
+
+    Best and Fisher 1981 (doi 10.1080/03610918108812225), good to about 1 %; cut at a length of 0.98.
+    """
+    h = np.clip(np.asarray(horizontal_share, dtype=np.float64), 0.0, 0.98)
+    low = 2 * h + h**3 + 5 * h**5 / 6
+    middle = -0.4 + 1.39 * h + 0.43 / (1 - h)
+    high = 1 / np.maximum(h**3 - 4 * h**2 + 3 * h, 1e-9)
+    kappa: Array = np.where(h < 0.53, low, np.where(h < 0.85, middle, high))
+    return kappa
+
+
+def rings_from_strikes(position_m: Array, impulse_m4_s: Array, sigma_m: Array, stream: IntArray) -> Rings:
+    """Rings that take over from parcels (arrays as in `Parcels`) which have come down to the bed."""
+    size = np.linalg.norm(impulse_m4_s, axis=1)
+    flat = np.hypot(impulse_m4_s[:, 0], impulse_m4_s[:, 1])
+    heading = np.where(flat[:, None] > 0, impulse_m4_s[:, :2], [1.0, 0.0]) / np.where(flat > 0, flat, 1.0)[:, None]
+    share = flat / np.where(size > 0, size, 1.0)
+    return Rings(position_m[:, :2].copy(), STRIKE_HEIGHT * sigma_m, size, heading, lean(share), stream.copy())
+
+
+def ring_velocity(points_W_m: Array, rings: Rings, bed_z_m: float) -> Array:
+    """Velocity of the rings, shape (n, 3), at points, shape (n, 3); zero if there are none."""
+    out = np.zeros((len(points_W_m), 3))
+    if rings.count and len(points_W_m):
+        points = np.ascontiguousarray(points_W_m, dtype=np.float64)
+        strength = ring_strength(rings)
+        weight = 1 / i0(rings.kappa)
+        # Where a ring can be felt at all, whatever the azimuth: w lies between exp(-kappa)/I0 and exp(kappa)/I0.
+        inner = rings.radius_m * (weight * np.exp(-rings.kappa)) ** 0.25 * math.exp(-_REACH)
+        outer = rings.radius_m * (weight * np.exp(rings.kappa)) ** 0.25 * math.exp(_REACH)
+        packed = np.column_stack(
+            [rings.centre_m, rings.radius_m, strength, rings.heading, rings.kappa, weight, inner**2, outer**2]
+        )
+        cost = 10 * len(points) * rings.count  # a ring takes as long as ten parcels
+        over_points(lambda some, result: _sum_rings(some, packed, bed_z_m, result), points, out, cost)
+    return out
+
+
+def ring_strength(rings: Rings) -> Array:
+    """A of each ring in m2/s, shape (n,): such that rings sent at a steady rate add up to u_max = 1.16 sqrt(M) / r."""
+    scale = _LAYER_CONVECTION * WALL_JET_SPEED**2 / (math.sqrt(2 * math.pi) * _LOG_WIDTH)
+    return scale * rings.impulse_m4_s / rings.radius_m**2
+
+
+def layer_speed(rings: Rings) -> Array:
+    """Speed at the bed under each ring's crest, from all rings of its own jet taken as concentric, shape (n,)."""
+    apart = np.log(rings.radius_m[:, None] / rings.radius_m[None, :])
+    same = rings.stream[:, None] == rings.stream[None, :]
+    overlap = np.where(same, np.exp(-(apart**2) / (2 * _LOG_WIDTH**2)), 0.0)
+    speed: Array = overlap @ ring_strength(rings) / rings.radius_m
+    return speed
+
+
+def grown(rings: Rings, current_W_m_s: Array, dt_s: float) -> tuple[Rings, Array]:
+    """Rings after dt_s, and the layer speed they had, shape (n,). Exact in dt for a speed that falls as 1/R."""
+    speed = layer_speed(rings)
+    radius = np.sqrt(rings.radius_m**2 + 2 * rings.radius_m * _LAYER_CONVECTION * speed * dt_s)
+    centre = rings.centre_m + current_W_m_s[:2] * dt_s
+    return Rings(centre, radius, rings.impulse_m4_s, rings.heading, rings.kappa, rings.stream), speed
+
+
+def coarsened(rings: Rings) -> Rings:
+    """Neighbouring rings of one jet, close in radius and centre, made one; impulse is conserved."""
+    if rings.count < 2:
+        return rings
+    order = np.lexsort((np.arange(rings.count), rings.stream))
+    keep = np.ones(rings.count, dtype=np.bool_)
+    centre, radius, impulse = rings.centre_m.copy(), rings.radius_m.copy(), rings.impulse_m4_s.copy()
+    heading, kappa = rings.heading.copy(), rings.kappa.copy()
+    joined_last = False
+    for a, b in itertools.pairwise(order):
+        close = (
+            not joined_last
+            and rings.stream[a] == rings.stream[b]
+            and abs(math.log(radius[a] / radius[b])) < _RING_MERGE * _LOG_WIDTH
+            and np.hypot(*(centre[a] - centre[b])) < _RING_MERGE * _LOG_WIDTH * radius[a]
+        )
+        joined_last = bool(close)
+        if not close:
+            continue
+        share = impulse[a] / (impulse[a] + impulse[b])
+        # The newer ring b takes a's part, so that the order within a jet stays.
+        centre[b] = share * centre[a] + (1 - share) * centre[b]
+        radius[b] = share * radius[a] + (1 - share) * radius[b]
+        turned = share * heading[a] + (1 - share) * heading[b]
+        heading[b] = turned / max(float(np.hypot(*turned)), 1e-12)
+        kappa[b] = share * kappa[a] + (1 - share) * kappa[b]
+        impulse[b] += impulse[a]
+        keep[a] = False
+    return Rings(centre, radius, impulse, heading, kappa, rings.stream).take(keep)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _sum_rings(points: Array, rings: Array, bed: float, out: Array) -> None:
+    """Sum over rings, whose columns are as packed by `ring_velocity`."""
+    root_half_pi = math.sqrt(math.pi / 2)
+    for p in range(points.shape[0]):
+        height = max(bed - points[p, 2], 0.0)
+        u = v = up = 0.0
+        for j in range(rings.shape[0]):
+            dx, dy = points[p, 0] - rings[j, 0], points[p, 1] - rings[j, 1]
+            r2 = dx * dx + dy * dy
+            if r2 < rings[j, 8] or r2 > rings[j, 9]:
+                continue
+            r = math.sqrt(r2)
+            kappa = rings[j, 6]
+            w = 1.0
+            if kappa > 0.0:
+                w = rings[j, 7] * math.exp(kappa * (dx * rings[j, 4] + dy * rings[j, 5]) / r)
+            root_w = math.sqrt(w)
+            R = rings[j, 2] * math.sqrt(root_w)
+            t = math.log(r / R)
+            if abs(t) > _REACH or height > 8.0 * R:
+                continue
+            g = math.exp(-t * t / (2.0 * _LOG_WIDTH * _LOG_WIDTH))
+            delta = WALL_JET_SPREAD * R
+            layer = delta * root_half_pi * math.erf(height / (math.sqrt(2.0) * delta))
+            slope = math.exp(-height * height / (2.0 * delta * delta)) - layer / R
+            a = rings[j, 3] * root_w * g * math.exp(-height / R) / r
+            radial = a * slope / r
+            u += dx * radial
+            v += dy * radial
+            up += a * t * layer / (_LOG_WIDTH * _LOG_WIDTH * r)
+        out[p, 0] += u
+        out[p, 1] += v
+        out[p, 2] -= up

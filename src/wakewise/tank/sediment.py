@@ -1,0 +1,266 @@
+"""Silt on the bed and in the water: lifted by jets, carried, mixed, settled; no gram is lost.
+
+The bed is a grid of cells with a load in kg/m2. Where the water's shear stress exceeds the silt's threshold, silt
+leaves its cell at Partheniades' rate as particles, each standing for a parcel of silt. Particles move with the water,
+sink, and walk at random with the eddy diffusivity K = K0 + 0.40 u* min(h, H), h the height above the bed and u* the
+friction velocity of the cell below (mixing length theory next to a wall), including the
+drift grad K that keeps well-mixed silt mixed (Visser 1997, doi 10.3354/meps158275).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from wakewise.arrays import Array, IntArray
+from wakewise.interfaces import Flow, ScalarGrid
+from wakewise.tank.grains import (
+    VON_KARMAN,
+    erosion_rate_kg_m2_s,
+    friction_velocity_m_s,
+    settling_speed_m_s,
+    threshold_stress_Pa,
+)
+
+CELL_M = 0.05
+SHEAR_HEIGHT_M = 0.01  # where the log law takes the water's speed from; the wall jets' slip speed stands for it
+BACKGROUND_DIFFUSIVITY_M2_S = 1e-5  # still tank water, low end of 1e-5..1e-4
+MIXING_HEIGHT_M = 0.065  # 0.40 u* h reaches a jet's 0.022 sqrt(T/rho) about here, and grows no more
+_FIRST_HEIGHT_M = 0.005  # silt that leaves the bed starts evenly spread below this
+
+
+@dataclass(frozen=True, kw_only=True)
+class SiltLaws:
+    """What the silt is made of."""
+
+    grain_m: float
+    grain_density_kg_m3: float
+    water_density_kg_m3: float
+    erosion_kg_m2_s: float
+    threshold_Pa: float
+    settling_m_s: float
+
+    @classmethod
+    def of(
+        cls,
+        grain_m: float,
+        grain_density_kg_m3: float,
+        water_density_kg_m3: float,
+        erosion_kg_m2_s: float,
+        threshold_Pa: float | None = None,
+    ) -> SiltLaws:
+        """Laws of a grain; its own threshold unless one is given."""
+        own = threshold_stress_Pa(grain_m, grain_density_kg_m3, water_density_kg_m3)
+        return cls(
+            grain_m=grain_m,
+            grain_density_kg_m3=grain_density_kg_m3,
+            water_density_kg_m3=water_density_kg_m3,
+            erosion_kg_m2_s=erosion_kg_m2_s,
+            threshold_Pa=own if threshold_Pa is None else threshold_Pa,
+            settling_m_s=settling_speed_m_s(grain_m, grain_density_kg_m3, water_density_kg_m3),
+        )
+
+
+class Silt:
+    """Silt of one tank.
+
+    Parameters
+    ----------
+    laws : SiltLaws
+    load_kg_m2 : float
+        On every part of the bed at the start.
+    size_m : tuple of three floats
+        Length, width and depth of the tank, whose bed is at z = depth and whose middle is at x = y = 0.
+    max_particles : int
+        Above this, pairs of neighbouring particles become one: the mass adds up, the place is that of one of the two,
+        drawn with their masses as odds, which keeps the expected distribution.
+    rng : numpy Generator
+    """
+
+    def __init__(
+        self,
+        laws: SiltLaws,
+        load_kg_m2: float,
+        size_m: tuple[float, float, float],
+        max_particles: int,
+        rng: np.random.Generator,
+    ) -> None:
+        self.laws = laws
+        self._size = np.array(size_m)
+        self._shape = (math.ceil(size_m[0] / CELL_M), math.ceil(size_m[1] / CELL_M))
+        # Cells are stretched a little so that a whole number of them covers the bed.
+        self._cell = self._size[:2] / np.array(self._shape)
+        self._low = -self._size[:2] / 2
+        self.bed_kg_m2: Array = np.full(self._shape, load_kg_m2)
+        self._star_m_s: Array = np.zeros(self._shape)
+        self.position_m: Array = np.zeros((0, 3))
+        self.mass_kg: Array = np.zeros(0)
+        self._max = max_particles
+        self._rng = rng
+        # A full set of new particles stands for the load of 0.01 m2; every pairing doubles the mass of the next ones.
+        self._birth_kg = max(0.01 * load_kg_m2 / max_particles, 1e-12)
+        self.pairings = 0
+
+    @property
+    def total_kg(self) -> float:
+        """Bed and water together."""
+        return math.fsum(self.bed_kg_m2.ravel()) * float(self._cell.prod()) + math.fsum(self.mass_kg)
+
+    @property
+    def suspended_kg(self) -> float:
+        """In the water."""
+        return math.fsum(self.mass_kg)
+
+    def step(self, flow: Flow, stirred_W_m: Array, dt_s: float) -> None:
+        """Erode, carry, mix and settle over dt_s.
+
+        Parameters
+        ----------
+        flow : Flow
+            Water at this instant.
+        stirred_W_m : ndarray, shape (n, 3)
+            Circles on the bed, (x, y, radius), outside which no jet stirs it; only the current acts there.
+        dt_s : float
+        """
+        self._shear(flow, stirred_W_m)
+        self._erode(dt_s)
+        if len(self.mass_kg):
+            self._carry(flow, dt_s)
+            self._mix(dt_s)
+            self._pair()
+
+    def concentration(self, origin_W_m: Array, spacing_m: float, shape: tuple[int, int, int]) -> ScalarGrid:
+        """Silt in kg/m3 on a grid; each particle is shared among the eight nodes round it (cloud in cell)."""
+        values = np.zeros(shape)
+        if len(self.mass_kg):
+            at = (self.position_m - origin_W_m) / spacing_m
+            # The lowest layer of nodes may lie on the bed: what is below it is counted there, not lost.
+            first = np.floor(at).astype(np.int64)
+            share = at - first
+            for corner in np.ndindex(2, 2, 2):
+                node = first + corner
+                weight = np.prod(np.where(np.array(corner) == 1, share, 1 - share), axis=1)
+                inside = np.all((node >= 0) & (node < shape), axis=1)
+                np.add.at(values, tuple(node[inside].T), (self.mass_kg * weight)[inside])
+        half = np.ones(shape[2])
+        bed = (self._size[2] - origin_W_m[2]) / spacing_m
+        # A node on the bed has water only on its upper side.
+        if 0 <= bed <= shape[2] - 1 and abs(bed - round(bed)) < 1e-6:
+            half[round(bed)] = 0.5
+        return ScalarGrid(origin_W_m=origin_W_m, spacing_m=spacing_m, values=values / (spacing_m**3 * half))
+
+    def _cells(self, xy_m: Array) -> tuple[IntArray, IntArray]:
+        index = np.floor((xy_m[:, :2] - self._low) / self._cell).astype(np.int64)
+        index = np.clip(index, 0, np.array(self._shape) - 1)
+        return index[:, 0], index[:, 1]
+
+    def _centres(self) -> tuple[Array, Array]:
+        x = self._low[0] + (np.arange(self._shape[0]) + 0.5) * self._cell[0]
+        y = self._low[1] + (np.arange(self._shape[1]) + 0.5) * self._cell[1]
+        return x, y
+
+    def _shear(self, flow: Flow, stirred_W_m: Array) -> None:
+        """Friction velocity of every cell: from the water over it where jets reach, from the current elsewhere."""
+        x, y = self._centres()
+        near = np.zeros(self._shape, dtype=np.bool_)
+        for cx, cy, radius in stirred_W_m:
+            near |= (x[:, None] - cx) ** 2 + (y[None, :] - cy) ** 2 < (radius + CELL_M) ** 2
+        depth = self._size[2]
+        far = np.array([[0.0, 0.0, depth]])
+        speed = np.empty(self._shape)
+        # Away from the jets the water moves as it does in the farthest corner.
+        far[0, :2] = self._low
+        speed[:] = np.linalg.norm(flow.velocity(far)[0, :2])
+        i, j = np.nonzero(near)
+        if len(i):
+            points = np.stack([x[i], y[j], np.full(len(i), depth)], axis=1)
+            speed[i, j] = np.linalg.norm(flow.velocity(points)[:, :2], axis=1)
+        self._star_m_s = friction_velocity_m_s(speed, SHEAR_HEIGHT_M, self.laws.grain_m)
+
+    def _erode(self, dt_s: float) -> None:
+        """Lift whole particles, drawn so that on average each cell loses what the law says, at once."""
+        laws = self.laws
+        stress = laws.water_density_kg_m3 * self._star_m_s**2
+        area = float(self._cell.prod())
+        rate = erosion_rate_kg_m2_s(stress, laws.threshold_Pa, laws.erosion_kg_m2_s)
+        i, j = np.nonzero((rate > 0.0) & (self.bed_kg_m2 > 0.0))
+        if not len(i):
+            return
+        worth = rate[i, j] * area * dt_s / self._birth_kg
+        lifted = np.floor(worth + self._rng.uniform(size=len(i)))
+        i, j, lifted = i[lifted > 0], j[lifted > 0], lifted[lifted > 0]
+        mass = np.minimum(lifted * self._birth_kg, self.bed_kg_m2[i, j] * area)
+        self.bed_kg_m2[i, j] = np.maximum(self.bed_kg_m2[i, j] - mass / area, 0.0)
+        place = self._rng.uniform(size=(len(i), 3))
+        position = np.empty((len(i), 3))
+        position[:, :2] = self._low + (np.stack([i, j], axis=1) + place[:, :2]) * self._cell
+        position[:, 2] = self._size[2] - _FIRST_HEIGHT_M * place[:, 2]
+        self.position_m = np.concatenate([self.position_m, position])
+        self.mass_kg = np.concatenate([self.mass_kg, mass])
+
+    def _carry(self, flow: Flow, dt_s: float) -> None:
+        """Move with the water and sink; what sinks onto the bed stays there."""
+        u = flow.velocity(self.position_m)
+        height = self._size[2] - self.position_m[:, 2]
+        down = np.maximum(u[:, 2], 0.0)
+        # Downward flow vanishes at the bed in proportion to the height, so water alone never carries silt into it.
+        flown = height * np.exp(-down * dt_s / np.maximum(height, 1e-9)) - np.minimum(u[:, 2], 0.0) * dt_s
+        settled = flown - self.laws.settling_m_s * dt_s
+        position = self.position_m + u * dt_s
+        position[:, 2] = self._size[2] - settled
+        position = self._within_walls(position)
+        landed = settled <= 0.0
+        i, j = self._cells(position[landed])
+        np.add.at(self.bed_kg_m2, (i, j), self.mass_kg[landed] / float(self._cell.prod()))
+        self.position_m, self.mass_kg = position[~landed], self.mass_kg[~landed]
+
+    def _mix(self, dt_s: float) -> None:
+        """Random walk with drift; the bed turns it back, since only sinking deposits (flux w_s C, Krone 1962)."""
+        if not len(self.mass_kg):
+            return
+        i, j = self._cells(self.position_m)
+        star = self._star_m_s[i, j]
+        height = self._size[2] - self.position_m[:, 2]
+        slopes = np.gradient(self._star_m_s, self._cell[0], self._cell[1])
+        mixing = VON_KARMAN * np.minimum(height, MIXING_HEIGHT_M)
+        drift = np.stack(
+            [mixing * slopes[0][i, j], mixing * slopes[1][i, j], -VON_KARMAN * star * (height < MIXING_HEIGHT_M)],
+            axis=1,
+        )
+        # K half a drift step on, as Visser's scheme has it, keeps the mixture even next to the bed.
+        on = np.abs(height - 0.5 * drift[:, 2] * dt_s)
+        K = BACKGROUND_DIFFUSIVITY_M2_S + VON_KARMAN * star * np.minimum(on, MIXING_HEIGHT_M)
+        kick = self._rng.standard_normal(self.position_m.shape) * np.sqrt(2 * K * dt_s)[:, None]
+        self.position_m = self._within_walls(self.position_m + drift * dt_s + kick)
+
+    def _within_walls(self, position_m: Array) -> Array:
+        """Turn back at walls, surface and bed."""
+        half = self._size[:2] / 2
+        position = position_m.copy()
+        position[:, :2] = np.clip(
+            np.where(
+                np.abs(position[:, :2]) > half, np.sign(position[:, :2]) * 2 * half - position[:, :2], position[:, :2]
+            ),
+            -half,
+            half,
+        )
+        z = np.abs(position[:, 2])
+        position[:, 2] = np.clip(np.where(z > self._size[2], 2 * self._size[2] - z, z), 0.0, self._size[2])
+        return position
+
+    def _pair(self) -> None:
+        while len(self.mass_kg) > self._max:
+            box = np.floor((self.position_m - np.array([*self._low, 0.0])) / (2 * CELL_M)).astype(np.int64)
+            order = np.lexsort((self.mass_kg, box[:, 2], box[:, 1], box[:, 0]))
+            n = len(order) // 2
+            a, b = order[: 2 * n : 2], order[1 : 2 * n : 2]
+            total = self.mass_kg[a] + self.mass_kg[b]
+            first = self._rng.uniform(size=n) * total < self.mass_kg[a]
+            chosen = np.where(first[:, None], self.position_m[a], self.position_m[b])
+            rest = order[2 * n :]
+            self.position_m = np.concatenate([chosen, self.position_m[rest]])
+            self.mass_kg = np.concatenate([total, self.mass_kg[rest]])
+            self._birth_kg *= 2
+            self.pairings += 1

@@ -1,0 +1,240 @@
+"""The simulated tank: vehicle, water, silt and sensors on one clock, and what the water does at the target."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from wakewise.arrays import Array
+from wakewise.errors import InputError
+from wakewise.interfaces import BodyState, Measurement, ScalarGrid
+from wakewise.tank.grains import beam_attenuation_per_m, speed_at_stress_m_s
+from wakewise.tank.plant import VehiclePlant
+from wakewise.tank.probes import bed_points, surface_points, water_points
+from wakewise.tank.sediment import SHEAR_HEIGHT_M, Silt, SiltLaws
+from wakewise.tank.sensors import Sensors
+from wakewise.tank.settings import TankSettings
+from wakewise.tank.water import Water
+from wakewise.targets import Target
+from wakewise.vehicles import Vehicle, electrical_power_W
+
+GRID_SPACING_M = 0.05
+_GRID_HALF_M = 0.8
+_GRID_HEIGHT_M = 1.0
+_CLOSE_M = 0.3  # bed and water within this of the target count as being at it
+_PROBES = 300
+_SILT_STEP_S = 0.1  # longest step of the silt: a few cm of travel in the fastest wall jets
+_STIRRING_SHARE = 0.4  # jets slower than this share of the threshold's speed are left out of the search for erosion
+_TIME_TOLERANCE_S = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True)
+class WaterMeasure:
+    """What the thrusters do to the water at the target, at one instant.
+
+    Speeds are in excess of the same water without thrusters. `target_speed_*` on points spread evenly over the target's
+    surface; `bed_speed_p95_m_s` 1 to 2 cm above the bed within 0.3 m of the target's foot; `turbidity_per_m` is the
+    mean beam attenuation by silt in the water within 0.3 m of the target's centre.
+    """
+
+    target_speed_mean_m_s: float
+    target_speed_p95_m_s: float
+    bed_speed_p95_m_s: float
+    turbidity_per_m: float
+
+
+class Tank:
+    """The simulated world of a trial (a `Plant`); its truth is for the record and never for the controller.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        The plant's own parameters, which differ from what the controller believes.
+    target : Target
+        Standing on the bed, at the tank's depth.
+    settings : TankSettings
+    start : BodyState
+    rng : numpy Generator
+        Its children serve water, silt, sensors and probes.
+
+    Raises
+    ------
+    InputError
+        If the vehicle starts in the floor, a wall, the air or the target, or the target does not stand on the bed.
+    """
+
+    def __init__(
+        self, vehicle: Vehicle, target: Target, settings: TankSettings, start: BodyState, rng: np.random.Generator
+    ) -> None:
+        length, width, depth = settings.size_m
+        if abs(target.bed_z_m - depth) > 1e-6:
+            raise InputError(
+                f"target {target.name}: stands on a bed at {target.bed_z_m:g} m, tank.size_m has {depth:g}"
+            )
+        water_rng, silt_rng, sensor_rng, probe_rng = rng.spawn(4)
+        self.settings = settings
+        self.target = target
+        current = np.array(settings.current_m_s)
+        self._plant = VehiclePlant(
+            vehicle,
+            start,
+            density_kg_m3=settings.density_kg_m3,
+            current_W_m_s=current,
+            size_m=settings.size_m,
+            target_W_m=target.mesh.vertices_m,
+        )
+        self.water = Water(
+            vehicle.disk_areas_m2,
+            density_kg_m3=settings.density_kg_m3,
+            bed_z_m=depth,
+            rng=water_rng,
+            current_W_m_s=current,
+            half_size_m=(length / 2, width / 2),
+            turbulence=settings.turbulence,
+            max_parcels=settings.max_parcels,
+        )
+        laws = SiltLaws.of(
+            settings.grain_m,
+            settings.grain_density_kg_m3,
+            settings.density_kg_m3,
+            settings.erosion_kg_m2_s,
+            settings.erosion_threshold_Pa,
+        )
+        self.silt = Silt(laws, settings.silt, settings.size_m, settings.max_silt_particles, silt_rng)
+        self._stirring_speed = _STIRRING_SHARE * speed_at_stress_m_s(
+            laws.threshold_Pa / settings.density_kg_m3, SHEAR_HEIGHT_M, laws.grain_m
+        )
+        self._sensors = Sensors(settings, sensor_rng)
+        self._probes = (
+            surface_points(target, _PROBES, probe_rng),
+            bed_points(target.centre_W_m, depth, _CLOSE_M),
+            water_points(target, _CLOSE_M),
+        )
+        self._time = 0.0
+        self._flow_time = 0.0
+        self._flow_steps = 0
+        self._silt_every = max(1, math.floor(_SILT_STEP_S / settings.flow_step_s + 1e-9))
+        self._impulse_N_s = np.zeros((len(vehicle.thrusters), 2))
+        self._disks_before_m = self._plant.disks()[0]
+        self._touching = ""
+        self._measured: WaterMeasure | None = None
+
+    @property
+    def time_s(self) -> float:
+        """Time since the start."""
+        return self._time
+
+    @property
+    def state(self) -> BodyState:
+        """True pose and twist."""
+        return self._plant.state
+
+    @property
+    def thrusts_N(self) -> Array:
+        """True force of each thruster, shape (n,)."""
+        return self._plant.thrusts_N
+
+    @property
+    def power_W(self) -> float:
+        """Estimated electrical power of all thrusters."""
+        areas = self._plant.vehicle.disk_areas_m2
+        return float(electrical_power_W(self.thrusts_N, areas, water_density_kg_m3=self.settings.density_kg_m3).sum())
+
+    @property
+    def collision(self) -> bool:
+        """Whether the hull touched anything during the last step."""
+        return bool(self._touching)
+
+    @property
+    def touching(self) -> str:
+        """What it touched: "the floor", "a wall", "the target", or nothing."""
+        return self._touching
+
+    def step(self, thrusts_N: Array, dt_s: float) -> tuple[Measurement, ...]:
+        """Hold commanded thrusts, shape (n,), for dt_s; return what the sensors handed over, oldest sample first.
+
+        Raises
+        ------
+        InputError
+            If the commands do not match the thrusters or are not finite, or dt_s is not positive.
+        """
+        commands = np.asarray(thrusts_N, dtype=np.float64)
+        n = len(self._plant.vehicle.thrusters)
+        if commands.shape != (n,) or not np.all(np.isfinite(commands)):
+            raise InputError(
+                f"thrusts_N: shape {commands.shape} with values {commands.tolist()}, needs {n} finite ones"
+            )
+        if not (math.isfinite(dt_s) and dt_s > 0.0):
+            raise InputError(f"dt_s: {dt_s:g}, must be finite and more than 0")
+        end = self._time + dt_s
+        self._touching = ""
+        while end - self._time > _TIME_TOLERANCE_S:
+            flow_due = (self._flow_steps + 1) * self.settings.flow_step_s
+            stop = min(self._time + self.settings.plant_step_s, end, flow_due, self._sensors.next_due_s())
+            self._advance(commands, max(stop - self._time, 0.0))
+            if flow_due - self._time < _TIME_TOLERANCE_S:
+                self._move_water()
+        self._touching = self._touching or self._plant.touches()
+        return self._sensors.collect(self._time)
+
+    def excess_velocity(self, points_W_m: Array) -> Array:
+        """Velocity of the water less that of the same water without thrusters, shape (n, 3)."""
+        return self.water.excess_velocity(points_W_m)
+
+    def bed_speed_m_s(self, xy_W_m: Array) -> Array:
+        """Excess speed, shape (n,), 1.5 cm above the bed at horizontal places, shape (n, 2)."""
+        xy = np.atleast_2d(np.asarray(xy_W_m, dtype=np.float64))
+        points = np.concatenate([xy, np.full((len(xy), 1), self.settings.size_m[2] - 0.015)], axis=1)
+        speed: Array = np.linalg.norm(self.excess_velocity(points), axis=1)
+        return speed
+
+    def concentration_grid(self) -> ScalarGrid:
+        """Silt in kg/m3 over 1.6 x 1.6 m about the target's foot, from the bed up to 1 m or the surface."""
+        centre, depth = self.target.centre_W_m, self.settings.size_m[2]
+        layers = int(min(_GRID_HEIGHT_M, depth) / GRID_SPACING_M + 1e-9) + 1
+        across = 2 * round(_GRID_HALF_M / GRID_SPACING_M) + 1
+        origin = np.array([centre[0] - _GRID_HALF_M, centre[1] - _GRID_HALF_M, depth - (layers - 1) * GRID_SPACING_M])
+        return self.silt.concentration(origin, GRID_SPACING_M, (across, across, layers))
+
+    def measure(self) -> WaterMeasure:
+        """Speeds and turbidity at the target now; the water moves in steps, so it is computed once for each."""
+        if self._measured is None:
+            surface, bed, water = self._probes
+            speed = np.linalg.norm(self.excess_velocity(np.concatenate([surface, bed])), axis=1)
+            at_target, at_bed = speed[: len(surface)], speed[len(surface) :]
+            grid = self.concentration_grid()
+            node = np.rint((water - grid.origin_W_m) / grid.spacing_m).astype(np.int64)
+            silt = float(grid.values[tuple(node.T)].mean())
+            laws = self.silt.laws
+            self._measured = WaterMeasure(
+                target_speed_mean_m_s=float(at_target.mean()),
+                target_speed_p95_m_s=float(np.quantile(at_target, 0.95)),
+                bed_speed_p95_m_s=float(np.quantile(at_bed, 0.95)),
+                turbidity_per_m=float(beam_attenuation_per_m(silt, laws.grain_m, laws.grain_density_kg_m3)),
+            )
+        return self._measured
+
+    def _advance(self, commands_N: Array, dt_s: float) -> None:
+        before = self._plant.thrusts_N
+        self._plant.step(commands_N, dt_s)
+        mean = 0.5 * (before + self._plant.thrusts_N)
+        self._impulse_N_s[:, 0] += np.maximum(mean, 0.0) * dt_s
+        self._impulse_N_s[:, 1] += np.maximum(-mean, 0.0) * dt_s
+        self._time += dt_s
+        if self._sensors.next_due_s() - self._time < _TIME_TOLERANCE_S:
+            self._sensors.sample(self._time, self._plant.state)
+
+    def _move_water(self) -> None:
+        origins, axes = self._plant.disks()
+        dt_s = self.settings.flow_step_s
+        self.water.step(dt_s, self._disks_before_m, origins, axes, self._impulse_N_s)
+        self._disks_before_m = origins
+        self._impulse_N_s = np.zeros_like(self._impulse_N_s)
+        self._flow_steps += 1
+        if self.settings.silt > 0.0 and self._flow_steps % self._silt_every == 0:
+            circles = self.water.stirred_bed(self._stirring_speed)
+            self.silt.step(self.water, circles, self._silt_every * dt_s)
+        self._touching = self._touching or self._plant.touches()
+        self._measured = None

@@ -1,0 +1,125 @@
+"""Wall jets on the bed: Rajaratnam's law, no divergence, the readable twin."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.special import erf, i0, i1
+
+from wakewise.tank.bedjets import (
+    _LOG_WIDTH,
+    WALL_JET_SPEED,
+    WALL_JET_SPREAD,
+    Rings,
+    coarsened,
+    grown,
+    layer_speed,
+    lean,
+    ring_strength,
+    ring_velocity,
+    rings_from_strikes,
+)
+
+BED_Z_M = 1.5
+
+
+def _rings(leaning=True):
+    impulse = np.array([[0.0, 0.0, 1e-3], [4e-4, -3e-4, 8e-4], [0.0, 1e-4, 5e-4]])
+    if not leaning:
+        impulse[:, :2] = 0.0
+    position = np.array([[0.0, 0.0, 1.45], [0.1, 0.05, 1.4], [-0.2, 0.1, 1.42]])
+    return rings_from_strikes(position, impulse, np.array([0.05, 0.08, 0.06]), np.array([0, 0, 2]))
+
+
+def _steady(M=1e-3, seconds=40.0, dt_s=0.05):
+    """Rings of an upright jet of steady momentum flux M, struck at every step."""
+    rings = Rings.none()
+    for _ in range(round(seconds / dt_s)):
+        rings, _ = grown(rings, np.zeros(3), dt_s)
+        new = rings_from_strikes(
+            np.array([[0.0, 0.0, 1.4]]), np.array([[0.0, 0.0, M * dt_s]]), np.array([0.03]), np.zeros(1, dtype=np.int64)
+        )
+        rings = coarsened(rings.joined(new))
+    return rings
+
+
+def _twin(points, rings, bed_z_m):
+    u = np.zeros_like(points)
+    strength = ring_strength(rings)
+    for k in range(rings.count):
+        d = points[:, :2] - rings.centre_m[k]
+        r, h = np.linalg.norm(d, axis=1), bed_z_m - points[:, 2]
+        w = np.exp(rings.kappa[k] * (d @ rings.heading[k]) / r) / i0(rings.kappa[k])
+        R, A = rings.radius_m[k] * w**0.25, strength[k] * np.sqrt(w)
+        t, delta = np.log(r / R), WALL_JET_SPREAD * rings.radius_m[k] * w**0.25
+        g = np.where(np.abs(t) < 4 * _LOG_WIDTH, np.exp(-(t**2) / (2 * _LOG_WIDTH**2)), 0.0)
+        layer = delta * np.sqrt(np.pi / 2) * erf(h / (np.sqrt(2) * delta))
+        dF = (np.exp(-(h**2) / (2 * delta**2)) - layer / R) * np.exp(-h / R)
+        u[:, :2] += d * (A * g * dF / r**2)[:, None]
+        u[:, 2] -= A * g * t / (_LOG_WIDTH**2 * r**2) * layer * np.exp(-h / R)
+    return u
+
+
+def test_the_fast_sum_is_the_formula_as_written():
+    """Kernel and twin agree to rounding."""
+    points = np.random.default_rng(0).uniform([-0.6, -0.6, 1.2], [0.6, 0.6, 1.5], (300, 3))
+    assert ring_velocity(points, _rings(), BED_Z_M) == pytest.approx(_twin(points, _rings(), BED_Z_M), abs=1e-12)
+
+
+def test_a_steady_upright_jet_spreads_as_measured():
+    """Speed at the bed within 10 % of 1.16 sqrt(M)/r, and half of it at 0.09 r within 10 %."""
+    M, rings = 1e-3, _steady()
+    for r in (0.15, 0.2, 0.3, 0.5):
+        u = ring_velocity(np.array([[r, 0.0, BED_Z_M]]), rings, BED_Z_M)[0, 0]
+        assert u * r / math.sqrt(M) == pytest.approx(WALL_JET_SPEED, rel=0.10)
+        heights = np.linspace(0, 0.25 * r, 100)
+        profile = ring_velocity(np.column_stack([np.full(100, r), 0 * heights, BED_Z_M - heights]), rings, BED_Z_M)
+        half = np.interp(-0.5 * u, -profile[:, 0], heights)
+        assert half / r == pytest.approx(0.09, rel=0.10)
+
+
+def test_wall_jets_have_no_divergence_even_when_they_lean():
+    """Central differences of the velocity sum to zero, relative to the velocity gradient."""
+    rng = np.random.default_rng(5)
+    points, h = rng.uniform([-0.5, -0.5, 1.3], [0.5, 0.5, 1.49], (200, 3)), 1e-5
+    gradient = np.stack(
+        [
+            (ring_velocity(points + h * e, _rings(), BED_Z_M) - ring_velocity(points - h * e, _rings(), BED_Z_M))
+            / (2 * h)
+            for e in np.eye(3)
+        ]
+    )
+    # Each ring is cut off where g is 4e-4; points there see a step.
+    divergence = np.abs(np.einsum("ini->n", gradient))
+    assert np.quantile(divergence, 0.98) < 1e-4 * np.abs(gradient).max()
+
+
+def test_nothing_flows_through_the_bed():
+    """The vertical velocity vanishes on the bed."""
+    xy = np.random.default_rng(2).uniform(-0.5, 0.5, (100, 2))
+    u = ring_velocity(np.column_stack([xy, np.full(100, BED_Z_M)]), _rings(), BED_Z_M)
+    assert np.abs(u[:, 2]).max() == 0.0
+    assert np.abs(u[:, :2]).max() > 0.01
+
+
+def test_a_leaning_jet_keeps_its_horizontal_momentum():
+    """The mean direction I1/I0 of the azimuthal distribution is the horizontal share, within 2 %."""
+    share = np.linspace(0.05, 0.95, 19)
+    kappa = lean(share)
+    assert i1(kappa) / i0(kappa) == pytest.approx(share, rel=0.02)
+
+
+def test_merging_conserves_impulse_and_bounds_the_count():
+    """Rings of a jet that ran 800 steps number a few dozen and carry all of its impulse."""
+    rings = _steady()
+    assert rings.impulse_m4_s.sum() == pytest.approx(1e-3 * 40.0, rel=1e-12)
+    assert rings.count < 60
+
+
+def test_without_supply_a_wall_jet_fades():
+    """Ten seconds after the last strike the layer is slower everywhere."""
+    rings = _steady(seconds=10.0)
+    before = layer_speed(rings).max()
+    for _ in range(200):
+        rings, _ = grown(rings, np.zeros(3), 0.05)
+    assert layer_speed(rings).max() < 0.3 * before

@@ -1,0 +1,67 @@
+"""What a grain does in water, against published values."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wakewise.errors import InputError
+from wakewise.tank.grains import (
+    beam_attenuation_per_m,
+    erosion_rate_kg_m2_s,
+    friction_velocity_m_s,
+    settling_speed_m_s,
+    speed_at_stress_m_s,
+    threshold_stress_Pa,
+)
+
+CALCITE = 2710.0
+
+
+def test_calcite_sand_settles_and_moves_as_soulsby_says():
+    """0.3 mm sinks at 42 to 46 mm/s and moves at 0.187 Pa; 20 um at 0.34 mm/s and 0.063 Pa."""
+    assert 0.042 < settling_speed_m_s(3e-4, CALCITE, 998.0) < 0.0461
+    assert threshold_stress_Pa(3e-4, CALCITE, 998.0) == pytest.approx(0.187, rel=0.02)
+    assert settling_speed_m_s(20e-6, CALCITE, 998.0) == pytest.approx(0.34e-3, rel=0.10)
+    assert threshold_stress_Pa(20e-6, CALCITE, 998.0) == pytest.approx(0.063, rel=0.02)
+
+
+def test_fine_grains_settle_as_stokes_says():
+    """Below 30 um the settling speed is within 15 % of g (s-1) d^2 / (18 nu)."""
+    for d in (5e-6, 10e-6, 30e-6):
+        stokes = 9.80665 * (CALCITE / 1000 - 1) * d**2 / 18e-6
+        assert settling_speed_m_s(d, CALCITE, 1000.0) == pytest.approx(stokes, rel=0.15)
+
+
+def test_smooth_beds_follow_the_universal_log_law():
+    """Over fine silt u/u* is 2.5 ln(z u*/nu) + 5.5, within 2 %."""
+    star = float(friction_velocity_m_s(0.3, 0.01, 1e-6))
+    assert 0.3 / star == pytest.approx(2.5 * math.log(0.01 * star / 1e-6) + 5.5, rel=0.02)
+
+
+@given(st.floats(0.03, 2.0), st.floats(1e-6, 5e-4))
+def test_friction_velocity_and_its_inverse_agree(speed, grain):
+    """The speed at the stress that a speed makes is that speed, within 1 %."""
+    star = float(friction_velocity_m_s(speed, 0.01, grain))
+    assert speed_at_stress_m_s(star**2, 0.01, grain) == pytest.approx(speed, rel=0.01)
+
+
+def test_erosion_starts_at_the_threshold():
+    """Nothing below it, M at twice it."""
+    assert erosion_rate_kg_m2_s([0.0, 0.05, 0.1, 0.2], 0.1, 5e-5) == pytest.approx([0, 0, 0, 5e-5])
+
+
+def test_fifty_milligrams_of_silt_dim_a_beam():
+    """50 mg/L of 20 um calcite takes 2.8 /m, of 0.3 mm 0.18 /m; twice the silt, twice as much."""
+    assert float(beam_attenuation_per_m(0.05, 20e-6, CALCITE)) == pytest.approx(2.77, rel=0.01)
+    assert float(beam_attenuation_per_m(0.05, 3e-4, CALCITE)) == pytest.approx(0.18, rel=0.03)
+    assert np.allclose(beam_attenuation_per_m([0.1, 0.2], 20e-6, CALCITE), [5.535, 11.07], rtol=0.01)
+
+
+@pytest.mark.parametrize(("grain", "density"), [(0.0, CALCITE), (-1e-6, CALCITE), (20e-6, 900.0)])
+def test_grains_that_cannot_sink_are_refused(grain, density):
+    """A grain of no size, or lighter than water, is bad input."""
+    with pytest.raises(InputError, match="grain"):
+        settling_speed_m_s(grain, density, 1000.0)

@@ -1,0 +1,98 @@
+"""The plant: equilibrium, lag and limits, gains, the floor, collisions."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wakewise.errors import InputError
+from wakewise.geometry import Pose
+from wakewise.interfaces import BodyState
+from wakewise.tank import VehiclePlant
+from wakewise.vehicles import load_vehicle, perturbed
+
+VEHICLE = load_vehicle("paper")
+SIZE_M = (6.0, 5.0, 1.5)
+ROCK = np.array([[0.0, 0.0, 1.4], [0.0, 0.1, 1.5], [0.1, 0.0, 1.5]])
+
+
+def _plant(p=(-1.0, 0.0, 0.8), vehicle=VEHICLE, current=(0, 0, 0), nu=(0, 0, 0, 0, 0, 0)):
+    start = BodyState(X_WB=Pose(np.array(p, dtype=float)), nu_B=np.array(nu, dtype=float))
+    return VehiclePlant(
+        vehicle,
+        start,
+        density_kg_m3=1000.0,
+        current_W_m_s=np.array(current, dtype=float),
+        size_m=SIZE_M,
+        target_W_m=ROCK,
+    )
+
+
+def test_without_thrust_a_vehicle_drifts_with_the_current():
+    """After two minutes it moves as the water does."""
+    plant = _plant(current=(0.03, 0.0, 0.0))
+    for _ in range(6000):
+        plant.step(np.zeros(8), 0.02)
+    assert (plant.state.X_WB.R @ plant.state.nu_B[:3])[0] == pytest.approx(0.03, rel=0.15)
+
+
+def test_thrust_lags_and_is_limited():
+    """After one time constant 63 % of a step has come; no command exceeds the limits."""
+    plant, tau = _plant(), VEHICLE.time_constants_s[0]
+    for _ in range(20):
+        plant.step(np.full(8, 1.0), tau / 20)
+    assert plant.thrusts_N == pytest.approx(np.full(8, 1 - np.exp(-1)), rel=1e-6)
+    for _ in range(100):
+        plant.step(np.full(8, -1e4), 0.02)
+    assert plant.thrusts_N == pytest.approx(VEHICLE.thrust_lower_N, rel=1e-6)
+
+
+def test_true_gains_make_true_thrust():
+    """What the thrusters deliver is the command times the plant's own gains."""
+    own = perturbed(VEHICLE, np.random.default_rng(0), thrust_pct=20.0)
+    plant = _plant(vehicle=own)
+    for _ in range(200):
+        plant.step(np.full(8, 0.5), 0.02)
+    assert plant.thrusts_N == pytest.approx(0.5 * own.thrust_gains, rel=1e-6)
+    assert np.ptp(plant.thrusts_N) > 0.01
+
+
+def test_jets_leave_from_the_disks_of_the_moved_vehicle():
+    """Disk positions and axes turn and move with the body."""
+    plant = _plant()
+    origins, axes = plant.disks()
+    assert origins == pytest.approx(plant.state.X_WB.apply(VEHICLE.thruster_positions_B_m))
+    assert axes == pytest.approx(VEHICLE.thruster_axes_B @ plant.state.X_WB.R.T)
+
+
+def test_a_sinking_vehicle_stops_on_the_floor_and_says_so():
+    """It never passes the floor, and reports it."""
+    heavy = replace(VEHICLE, displaced_volume_m3=0.9 * VEHICLE.displaced_volume_m3)
+    plant = _plant(vehicle=heavy)
+    lowest = 0.0
+    for _ in range(600):
+        plant.step(np.zeros(8), 0.02)
+        lowest = max(lowest, plant.state.X_WB.apply(plant._corners_B_m)[:, 2].max())
+    assert lowest <= SIZE_M[2] + 1e-9
+    assert plant.touches() == "the floor"
+
+
+def test_a_vertex_of_the_target_in_the_hull_is_a_collision():
+    """Beside the rock there is none, over it there is."""
+    plant = _plant(p=(-0.3, 0.0, 1.3), nu=np.array([0.5, 0, 0, 0, 0, 0]))
+    assert plant.touches() == ""
+    for _ in range(100):
+        plant.step(np.zeros(8), 0.01)
+        if plant.touches():
+            break
+    assert plant.touches() == "the target"
+
+
+@pytest.mark.parametrize(
+    ("p", "what"),
+    [((0, 0, 1.4), "the floor"), ((2.9, 0, 0.8), "a wall"), ((0, 0.1, 1.31), "the target"), ((0, 0, 0.0), "surface")],
+)
+def test_bad_starts_are_refused(p, what):
+    """Starting in the floor, a wall, the target or the air is bad input, named in the message."""
+    with pytest.raises(InputError, match=what):
+        _plant(p=p)

@@ -1,0 +1,131 @@
+"""The tank as a whole: one clock, honest excess, determinism, silt in the picture, refusals."""
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from wakewise.errors import InputError
+from wakewise.geometry import Pose
+from wakewise.interfaces import BodyState, Plant
+from wakewise.tank import Tank, TankSettings
+from wakewise.tank.probes import bed_points, surface_points, water_points
+from wakewise.targets import Mesh, place_on_bed
+from wakewise.vehicles import load_vehicle
+
+VEHICLE = load_vehicle("paper")
+# A pyramid of 0.15 m: four sides and a foot.
+PYRAMID = place_on_bed(
+    "pyramid",
+    Mesh(
+        np.array([[0.07, 0.07, 0], [-0.07, 0.07, 0], [-0.07, -0.07, 0], [0.07, -0.07, 0], [0, 0, 0.15]]),
+        np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [0, 2, 1], [0, 3, 2]]),
+    ),
+    1.5,
+)
+HOLD_DOWN = VEHICLE.null_space @ np.full(VEHICLE.null_space.shape[1], 6.0)
+
+
+def _tank(p=(0.0, 0.0, 1.0), seed=0, **settings):
+    settings.setdefault("current_m_s", (0.0, 0.0, 0.0))
+    start = BodyState(X_WB=Pose(np.array(p, dtype=float)))
+    return Tank(VEHICLE, PYRAMID, TankSettings(**settings), start, np.random.default_rng(seed))
+
+
+def _fly(tank, seconds, thrusts=HOLD_DOWN, dt_s=0.02):
+    heard = []
+    for _ in range(round(seconds / dt_s)):
+        heard += tank.step(thrusts, dt_s)
+    return heard
+
+
+def test_a_tank_is_a_plant():
+    """It satisfies the Protocol that the loop flies, and its clock adds up."""
+    tank: Plant = _tank()
+    heard = _fly(tank, 1.0)
+    assert tank.time_s == pytest.approx(1.0)
+    assert len(heard) > 100
+    assert all(0.0 < m.time_s <= 1.0 + 1e-9 for m in heard)
+
+
+def test_without_thrust_nothing_is_stirred():
+    """A current alone moves water but gives no excess and lifts no silt."""
+    tank = _tank(current_m_s=(0.03, 0.02, 0.0))
+    _fly(tank, 1.0, np.zeros(8))
+    measure = tank.measure()
+    assert measure.target_speed_p95_m_s == 0.0
+    assert measure.bed_speed_p95_m_s == 0.0
+    assert measure.turbidity_per_m == 0.0
+    assert tank.water.velocity(np.array([[0.0, 0.0, 1.0]])) == pytest.approx(np.array([[0.03, 0.02, 0.0]]))
+
+
+def test_downwash_stirs_the_bed_and_clouds_the_water():
+    """Thrusters fighting each other above a silty bed raise silt at the target; a clean bed stays clear; mass stays."""
+    silty, clean = _tank(silt=1.0), _tank(silt=0.0)
+    mass = silty.silt.total_kg
+    for tank in (silty, clean):
+        _fly(tank, 4.0)
+    assert silty.measure().bed_speed_p95_m_s > 0.02
+    assert silty.silt.suspended_kg > 0.0
+    assert silty.concentration_grid().values.max() > 0.0
+    assert clean.concentration_grid().values.max() == 0.0
+    assert silty.silt.total_kg == pytest.approx(mass, rel=1e-9)
+    assert silty.concentration_grid().values.shape == (33, 33, 21)
+    assert tank.bed_speed_m_s([[0.2, 0.0]]).shape == (1,)
+
+
+def test_the_same_seed_gives_the_same_record():
+    """State, measurements, water and silt repeat to the byte; another seed differs."""
+    records = []
+    for seed in (1, 1, 2):
+        tank = _tank(seed=seed)
+        heard = _fly(tank, 2.0)
+        parts = [tank.state.X_WB.p_m, tank.state.nu_B, tank.excess_velocity(np.array([[0.1, 0.0, 1.2]]))]
+        parts += [tank.concentration_grid().values, np.array([m.depth_m for m in heard if m.depth_m is not None])]
+        records.append(b"".join(np.ascontiguousarray(part).tobytes() for part in parts))
+    assert records[0] == records[1] != records[2]
+
+
+def test_the_control_rate_does_not_change_the_physics():
+    """Held thrusts give the same flight at 50 Hz and at 20 Hz, apart from where samples split the steps."""
+    fine, coarse = _tank(turbulence=0.0), _tank(turbulence=0.0)
+    _fly(fine, 2.0, dt_s=0.02)
+    _fly(coarse, 2.0, dt_s=0.05)
+    assert fine.state.X_WB.p_m == pytest.approx(coarse.state.X_WB.p_m, abs=1e-6)
+    points = np.array([[0.2, 0.1, 1.3]])
+    assert fine.excess_velocity(points) == pytest.approx(coarse.excess_velocity(points), rel=1e-3, abs=1e-6)
+
+
+def test_probes_are_on_the_surface_and_even():
+    """Surface points lie on the pyramid's sides in proportion to area; bed and water points lie where they should."""
+    points = surface_points(PYRAMID, 400, np.random.default_rng(0))
+    across = np.abs(points[:, :2]).max(axis=1)
+    assert across == pytest.approx(0.07 * (points[:, 2] - 1.35) / 0.15, abs=1e-9)
+    quadrant = np.bincount((points[:, 0] > points[:, 1]) * 2 + (points[:, 0] > -points[:, 1]), minlength=4)
+    assert np.all(np.abs(quadrant - 100) <= 2)
+    bed = bed_points(PYRAMID.centre_W_m, 1.5, 0.3)
+    assert np.all(np.hypot(bed[:, 0], bed[:, 1]) <= 0.3)
+    assert np.all((bed[:, 2] >= 1.48) & (bed[:, 2] <= 1.49))
+    water = water_points(PYRAMID, 0.3)
+    assert len(water) > 300
+    assert np.all(np.linalg.norm(water - PYRAMID.centre_W_m, axis=1) <= 0.3)
+
+
+def test_bad_commands_are_refused():
+    """Wrong number of thrusts, values that are not finite, and a step of no time are bad input."""
+    tank = _tank()
+    for thrusts, dt_s in ((np.zeros(3), 0.02), (np.full(8, np.nan), 0.02), (np.zeros(8), 0.0)):
+        with pytest.raises(InputError):
+            tank.step(thrusts, dt_s)
+
+
+def test_a_target_off_the_bed_is_refused():
+    """A target placed for another depth does not stand in this tank."""
+    with pytest.raises(InputError, match="stands on a bed"):
+        _tank(size_m=(6.0, 5.0, 2.0))
+
+
+@pytest.mark.parametrize("bad", [{"silt": -0.1}, {"grain_m": 0.0}, {"flow_step_s": 0.0}, {"sillt": 1.0}])
+def test_bad_settings_are_refused(bad):
+    """Negative silt, a grain of no size, no time step and unknown fields do not validate."""
+    with pytest.raises(ValidationError):
+        TankSettings(**bad)
