@@ -1,0 +1,36 @@
+"""What the camera would have seen: a lit and textured scene, the water between, motion blur and sensor noise.
+
+`Scene.build` sets the target on its bed, `render` draws it as if there were no water, and `photograph` adds water,
+silt, flakes, the camera's motion while the shutter is open and the sensor. Everything is a function of the true poses,
+the true silt and a seed.
+"""
+
+from wakewise.imaging.blur import motion_blur, motion_px, pose_at
+from wakewise.imaging.camera import PinholeCamera
+from wakewise.imaging.optics import SiltOptics, WaterOptics, haze_between, through_water, water_optics, water_types
+from wakewise.imaging.photograph import Photo, photograph, photograph_of, sharpness
+from wakewise.imaging.renderer import Lights, Render, render
+from wakewise.imaging.scene import Scene
+from wakewise.imaging.settings import ImagingSettings
+
+__all__ = [
+    "ImagingSettings",
+    "Lights",
+    "Photo",
+    "PinholeCamera",
+    "Render",
+    "Scene",
+    "SiltOptics",
+    "WaterOptics",
+    "haze_between",
+    "motion_blur",
+    "motion_px",
+    "photograph",
+    "photograph_of",
+    "pose_at",
+    "render",
+    "sharpness",
+    "through_water",
+    "water_optics",
+    "water_types",
+]

@@ -1,0 +1,103 @@
+"""Down-welling light on every vertex, with the shade that target and stones cast: baked once per scene.
+
+Under water the sky is squeezed into Snell's window, 48.6 deg about the zenith for a refractive index of 4/3, and dim
+diffuse light comes from outside of it (Mobley, Light and Water, Academic Press 1994, section 4.2). The shares used here
+are a choice for a shallow tank under a bright overcast sky, not a measurement.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
+from numpy.typing import NDArray
+
+from wakewise.arrays import Array, IntArray
+
+SNELL_SIN = 0.75
+"""Sine of the half angle of Snell's window."""
+OUTSIDE_SHARE = 0.15
+"""Radiance outside of Snell's window relative to inside."""
+BED_REFLECTANCE = 0.36
+TARGET_REFLECTANCE = 0.2
+RAYS_TOTAL = 2_500_000
+"""Rays spent on a scene; large meshes get fewer per vertex, at least 8."""
+
+
+def sky_radiance(up: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Radiance from a direction whose upward component is `up`, relative to what gives a level surface irradiance 1.
+
+    Radiance is counted in units of irradiance / pi, so that its cosine-weighted mean over a hemisphere is the
+    irradiance. Downward directions see the lit bed.
+    """
+    inside_sin2 = SNELL_SIN**2
+    window = 1.0 / (inside_sin2 + OUTSIDE_SHARE * (1.0 - inside_sin2))
+    cos_edge = math.sqrt(1.0 - inside_sin2)
+    return np.where(up >= cos_edge, window, np.where(up >= 0.0, OUTSIDE_SHARE * window, BED_REFLECTANCE))
+
+
+def bake_daylight(
+    parts: Sequence[tuple[Array, IntArray]], normals: Sequence[Array], near_m: float
+) -> NDArray[np.float32]:
+    """Irradiance on the outer and the inner side of each vertex of target, bed and stones, shape (n, 2).
+
+    Parameters
+    ----------
+    parts : vertices (m) and faces of target, bed and stones, in the scene's frame
+    normals : their unit vertex normals
+    near_m : float
+        Bed vertices farther than this from the foot are taken as unshaded.
+    """
+    occluder = EmbreeScene()
+    for vertices, faces in (parts[0], parts[2]):
+        if len(faces):
+            TriangleMesh(occluder, np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int32))
+    out = []
+    for k, ((vertices, faces), normal) in enumerate(zip(parts, normals, strict=True)):
+        light = np.zeros((len(vertices), 2), np.float32)
+        lit = np.arange(len(vertices))
+        if k == 1:
+            light[:] = np.clip(0.5 - 0.5 * normal[:, 2:], 0.0, 1.0)
+            lit = np.nonzero(np.hypot(vertices[:, 0], vertices[:, 1]) < near_m)[0]
+        sides = (1.0, -1.0) if k == 0 else (1.0,)
+        rays = int(np.clip(RAYS_TOTAL // max(1, len(lit) * len(sides) * len(parts)), 8, 64))
+        for side, sign in enumerate(sides):
+            light[lit, side] = _irradiance(occluder, vertices[lit], sign * normal[lit], rays)
+        out.append(_smooth(light, faces) if len(faces) else light)
+    return np.concatenate(out).astype(np.float32)
+
+
+def _irradiance(occluder: EmbreeScene, points: Array, normals: Array, rays: int) -> NDArray[np.float64]:
+    """Mean radiance over a stratified cosine-weighted hemisphere of `rays` directions, shape (n,)."""
+    # The same golden-angle spiral everywhere, turned by a vertex's own angle so that no pattern shows.
+    k = np.arange(rays)
+    radius = np.sqrt((k + 0.5) / rays)
+    total = np.zeros(len(points))
+    helper = np.where(np.abs(normals[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    tangent = np.cross(normals, helper)
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-12)
+    bitangent = np.cross(normals, tangent)
+    turn = np.arange(len(points)) * 2.399963
+    start = np.ascontiguousarray(points + 3e-4 * normals, np.float32)
+    for i in range(rays):
+        a = turn + 2.399963 * k[i]
+        out = math.sqrt(1.0 - radius[i] ** 2)
+        way = radius[i] * (np.cos(a)[:, None] * tangent + np.sin(a)[:, None] * bitangent) + out * normals
+        hit = occluder.run(start, np.ascontiguousarray(way, np.float32), query="OCCLUDED") >= 0
+        total += np.where(hit, TARGET_REFLECTANCE * 0.5, sky_radiance(-way[:, 2]))
+    return total / rays
+
+
+def _smooth(light: NDArray[np.float32], faces: IntArray, passes: int = 2) -> NDArray[np.float32]:
+    """Average each vertex with the corners of its faces, to quieten the few rays per vertex."""
+    n = len(light)
+    corner = faces.ravel()
+    count = np.maximum(np.bincount(corner, minlength=n), 1)
+    for _ in range(passes):
+        face_mean = light[faces].mean(axis=1)
+        columns = [np.bincount(corner, np.repeat(face_mean[:, k], 3), minlength=n) / count for k in range(2)]
+        light = np.stack(columns, axis=1).astype(np.float32)
+    return light

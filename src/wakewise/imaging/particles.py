@@ -1,0 +1,134 @@
+"""Flakes that drift between camera and scene, lit by daylight and lamps, mostly out of focus.
+
+Silt's single grains are far below a pixel and make haze; what a camera sees as specks are aggregates, a few tenths of
+a millimetre across. Their number follows the concentration of silt, with a little in clear water.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numba import njit, prange
+
+from wakewise.arrays import Array
+from wakewise.geometry import Pose
+from wakewise.imaging.blur import pose_at
+from wakewise.imaging.camera import PinholeCamera
+from wakewise.imaging.optics import WaterOptics, sample_grid
+from wakewise.imaging.renderer import LAMP_REFERENCE_M, Image, Lights
+from wakewise.interfaces import ScalarGrid
+
+NEAREST_M, FARTHEST_M = 0.04, 0.6
+"""Range of depth in which flakes are drawn one by one."""
+MEDIAN_DIAMETER_M, LOG_SPREAD = 0.4e-3, 0.4
+APERTURE_M = 1.5e-3
+"""Entrance pupil, of a 4 mm lens at f/2.7."""
+FOCUS_M = 0.5
+REFLECTANCE = 0.5
+STEPS = 9
+"""Instants at which a streak is drawn."""
+
+
+def flake_positions(
+    camera: PinholeCamera,
+    X_WC: Pose,
+    silt: ScalarGrid | None,
+    per_m3: float,
+    per_kg: float,
+    rng: np.random.Generator,
+) -> Array:
+    """Draw where flakes are, shape (n, 3) in the camera frame: a Poisson process with density per_m3 + per_kg C."""
+    densest = per_m3 + (per_kg * float(silt.values.max(initial=0.0)) if silt is not None else 0.0)
+    f = camera.focal_px
+    volume = camera.width * camera.height / f**2 * (FARTHEST_M**3 - NEAREST_M**3) / 3.0
+    n = int(rng.poisson(densest * volume))
+    depth = (NEAREST_M**3 + rng.random(n) * (FARTHEST_M**3 - NEAREST_M**3)) ** (1.0 / 3.0)
+    pixels = rng.random((n, 2)) * np.array([camera.width, camera.height])
+    points_C = camera.rays(pixels) * depth[:, None]
+    keep = rng.random(n) * densest < per_m3 + per_kg * concentration(silt, X_WC.apply(points_C))
+    return points_C[keep]
+
+
+def concentration(silt: ScalarGrid | None, points_W_m: Array) -> Array:
+    """Value of the grid at points, shape (n, 3) to (n,); zero without a grid."""
+    if silt is None:
+        return np.zeros(len(points_W_m))
+    return _sample(silt.values, silt.origin_W_m, silt.spacing_m, points_W_m)
+
+
+def draw_flakes(
+    image: Image,
+    depth_m: Image,
+    camera: PinholeCamera,
+    poses: Sequence[Pose],
+    points_C_m: Array,
+    water: WaterOptics,
+    lights: Lights,
+    rng: np.random.Generator,
+) -> Image:
+    """Lay flakes over a photograph, each a soft disk, streaked by the camera's motion; returns a new image.
+
+    A flake covers as much light as its shadow: the blur disk of a thin lens spreads it, with diameter
+    f A |1/z - 1/z_focus| in pixels, and the cover falls by the ratio of areas. Flakes are still in the world.
+    """
+    n = len(points_C_m)
+    diameter = MEDIAN_DIAMETER_M * np.exp(LOG_SPREAD * rng.standard_normal(n))
+    reflectance = REFLECTANCE * rng.uniform(0.6, 1.4, n)
+    if n == 0:
+        return image
+    z = points_C_m[:, 2]
+    f = camera.focal_px
+    own = 0.5 * f * diameter / z
+    radius = np.sqrt(own**2 + (0.5 * f * APERTURE_M * np.abs(1.0 / z - 1.0 / FOCUS_M)) ** 2 + 0.5**2)
+    away = points_C_m[:, None, :] - lights.lamps_C_m[None]
+    lamp = lights.lamp * LAMP_REFERENCE_M**2 / max(1, len(lights.lamps_C_m))
+    lamp_light = (lamp * np.clip(away[..., 2], 0.0, None) / (np.sum(away**2, axis=2) + 1e-4) ** 1.5).sum(axis=1)
+    # A flake turned every way gathers half of the down-welling light of a level card.
+    light = reflectance * (0.5 * lights.ambient + lamp_light)
+    colour = light[:, None] * np.exp(-water.signal_per_m * z[:, None])
+    cover = np.minimum(0.85, own**2 / radius**2)
+
+    middle = pose_at(poses, 0.5)
+    points_W = middle.apply(points_C_m)
+    track = np.stack(
+        [camera.project(pose_at(poses, (k + 0.5) / STEPS).inverse().apply(points_W)) for k in range(STEPS)], axis=1
+    )
+    out = image.copy()
+    _splat(out, depth_m, np.nan_to_num(track, nan=-1e6), z, radius, cover, colour)
+    return out
+
+
+@njit(cache=True, parallel=True)
+def _sample(values: Any, origin: Any, spacing: float, points: Any) -> Any:
+    out = np.empty(points.shape[0])
+    for i in prange(points.shape[0]):
+        out[i] = sample_grid(values, origin, spacing, points[i, 0], points[i, 1], points[i, 2])
+    return out
+
+
+@njit(cache=True)
+def _splat(out: Any, depth_m: Any, track: Any, z: Any, radius: Any, cover: Any, colour: Any) -> None:
+    """Blend flakes one after the other; a streak is drawn as overlapping disks that share the cover."""
+    h, w = depth_m.shape
+    for n in range(z.shape[0]):
+        x0, y0 = track[n, 0]
+        x1, y1 = track[n, track.shape[1] - 1]
+        moved = math.sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2)
+        stops = track.shape[1] if moved > 0.5 else 1
+        r = radius[n]
+        for s in range(stops):
+            x, y = track[n, s if stops > 1 else track.shape[1] // 2]
+            if not (-r < x < w + r and -r < y < h + r):
+                continue
+            share = cover[n] / stops
+            for j in range(max(0, int(y - r - 1)), min(h, int(y + r + 2))):
+                for i in range(max(0, int(x - r - 1)), min(w, int(x + r + 2))):
+                    if depth_m[j, i] < z[n]:
+                        continue
+                    distance = math.sqrt((i + 0.5 - x) ** 2 + (j + 0.5 - y) ** 2)
+                    a = share * min(1.0, max(0.0, r + 0.5 - distance))
+                    for c in range(3):
+                        out[j, i, c] += a * (colour[n, c] - out[j, i, c])

@@ -1,0 +1,117 @@
+"""One photograph: the scene through silty water, over the time the shutter is open, on a noisy sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from wakewise.errors import InputError
+from wakewise.geometry import Pose
+from wakewise.imaging.blur import motion_blur, pose_at
+from wakewise.imaging.camera import PinholeCamera
+from wakewise.imaging.optics import SiltOptics, haze_between, through_water
+from wakewise.imaging.particles import draw_flakes, flake_positions
+from wakewise.imaging.renderer import Image, Render, render
+from wakewise.imaging.scene import Scene
+from wakewise.imaging.sensor import expose
+from wakewise.imaging.settings import ImagingSettings
+from wakewise.interfaces import ScalarGrid
+
+BALANCE_M = 0.25
+"""White balance: a grey card at this range in clear water comes out grey, so that farther things turn bluish."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Photo:
+    """A photograph and what is known about it.
+
+    `image` (h, w, 3) uint8 RGB; `sharpness` see `sharpness`, None if the target is not in view; `turbidity_per_m` mean
+    attenuation by silt along the rays to the target, or over the whole image if the target is not in view.
+    """
+
+    image: NDArray[np.uint8]
+    sharpness: float | None
+    turbidity_per_m: float
+
+
+def photograph(
+    scene: Scene,
+    camera: PinholeCamera,
+    poses: Sequence[Pose],
+    silt: ScalarGrid | None,
+    settings: ImagingSettings,
+    rng: np.random.Generator,
+    grains: SiltOptics | None = None,
+) -> Photo:
+    """Take one photograph.
+
+    Parameters
+    ----------
+    scene : Scene
+    camera : PinholeCamera
+        `settings.camera()`, or another one.
+    poses : sequence of Pose
+        True X_WC at instants evenly spaced over the exposure, the first and last at its ends; one means no motion.
+    silt : ScalarGrid or None
+        Concentration in kg/m3.
+    settings : ImagingSettings
+    rng : Generator
+        Draws flakes and noise, nothing else.
+    grains : SiltOptics, optional
+        What the silt is made of; pale 20 um carbonate mud if not given.
+
+    Raises
+    ------
+    InputError
+        If there is no pose, or the silt is negative somewhere.
+    """
+    view = render(scene, camera, pose_at(poses, 0.5), settings.lights(), settings.samples)
+    return photograph_of(view, camera, poses, silt, settings, rng, grains)
+
+
+def photograph_of(
+    view: Render,
+    camera: PinholeCamera,
+    poses: Sequence[Pose],
+    silt: ScalarGrid | None,
+    settings: ImagingSettings,
+    rng: np.random.Generator,
+    grains: SiltOptics | None = None,
+) -> Photo:
+    """As `photograph`, from a render of the middle of the exposure that is there already."""
+    if silt is not None and silt.values.size and float(silt.values.min()) < 0.0:
+        raise InputError(f"silt: concentration {float(silt.values.min()):g} kg/m3, must not be negative")
+    middle = pose_at(poses, 0.5)
+    lights, water = settings.lights(), settings.water()
+    haze = haze_between(camera, middle, water, grains or SiltOptics(), silt, lights)
+    radiance, silt_per_m = through_water(view, camera, haze, water, lights.ambient)
+    radiance = motion_blur(radiance, view.depth_m, camera, poses)
+    flakes = flake_positions(camera, middle, silt, settings.flakes_per_m3, settings.flakes_per_kg, rng)
+    radiance = draw_flakes(radiance, view.depth_m, camera, poses, flakes, water, lights, rng)
+    gains = settings.gain * np.exp(water.signal_per_m * BALANCE_M)
+    image = expose(radiance, gains, settings.electrons_per_s * settings.exposure_s, settings.read_noise_e, rng)
+    on_target = view.target_fraction >= 0.5
+    return Photo(
+        image=image,
+        sharpness=sharpness(image, view.target_fraction),
+        turbidity_per_m=float(np.mean(silt_per_m[on_target] if on_target.any() else silt_per_m)),
+    )
+
+
+def sharpness(image: NDArray[np.uint8], target_fraction: Image) -> float | None:
+    """Variance of the Laplacian over the target, in grey levels squared; None if no pixel is half filled by it.
+
+    The grey image (0-255) is smoothed first with a Gaussian of 1 px, so that sensor noise counts for little.
+    """
+    rows, columns = np.nonzero(target_fraction >= 0.5)
+    if len(rows) == 0:
+        return None
+    pad = 6
+    box = np.s_[max(0, rows.min() - pad) : rows.max() + pad + 1, max(0, columns.min() - pad) : columns.max() + pad + 1]
+    grey = cv2.cvtColor(image[box], cv2.COLOR_RGB2GRAY).astype(np.float32)
+    edges = cv2.Laplacian(cv2.GaussianBlur(grey, (0, 0), 1.0), cv2.CV_32F)
+    return float(np.var(edges[target_fraction[box] >= 0.5]))

@@ -1,0 +1,51 @@
+"""What a user may set about camera, light and water."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from wakewise.imaging.camera import PinholeCamera
+from wakewise.imaging.optics import WaterOptics, water_optics
+from wakewise.imaging.renderer import Lights
+from wakewise.settings import Settings
+
+WaterType = Literal["I", "IB", "II", "III", "1C", "3C", "5C"]
+
+
+class ImagingSettings(Settings):
+    """Camera, light, water and sensor of the simulated photographs."""
+
+    width: int = Field(960, description="image width, px", ge=16, le=8192)
+    height: int = Field(720, description="image height, px", ge=16, le=8192)
+    fov_deg: float = Field(90.0, description="horizontal field of view in water, deg", ge=10.0, le=150.0)
+    exposure_s: float = Field(0.008, description="time the shutter is open, s", gt=0.0, le=1.0)
+    instants: int = Field(5, description="true camera poses kept across each exposure, for motion blur", ge=2, le=101)
+    samples: int = Field(2, description="rays across a pixel (squared in all) on target and edges", ge=1, le=8)
+    water_type: WaterType = Field("II", description="Jerlov water type: I to III oceanic, 1C to 5C coastal")
+    ambient: float = Field(1.0, description="down-welling light relative to the reference, 0 = night", ge=0.0, le=10.0)
+    lamp: float = Field(0.35, description="lamps' irradiance at 0.5 m relative to the daylight", ge=0.0, le=100.0)
+    lamp_offset_m: float = Field(0.2, description="distance of each of two lamps to the camera's side, m", gt=0, le=2.0)
+    gain: float = Field(0.75, description="signal, 1 = saturation, of a white card in unit light", gt=0.0, le=100.0)
+    flakes_per_m3: float = Field(1500.0, description="visible flakes in clear water, 1/m3", ge=0.0, le=1e6)
+    flakes_per_kg: float = Field(1e6, description="visible flakes per kilogram of suspended silt, 1/kg", ge=0.0, le=1e8)
+    electrons_per_s: float = Field(1.5e6, description="electrons per second at saturation", gt=0.0, le=1e12)
+    read_noise_e: float = Field(4.0, description="read noise, electrons rms", ge=0.0, le=1000.0)
+
+    def camera(self) -> PinholeCamera:
+        """Ideal camera of these settings."""
+        return PinholeCamera(self.width, self.height, math.radians(self.fov_deg))
+
+    def lights(self) -> Lights:
+        """Daylight, and two lamps level with the lens, a little above it."""
+        x = self.lamp_offset_m
+        return Lights(
+            ambient=self.ambient, lamp=self.lamp, lamps_C_m=np.array([[-x, -0.4 * x, 0.0], [x, -0.4 * x, 0.0]])
+        )
+
+    def water(self) -> WaterOptics:
+        """Clear water of the chosen type."""
+        return water_optics(self.water_type)
