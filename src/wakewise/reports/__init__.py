@@ -1,0 +1,6 @@
+"""Reports: one HTML page per trial or comparison, with plots, photographs and a 3D scene; it opens with no network."""
+
+from wakewise.reports.compare import write_comparison
+from wakewise.reports.report import write_report
+
+__all__ = ["write_comparison", "write_report"]

@@ -1,0 +1,98 @@
+"""The contact sheet: every photograph, small enough for one page file, large enough to judge."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import escape
+
+import cv2
+
+from wakewise.reports.ink import data_uri
+from wakewise.reports.trial import Photograph, Trial
+from wakewise.reports.words import number
+
+BUDGET_BYTES = 4_000_000
+"""Rough size of all embedded photographs together; many photographs are embedded smaller."""
+WIDTHS = (960, 800, 640, 480, 320)
+QUALITY = 82
+BYTES_PER_PIXEL = 0.16
+"""Of underwater photographs at this quality; only used to choose a width."""
+
+
+@dataclass(frozen=True)
+class Extremes:
+    """Indices of the sharpest and the least sharp photograph, None without a record of sharpness."""
+
+    sharpest: int | None
+    worst: int | None
+
+
+def extremes(photographs: tuple[Photograph, ...]) -> Extremes:
+    """Find the sharpest and the least sharp photograph."""
+    known = [(shot.sharpness, i) for i, shot in enumerate(photographs) if shot.sharpness is not None]
+    if len(known) < 2:
+        return Extremes(None, None)
+    return Extremes(sharpest=max(known)[1], worst=min(known)[1])
+
+
+def embed(shot: Photograph, width: int) -> str | None:
+    """JPEG data URI of a photograph, at most `width` pixels wide; None if the file is missing or no image."""
+    if not shot.path.is_file():
+        return None
+    image = cv2.imread(str(shot.path), cv2.IMREAD_COLOR)
+    if image is None:
+        return None
+    if image.shape[1] > width:
+        height = max(1, round(width * image.shape[0] / image.shape[1]))
+        image = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+    jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY, cv2.IMWRITE_JPEG_OPTIMIZE, 1])[1]
+    return data_uri(jpeg.tobytes(), "image/jpeg")
+
+
+def embedded_width(count: int) -> int:
+    """Width at which this many photographs fit the page."""
+    for width in WIDTHS:
+        if count * width * width * 0.75 * BYTES_PER_PIXEL <= BUDGET_BYTES:
+            return width
+    return WIDTHS[-1]
+
+
+def contact_sheet(trial: Trial, leg_of: dict[int, str]) -> str:
+    """HTML of all photographs in the order they were taken, by leg; `leg_of` names the leg of every index."""
+    shots = trial.photographs
+    width = embedded_width(len(shots))
+    marked = extremes(shots)
+    parts: list[str] = []
+    leg: str | None = None
+    for i, shot in enumerate(shots):
+        if not parts or leg_of.get(i, "") != leg:
+            leg = leg_of.get(i, "")
+            count = sum(leg_of.get(k, "") == leg for k in range(len(shots)))
+            parts.append("</div>" if parts else "")
+            if leg:
+                parts.append(f'<p class="sheet-leg">{escape(leg)}<span>{count} photographs</span></p>')
+            parts.append('<div class="sheet">')
+        parts.append(_photo(shot, i, marked, width))
+    return "".join(parts) + "</div>"
+
+
+def _photo(shot: Photograph, index: int, marked: Extremes, width: int) -> str:
+    kind = "sharpest" if index == marked.sharpest else "worst" if index == marked.worst else ""
+    tag = {
+        "sharpest": '<span class="tag">sharpest</span>',
+        "worst": '<span class="tag worst">least sharp</span>',
+        "": "",
+    }
+    sharpness = "" if shot.sharpness is None else f"sharpness {number(shot.sharpness)}"
+    turbidity = "" if shot.turbidity_per_m is None else f"turbidity {number(shot.turbidity_per_m, 2)} /m"
+    facts = [f"<b>{shot.time_s:.1f} s</b>", sharpness, turbidity]
+    lines = "".join(f"<span>{fact}</span>" for fact in facts if fact)
+    said = " · ".join(f for f in (shot.name, f"{shot.time_s:.1f} s", sharpness, turbidity, kind) if f)
+    source = embed(shot, width)
+    if source is None:
+        return f'<div class="photo gone"><div class="empty">no image file</div><span class="facts">{lines}</span></div>'
+    return (
+        f'<button type="button" class="photo {kind}" data-facts="{escape(said, quote=True)}">'
+        f'<img alt="{escape(shot.name, quote=True)}" src="{source}">{tag[kind]}'
+        f'<span class="facts">{lines}</span></button>'
+    )

@@ -1,0 +1,265 @@
+"""The flight as a 3D scene in one HTML page: path, cameras, vehicle, target, bed and the model coloured by its error.
+
+The page is viser's own client with the scene inside, so it needs no network. World is NED in the trial folder; the
+scene is east, north, up with the bed at zero height.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+
+import cv2
+import numpy as np
+import trimesh
+import viser
+
+from wakewise.arrays import Array, IntArray
+from wakewise.errors import InputError
+from wakewise.geometry import Pose, quat_multiply
+from wakewise.reports.errors import ModelErrors
+from wakewise.reports.ink import error_colours
+from wakewise.reports.trial import Photograph, Surface, Trial, find_setting
+from wakewise.vehicles import Vehicle, load_vehicle
+
+# NED to ENU: swap x and y, turn z round; a half turn about the line between x and y.
+R_UW = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+Q_UW = np.array([0.0, np.sqrt(0.5), np.sqrt(0.5), 0.0])
+
+PLAYBACK_S = 30.0
+FRAMES = 240
+MAX_FACES = 90_000
+MAX_POINTS = 50_000
+FRUSTUM_M = 0.03
+
+PATH_RGB, CAMERA_RGB, PLANNED_RGB = (11, 114, 133), (217, 86, 43), (120, 135, 145)
+HULL_RGB, THRUSTER_RGB, TRUTH_RGB = (222, 184, 60), (60, 70, 80), (196, 200, 198)
+
+
+def upright(points_W_m: Array, bed_z_m: float) -> Array:
+    """East, north and height above the bed in m, shape (..., 3), of world points (NED), same shape."""
+    return np.asarray(points_W_m) @ R_UW.T + np.array([0.0, 0.0, bed_z_m])
+
+
+def scene_html(trial: Trial, errors: ModelErrors | None) -> str | None:
+    """Whole HTML page with the scene of a trial; None if there is nothing with a place to show."""
+    path = trial.positions("true")
+    path = path if np.isfinite(path).any() else trial.positions("est")
+    if len(path) == 0 and not trial.photographs and trial.truth is None:
+        return None
+    # viser greets on standard output, which belongs to the command line's own answer.
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        try:
+            scene = server.scene
+            scene.set_up_direction("+z")
+            # Environment maps would be fetched from the network.
+            scene.configure_environment_map(None)
+            scene.add_light_ambient("/light", intensity=1.3)
+            _aim(server, trial)
+            _bed(server, trial)
+            _target(server, trial, errors)
+            _cameras(server, trial)
+            html = _fly(server, trial, path)
+        finally:
+            server.stop()
+    return html
+
+
+def _aim(server: viser.ViserServer, trial: Trial) -> None:
+    centre, reach = np.array([0.0, 0.0, 0.1]), 1.4
+    if trial.truth is not None:
+        corners = upright(trial.truth.vertices_m, trial.bed_z_m)
+        centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    eyes = [shot.X_WC_true or shot.X_WC_est for shot in trial.photographs]
+    if any(eyes):
+        away = upright(np.array([pose.p_m for pose in eyes if pose]), trial.bed_z_m) - centre
+        reach = float(np.linalg.norm(away, axis=1).max())
+    centre = centre + np.array([0.0, 0.0, 0.2 * reach])
+    server.initial_camera.look_at = tuple(centre)
+    server.initial_camera.position = tuple(centre + reach * np.array([1.3, -1.5, 1.15]))
+    server.initial_camera.up = (0.0, 0.0, 1.0)
+    server.initial_camera.fov = float(np.radians(45.0))
+    server.initial_camera.near = 0.01
+
+
+def _bed(server: viser.ViserServer, trial: Trial) -> None:
+    size = find_setting(trial.scenario, ("size_m",))
+    width, height = (float(size[1]), float(size[0])) if isinstance(size, list) and len(size) == 3 else (3.0, 3.0)
+    server.scene.add_grid(
+        "/bed", width=width, height=height, plane="xy", cell_size=0.1, section_size=0.5, cell_thickness=0.6,
+        cell_color=(214, 211, 200), section_color=(186, 181, 164), plane_color=(240, 236, 222), plane_opacity=0.9,
+        shadow_opacity=0.25, position=(0.0, 0.0, -0.002),
+    )  # fmt: skip
+
+
+def _target(server: viser.ViserServer, trial: Trial, errors: ModelErrors | None) -> None:
+    scene = server.scene
+    if errors is not None and errors.model is not None and errors.model_accuracy_m is not None:
+        model, chosen = lightened(errors.model)
+        mesh = trimesh.Trimesh(upright(model.vertices_m, trial.bed_z_m), model.faces, process=False)
+        # Without a material of its own, glTF takes a mesh for bare metal, which is black without an environment map.
+        matt = trimesh.visual.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=0.9)
+        mesh.visual = trimesh.visual.TextureVisuals(material=matt)
+        mesh.visual.vertex_attributes["color"] = _linear(error_colours(errors.model_accuracy_m[chosen]))
+        scene.add_mesh_trimesh("/model by error", mesh)
+    if errors is not None:
+        step = max(1, -(-len(errors.points_m) // MAX_POINTS))
+        scene.add_point_cloud(
+            "/model points by error",
+            points=upright(errors.points_m[::step], trial.bed_z_m).astype(np.float32),
+            colors=_bytes(error_colours(errors.accuracy_m[::step])),
+            point_size=0.0011,
+            point_shape="circle",
+            precision="float32",
+            visible=errors.model is None,
+        )
+    elif trial.cloud_m is not None:
+        step = max(1, -(-len(trial.cloud_m) // MAX_POINTS))
+        points = upright(trial.cloud_m[::step], trial.bed_z_m).astype(np.float32)
+        scene.add_point_cloud("/model points", points=points, colors=TRUTH_RGB, point_size=0.0015, precision="float32")
+    if trial.truth is not None:
+        truth, _ = lightened(trial.truth)
+        scene.add_mesh_simple(
+            "/true target",
+            vertices=upright(truth.vertices_m, trial.bed_z_m).astype(np.float32),
+            faces=truth.faces.astype(np.uint32),
+            color=TRUTH_RGB,
+            side="double",
+            visible=errors is None,
+        )
+
+
+def lightened(mesh: Surface, max_faces: int = MAX_FACES) -> tuple[Surface, IntArray]:
+    """A mesh light enough for a page, and for each of its vertices the index of the one that it was.
+
+    Vertices that share a cell of a grid become one; the cells grow until at most `max_faces` triangles are left.
+    """
+    keep, faces = np.unique(mesh.faces, return_inverse=True)
+    keep, faces = keep.astype(np.int64), faces.reshape(-1, 3).astype(np.int64)
+    offset = mesh.vertices_m[keep] - mesh.vertices_m[keep].min(axis=0)
+    cell_m = float(offset.max()) / 400.0
+    chosen, corners = keep, faces
+    while len(corners) > max_faces:
+        cells = np.floor(offset / cell_m).astype(np.int64)
+        _, first, shared = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+        corners = shared.reshape(-1)[faces].astype(np.int64)
+        a, b, c = corners.T
+        corners = corners[(a != b) & (b != c) & (c != a)]
+        chosen = keep[first]
+        cell_m *= 1.25
+    return Surface(vertices_m=mesh.vertices_m[chosen], faces=corners), chosen
+
+
+def _cameras(server: viser.ViserServer, trial: Trial) -> None:
+    scene = server.scene
+    aspect, fov_rad = _lens(trial)
+    for i, shot in enumerate(trial.photographs):
+        pose = shot.X_WC_true or shot.X_WC_est
+        if pose is None:
+            continue
+        scene.add_camera_frustum(
+            f"/photographs/{i + 1:03d}", fov=fov_rad, aspect=aspect, scale=FRUSTUM_M, thickness=0.0016,
+            color=CAMERA_RGB, image=_thumbnail(shot), format="jpeg", jpeg_quality=70, cast_shadow=False,
+            receive_shadow=False, wxyz=quat_multiply(Q_UW, pose.q), position=upright(pose.p_m, trial.bed_z_m),
+        )  # fmt: skip
+    if trial.planned:
+        scene.add_point_cloud(
+            "/planned viewpoints",
+            points=upright(np.array([pose.p_m for pose in trial.planned]), trial.bed_z_m).astype(np.float32),
+            colors=PLANNED_RGB,
+            point_size=0.008,
+            point_shape="diamond",
+            precision="float32",
+        )
+
+
+def _lens(trial: Trial) -> tuple[float, float]:
+    """Aspect ratio and vertical field of view in radians; 90 degrees across unless the scenario says otherwise."""
+    width = find_setting(trial.scenario, ("width", "width_px"))
+    height = find_setting(trial.scenario, ("height", "height_px"))
+    across = find_setting(trial.scenario, ("fov_rad",))
+    if across is None:
+        degrees = find_setting(trial.scenario, ("fov_deg", "field_of_view_deg"))
+        across = np.radians(float(degrees)) if isinstance(degrees, int | float) else np.pi / 2
+    aspect = float(width) / float(height) if width and height else 4 / 3
+    return aspect, float(2 * np.arctan(np.tan(float(across) / 2) / aspect))
+
+
+def _thumbnail(shot: Photograph, width: int = 128) -> Array | None:
+    image = cv2.imread(str(shot.path), cv2.IMREAD_COLOR)
+    if image is None:
+        return None
+    height = max(1, round(width * image.shape[0] / image.shape[1]))
+    small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+    return np.ascontiguousarray(small[..., ::-1])
+
+
+def _fly(server: viser.ViserServer, trial: Trial, path: Array) -> str:
+    """Add the path and the vehicle, play the flight back in half a minute, and give the page."""
+    scene = server.scene
+    serializer = None
+    if len(path) > 1:
+        line = upright(path[:: max(1, len(path) // 1500)], trial.bed_z_m).astype(np.float32)
+        scene.add_line_segments(
+            "/path", points=np.stack([line[:-1], line[1:]], axis=1), colors=PATH_RGB, thickness=0.003
+        )
+        poses = _body_poses(trial)
+        if poses:
+            hull = scene.add_frame("/vehicle", show_axes=False)
+            _hull(server, _vehicle(trial))
+            start = poses[0]
+            hull.position, hull.wxyz = upright(start.p_m, trial.bed_z_m), quat_multiply(Q_UW, start.q)
+            serializer = server.get_scene_serializer()
+            for pose in poses:
+                with server.atomic():
+                    hull.position, hull.wxyz = upright(pose.p_m, trial.bed_z_m), quat_multiply(Q_UW, pose.q)
+                serializer.insert_sleep(PLAYBACK_S / len(poses))
+    return (serializer or server.get_scene_serializer()).as_html()
+
+
+def _body_poses(trial: Trial) -> list[Pose]:
+    names = [f"true_{a}_m" for a in "xyz"] + [f"true_q{a}" for a in "wxyz"]
+    if trial.steps is None or not set(names) <= set(trial.steps.columns):
+        return []
+    rows = trial.steps.select(names).to_numpy()
+    rows = rows[np.isfinite(rows).all(axis=1)]
+    pick = np.unique(np.linspace(0, len(rows) - 1, min(FRAMES, len(rows))).astype(int))
+    return [Pose(rows[i, :3], rows[i, 3:]) for i in pick]
+
+
+def _vehicle(trial: Trial) -> Vehicle | None:
+    name = trial.scenario.get("vehicle")
+    if not isinstance(name, str):
+        return None
+    try:
+        return load_vehicle(name)
+    except (InputError, OSError):
+        return None
+
+
+def _hull(server: viser.ViserServer, vehicle: Vehicle | None) -> None:
+    """Hull and thrusters of the vehicle, in its body frame; only axes where the vehicle is not known."""
+    if vehicle is None:
+        server.scene.add_frame("/vehicle/axes", axes_length=0.15, axes_radius=0.005)
+        return
+    server.scene.add_box("/vehicle/hull", dimensions=tuple(vehicle.size_m), color=HULL_RGB, opacity=0.35)
+    for thruster in vehicle.thrusters:
+        # The shortest turn from z, the cylinder's own axis, to the thruster's; either way round looks the same.
+        axis = np.asarray(thruster.axis_B) * (-1.0 if thruster.axis_B[2] < 0 else 1.0)
+        q = np.array([1.0 + axis[2], *np.cross([0.0, 0.0, 1.0], axis)])
+        q /= np.linalg.norm(q)
+        server.scene.add_cylinder(
+            f"/vehicle/{thruster.name}", radius=float(np.sqrt(thruster.disk_area_m2 / np.pi)), height=0.05,
+            color=THRUSTER_RGB, wxyz=q, position=thruster.p_BT_m,
+        )  # fmt: skip
+
+
+def _linear(colours: Array) -> Array:
+    """Opaque glTF vertex colours, uint8, shape (n, 4): linear light, while colours on screen follow IEC 61966-2-1."""
+    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+    return _bytes(np.concatenate([linear, np.ones((len(linear), 1))], axis=1))
+
+
+def _bytes(colours: Array) -> Array:
+    return np.round(255 * colours).astype(np.uint8)

@@ -1,0 +1,140 @@
+"""What a report says: the verdict in words, numbers with sensible digits, the unit and the group of every figure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from wakewise.evaluation.surface import SUCCESS_COMPLETENESS_PCT, SUCCESS_RMSE_MM
+from wakewise.reports.trial import Metrics, Trial
+
+THIN_SPACE = "\u202f"
+
+# Endings of keys, longest first where one contains another.
+_UNITS = (
+    ("_m_s", "m/s"), ("_per_m", "1/m"), ("_per_s", "1/s"), ("_mm", "mm"), ("_pct", "%"), ("_deg", "deg"), ("_kJ", "kJ"),
+    ("_px", "px"), ("_MB", "MB"), ("_N", "N"), ("_ms", "ms"), ("_m", "m"), ("_s", "s"),
+)  # fmt: skip
+
+GROUPS: dict[str, tuple[str, ...]] = {
+    "The model": (
+        "success", "rmse_mm", "rmse_cap_mm", "accuracy", "completeness", "visible", "f_score", "icp", "cloud", "truth",
+        "dense", "mesh",
+    ),
+    "The photographs": (
+        "images", "registered", "features", "inlier", "reprojection", "cameras", "points", "sharpness", "sparse",
+    ),
+    "The water": ("target_speed", "exposure_speed", "bed_speed", "turbidity", "disturbance"),
+    "The flight": (
+        "method", "seed", "duration", "position", "path", "velocity", "roll", "energy", "sign", "collisions", "legs",
+    ),
+    "The computation": ("solve", "fallbacks", "wall", "cpu", "memory", "stages"),
+}  # fmt: skip
+OTHER = "Other figures"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Headline of a trial: `good` is None where the trial could not be judged."""
+
+    good: bool | None
+    headline: str
+    reasons: tuple[str, ...]
+
+
+def verdict(trial: Trial) -> Verdict:
+    """Say whether the scan succeeded and why, in words."""
+    metrics = trial.metrics
+    rmse, covered = metrics.number("rmse_mm"), metrics.number("completeness_pct")
+    success = metrics.values.get("success")
+    reasons = tuple(_reasons(trial, rmse, covered))
+    if rmse is None or covered is None:
+        made = trial.cloud_m is not None
+        why = metrics.why.get("rmse_mm") or metrics.why.get("completeness_pct")
+        headline = "The model was not measured." if made else "There is no model."
+        return Verdict(
+            False if success is False else None,
+            headline,
+            ((_sentence(why.removeprefix("no model: ")),) if why else ()) + reasons,
+        )
+    figures = f"{number(rmse)} mm RMSE, {number(covered)} % of the surface covered"
+    good = success if isinstance(success, bool) else rmse < SUCCESS_RMSE_MM and covered > SUCCESS_COMPLETENESS_PCT
+    return Verdict(good, f"{'Success' if good else 'Not good enough'}: {figures}.", reasons)
+
+
+def _reasons(trial: Trial, rmse: float | None, covered: float | None) -> list[str]:
+    metrics = trial.metrics
+    lines: list[str] = []
+    if rmse is not None and covered is not None:
+        fine, whole = rmse < SUCCESS_RMSE_MM, covered > SUCCESS_COMPLETENESS_PCT
+        limits = f"an RMSE below {SUCCESS_RMSE_MM:g} mm and more than {SUCCESS_COMPLETENESS_PCT:g} % of the surface"
+        if fine and whole:
+            lines.append(f"A scan succeeds with {limits} within 3 mm of the model; this one has both.")
+        else:
+            parts = [] if fine else [f"the RMSE is {number(rmse)} mm"]
+            parts += [] if whole else [f"{number(covered)} % of the surface is covered"]
+            lines.append(f"A scan succeeds with {limits} within 3 mm of the model; here {' and '.join(parts)}.")
+    registered, images = metrics.number("registered_images"), metrics.number("images")
+    if registered is not None and images:
+        all_of = "All" if registered == images else f"{registered:.0f} of"
+        lines.append(f"{all_of} {images:.0f} photographs found their place in the model.")
+    speed, p95 = metrics.number("target_speed_mean_m_s"), metrics.number("target_speed_p95_m_s")
+    if speed is not None:
+        tail = "" if p95 is None else f" ({number(1e3 * p95)} mm/s at its 95th percentile)"
+        lines.append(f"The thrusters moved the water at the target at {number(1e3 * speed)} mm/s on average{tail}.")
+    collisions = metrics.number("collisions")
+    if collisions:
+        lines.append(f"The hull touched something {collisions:.0f} times.")
+    return [" ".join(lines)] if lines else []
+
+
+def _sentence(text: str) -> str:
+    text = text.strip()
+    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number with three significant digits, thin spaces between thousands, no needless zeros or exponents."""
+    if value == 0:
+        return "0"
+    if float(value).is_integer() and abs(value) >= 1000:
+        return f"{int(value):,}".replace(",", THIN_SPACE)
+    size = abs(value)
+    if size >= 10 ** (digits + 1):
+        return f"{round(value):,}".replace(",", THIN_SPACE)
+    if size < 1e-4:
+        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+        superscript = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+        return f"{mantissa} × 10{superscript}"
+    text = f"{value:#.{digits}g}"
+    if "e" in text:
+        text = f"{value:.0f}"
+    text = text.rstrip(".")
+    return f"{int(value)}" if float(value).is_integer() else text
+
+
+def shown(value: object) -> str:
+    """A figure as text: numbers by `number`, yes and no for truth values."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int | float):
+        return number(value)
+    return str(value)
+
+
+def unit(metrics: Metrics, key: str) -> str:
+    """Unit of a figure: as metrics.json says, else by the ending of its key."""
+    if key in metrics.units:
+        return str(metrics.units[key])
+    for ending, name in _UNITS:
+        if key.endswith(ending) or f"{ending}_" in key:
+            return name
+    return ""
+
+
+def grouped(metrics: Metrics) -> dict[str, list[str]]:
+    """Keys of all figures by group, in the order of metrics.json; none is left out."""
+    groups: dict[str, list[str]] = {name: [] for name in (*GROUPS, OTHER)}
+    for key in metrics.values:
+        home = next((name for name, starts in GROUPS.items() if key.startswith(starts)), OTHER)
+        groups[home].append(key)
+    return {name: keys for name, keys in groups.items() if keys}
