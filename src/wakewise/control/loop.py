@@ -1,0 +1,77 @@
+"""The step that every controller shares: estimate and goal to wrench, wrench to thrusts, and what to do in trouble."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wakewise.arrays import Array, freeze
+from wakewise.control.allocation import Allocation
+from wakewise.control.tracker import Tracker, TrackerState
+from wakewise.control.view import WakeView
+from wakewise.interfaces import BodyState, Command, Goal
+
+Allocate = Callable[[Array, Array | None, Array], Allocation]
+"""`(wrench_B, gram or None, thrusts before) -> Allocation`; the Gram matrix is None if the wake model gave nonsense."""
+
+FULL = 1.0 - 1e-9
+"""Shares of a wrench above this are all of it, but for rounding."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ControllerState:
+    """What a controller remembers between steps.
+
+    The tracker's integral, the thrusts last asked for, shape (n,), and the share of the last wrench that they made.
+    """
+
+    tracker: TrackerState
+    thrusts_N: Array
+    share: float = 1.0
+
+    def __post_init__(self) -> None:
+        freeze(self, thrusts_N=(None,))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TrackingController:
+    """A tracker and a way to allocate; implements `wakewise.interfaces.Controller`.
+
+    An estimate or goal that is not finite gives the last thrusts, fading with `hold_s`, and says so in `fallback`.
+    """
+
+    name: str
+    tracker: Tracker
+    view: WakeView
+    allocate: Allocate
+    hold_s: float
+
+    def init(self) -> ControllerState:
+        """State before the first step."""
+        return ControllerState(tracker=self.tracker.init(), thrusts_N=np.zeros(len(self.view.positions_B_m)))
+
+    def step(
+        self, state: ControllerState, dt_s: float, estimate: BodyState, goal: Goal
+    ) -> tuple[ControllerState, Command]:
+        """Decide the thrusts for the next `dt_s` seconds."""
+        for what, X_WB, nu_B in (("estimate", estimate.X_WB, estimate.nu_B), ("goal", goal.X_WB, goal.nu_B)):
+            # A sum is finite only if each of its parts is.
+            if not np.isfinite(X_WB.p_m.sum() + X_WB.q.sum() + nu_B.sum()):
+                return self._hold(state, dt_s, f"{what} not finite: holding the last thrusts, fading")
+        tracker_state, wrench = self.tracker.wrench(state.tracker, dt_s, estimate, goal, saturated=state.share < FULL)
+        if not np.isfinite(wrench.sum()):
+            return self._hold(state, dt_s, "wrench not finite: holding the last thrusts, fading")
+        gram = self.view.gram(estimate.X_WB)
+        usable = bool(np.isfinite(gram).all())
+        fallback = None if usable else "wake model not finite: least thrusts"
+        found = self.allocate(wrench, gram if usable else None, state.thrusts_N)
+        if found.scale < FULL and fallback is None:
+            fallback = f"thrusters saturated: {100.0 * found.scale:.0f} % of the wrench"
+        command = Command(thrusts_N=found.thrusts_N, wrench_B=wrench, disturbance=found.disturbance, fallback=fallback)
+        return ControllerState(tracker=tracker_state, thrusts_N=found.thrusts_N, share=found.scale), command
+
+    def _hold(self, state: ControllerState, dt_s: float, why: str) -> tuple[ControllerState, Command]:
+        thrusts = state.thrusts_N * np.exp(-dt_s / self.hold_s)
+        return replace(state, thrusts_N=thrusts), Command(thrusts_N=thrusts, wrench_B=np.zeros(6), fallback=why)

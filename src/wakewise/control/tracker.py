@@ -1,0 +1,182 @@
+"""From a goal and an estimate to a wrench: a PID in six degrees of freedom with feed-forward, shared by all methods."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from wakewise.arrays import Array, freeze
+from wakewise.control.settings import ControlSettings
+from wakewise.control.stability import Gains, stable_gain_scale, vehicle_axes, wished_gains
+from wakewise.interfaces import BodyState, Goal
+from wakewise.vehicles import RigidBody, Vehicle, compile_body, damping_wrench, restoring_wrench
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TrackerState:
+    """Integral part: force in the *world* (currents and trim do not turn with the vehicle), moment in the body."""
+
+    force_W_N: Array
+    moment_B_Nm: Array
+
+    def __post_init__(self) -> None:
+        freeze(self, force_W_N=(3,), moment_B_Nm=(3,))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tracker:
+    """Gains, limits of the integral, and the nominal vehicle behind the feed-forward; make one with `make_tracker`.
+
+    `kp`, `kd`, `ki`, shape (6,): N/m, N s/m, N/(m s) for forces and Nm/rad, Nm s/rad, Nm/(rad s) for moments.
+    `integral_limit`, shape (6,), in N and Nm. `gain_scale`, shape (6,), is the share of the wished bandwidth that the
+    margins allowed.
+    """
+
+    body: RigidBody
+    kp: Array
+    kd: Array
+    ki: Array
+    integral_limit: Array
+    gain_scale: Array
+
+    def __post_init__(self) -> None:
+        freeze(self, kp=(6,), kd=(6,), ki=(6,), integral_limit=(6,), gain_scale=(6,))
+
+    def init(self) -> TrackerState:
+        """State before the first step."""
+        return TrackerState(force_W_N=np.zeros(3), moment_B_Nm=np.zeros(3))
+
+    def wrench(
+        self, state: TrackerState, dt_s: float, estimate: BodyState, goal: Goal, *, saturated: bool = False
+    ) -> tuple[TrackerState, Array]:
+        """Wrench on the vehicle that leads it towards the goal, shape (6,), expressed in B.
+
+        Errors are those of Goal over estimate in the body frame: position, rotation vector, and twist (the goal's
+        twist is turned from its own body frame into B). Feed-forward, from the nominal vehicle: what holds it at the
+        goal's attitude, and the drag at the goal's twist in still water. While the last allocation could not make all
+        of its wrench (`saturated`), the integral does not grow.
+        """
+        feed = -restoring_wrench(self.body, goal.X_WB.q)
+        wrench = np.empty(6)
+        force_W, moment_B = np.empty(3), np.empty(3)
+        twist_B = np.empty(6)
+        _pid(
+            estimate.X_WB.p_m,
+            estimate.X_WB.q,
+            estimate.nu_B,
+            goal.X_WB.p_m,
+            goal.X_WB.q,
+            goal.nu_B,
+            state.force_W_N,
+            state.moment_B_Nm,
+            self.kp,
+            self.kd,
+            self.ki,
+            self.integral_limit,
+            dt_s,
+            saturated,
+            feed,
+            wrench,
+            twist_B,
+            force_W,
+            moment_B,
+        )
+        wrench -= damping_wrench(self.body, twist_B)
+        return TrackerState(force_W_N=force_W, moment_B_Nm=moment_B), wrench
+
+
+def make_tracker(vehicle: Vehicle, settings: ControlSettings) -> Tracker:
+    """Tracker for a nominal vehicle, its gains slowed per axis where the loop's margins ask for it.
+
+    Raises
+    ------
+    InputError
+        If an axis has no stable bandwidth at all.
+    """
+    dt_s = 1.0 / settings.rate_hz
+    forces = Gains(kp=settings.kp_N_m, kd=settings.kd_N_s_m, ki=settings.ki_N_m_s)
+    scale = stable_gain_scale(vehicle, forces, dt_s, settings.estimator_lag_s, settings.gyro_lag_s)
+    gains = [g.slowed(float(s)) for g, s in zip(wished_gains(vehicle_axes(vehicle), forces), scale, strict=True)]
+    reach = np.minimum(-vehicle.thrust_lower_N, vehicle.thrust_upper_N)
+    limit = settings.integral_share * (np.abs(vehicle.allocation_matrix) @ reach)
+    # The force integral lives in the world, where any body axis may have to supply it.
+    limit[:3] = np.min(limit[:3][limit[:3] > 0.0], initial=np.inf) if np.any(limit[:3] > 0.0) else 0.0
+    return Tracker(
+        body=compile_body(vehicle),
+        kp=np.array([g.kp for g in gains]),
+        kd=np.array([g.kd for g in gains]),
+        ki=np.array([g.ki for g in gains]),
+        integral_limit=limit,
+        gain_scale=scale,
+    )
+
+
+@njit(cache=True)
+def _turn(q: Array, v: Array, inverse: bool) -> Array:
+    """Turn a vector by R(q), or by its inverse."""
+    sign = -1.0 if inverse else 1.0
+    w, x, y, z = q[0], sign * q[1], sign * q[2], sign * q[3]
+    tx, ty, tz = 2.0 * (y * v[2] - z * v[1]), 2.0 * (z * v[0] - x * v[2]), 2.0 * (x * v[1] - y * v[0])
+    return np.array(
+        [
+            v[0] + w * tx + y * tz - z * ty,
+            v[1] + w * ty + z * tx - x * tz,
+            v[2] + w * tz + x * ty - y * tx,
+        ]
+    )
+
+
+@njit(cache=True)
+def _pid(  # type: ignore[no-untyped-def]
+    p,
+    q,
+    nu,
+    goal_p,
+    goal_q,
+    goal_nu,
+    force_W,
+    moment_B,
+    kp,
+    kd,
+    ki,
+    limit,
+    dt_s,
+    saturated,
+    feed_G,
+    wrench,
+    twist_B,
+    new_force_W,
+    new_moment_B,
+):
+    # q_BG = conj(q_WB) q_WG: the goal's attitude as seen from B, shorter way round.
+    w = q[0] * goal_q[0] + q[1] * goal_q[1] + q[2] * goal_q[2] + q[3] * goal_q[3]
+    x = q[0] * goal_q[1] - q[1] * goal_q[0] - q[2] * goal_q[3] + q[3] * goal_q[2]
+    y = q[0] * goal_q[2] + q[1] * goal_q[3] - q[2] * goal_q[0] - q[3] * goal_q[1]
+    z = q[0] * goal_q[3] - q[1] * goal_q[2] + q[2] * goal_q[1] - q[3] * goal_q[0]
+    q_BG = np.array([w, x, y, z])
+    half = np.sqrt(x * x + y * y + z * z)
+    factor = 2.0 * np.arctan2(half, abs(w)) / half if half > 1e-12 else 2.0
+    if w < 0.0:
+        factor = -factor
+    error = np.empty(6)
+    error[:3] = _turn(q, goal_p - p, True)
+    error[3], error[4], error[5] = factor * x, factor * y, factor * z
+    twist_B[:3] = _turn(q_BG, goal_nu[:3], False)
+    twist_B[3:] = _turn(q_BG, goal_nu[3:], False)
+    # Weight against buoyancy is a world force: express the goal's feed-forward force in B, its moment as at the goal.
+    feed_B = feed_G.copy()
+    feed_B[:3] = _turn(q_BG, feed_G[:3], False)
+    integral = np.empty(6)
+    integral[:3] = _turn(q, force_W, True)
+    integral[3:] = moment_B
+    for i in range(6):
+        base = kp[i] * error[i] + kd[i] * (twist_B[i] - nu[i]) + feed_B[i]
+        step = ki[i] * error[i] * dt_s
+        # While limits cut the wrench, the integral may only fall back, never ask for more of the same.
+        if not (saturated and step * (base + integral[i]) > 0.0):
+            integral[i] = min(max(integral[i] + step, -limit[i]), limit[i])
+        wrench[i] = base + integral[i]
+    new_force_W[:] = _turn(q, integral[:3].copy(), False)
+    new_moment_B[:] = integral[3:]
