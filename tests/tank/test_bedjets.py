@@ -8,6 +8,7 @@ from scipy.special import erf, i0, i1
 
 from wakewise.tank.bedjets import (
     _LOG_WIDTH,
+    _REACH,
     WALL_JET_SPEED,
     WALL_JET_SPREAD,
     Rings,
@@ -52,7 +53,7 @@ def _twin(points, rings, bed_z_m):
         w = np.exp(rings.kappa[k] * (d @ rings.heading[k]) / r) / i0(rings.kappa[k])
         R, A = rings.radius_m[k] * w**0.25, strength[k] * np.sqrt(w)
         t, delta = np.log(r / R), WALL_JET_SPREAD * rings.radius_m[k] * w**0.25
-        g = np.where(np.abs(t) < 4 * _LOG_WIDTH, np.exp(-(t**2) / (2 * _LOG_WIDTH**2)), 0.0)
+        g = np.where(np.abs(t) < _REACH, np.exp(-(t**2) / (2 * _LOG_WIDTH**2)), 0.0)
         layer = delta * np.sqrt(np.pi / 2) * erf(h / (np.sqrt(2) * delta))
         dF = (np.exp(-(h**2) / (2 * delta**2)) - layer / R) * np.exp(-h / R)
         u[:, :2] += d * (A * g * dF / r**2)[:, None]

@@ -25,7 +25,9 @@ class MissionSettings(Settings):
     speed_m_s: float = Field(0.10, gt=0.0, le=0.5, description="speed of the camera along its path")
     acceleration_m_s2: float = Field(0.05, gt=0.0, le=1.0, description="greatest acceleration along the path")
     approach_m: float = Field(0.3, ge=0.0, le=2.0, description="the flight starts this much farther out")
-    settle_s: float = Field(3.0, ge=0.0, le=60.0, description="hover before the first leg, for filters to settle")
+    settle_s: float = Field(
+        12.0, ge=0.0, le=120.0, description="hover before the first leg, until the integral knows trim and current"
+    )
     clearance_m: float = Field(0.05, ge=0.0, le=1.0, description="least distance of the hull to anything solid")
 
     @model_validator(mode="after")

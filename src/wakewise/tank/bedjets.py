@@ -33,7 +33,7 @@ WALL_JET_SPREAD = 0.093  # delta over R for which the layer below, entrainment i
 STRIKE_HEIGHT = 1.75  # of the parcel's sigma: 0.14 H, where the bed's pressure begins to turn the jet (Beltaos 1974)
 _LAYER_CONVECTION = 1 / math.sqrt(2)  # mean of u weighted with u over a Gaussian layer, as a share of u_max
 _LOG_WIDTH = 0.3  # L: neighbouring rings overlap; it sets how sharp a front is, not how fast
-_REACH = 4 * _LOG_WIDTH  # beyond it g is below 4e-4
+_REACH = 3.3 * _LOG_WIDTH  # beyond it g is below 5e-3
 _RING_MERGE = 0.5  # rings of one jet closer than this share of L become one
 
 
@@ -144,11 +144,13 @@ def ring_strength(rings: Rings) -> Array:
 
 
 def layer_speed(rings: Rings) -> Array:
-    """Speed at the bed under each ring's crest, from all rings of its own jet taken as concentric, shape (n,)."""
-    apart = np.log(rings.radius_m[:, None] / rings.radius_m[None, :])
-    same = rings.stream[:, None] == rings.stream[None, :]
-    overlap = np.where(same, np.exp(-(apart**2) / (2 * _LOG_WIDTH**2)), 0.0)
-    speed: Array = overlap @ ring_strength(rings) / rings.radius_m
+    """Speed at the bed under each ring's crest, shape (n,), from all rings of its own jet.
+
+    Rings about one centre add up in full. A jet that wanders leaves rings about many: the crests of two of them meet
+    along less and less of their length as the centres part, and hardly at all a radius apart.
+    """
+    speed = np.zeros(rings.count)
+    _sum_layers(rings.centre_m, rings.radius_m, ring_strength(rings), rings.stream, speed)
     return speed
 
 
@@ -189,6 +191,23 @@ def coarsened(rings: Rings) -> Rings:
         impulse[b] += impulse[a]
         keep[a] = False
     return Rings(centre, radius, impulse, heading, kappa, rings.stream).take(keep)
+
+
+@njit(cache=True)
+def _sum_layers(centre: Array, radius: Array, strength: Array, stream: IntArray, out: Array) -> None:
+    """For each ring, strengths of its jet's rings weighted with nearness in log radius and in centre, over radius."""
+    for i in range(radius.shape[0]):
+        total = 0.0
+        for j in range(radius.shape[0]):
+            if stream[i] != stream[j]:
+                continue
+            apart = math.log(radius[i] / radius[j]) / _LOG_WIDTH
+            dx, dy = centre[i, 0] - centre[j, 0], centre[i, 1] - centre[j, 1]
+            wide = 2.0 * (dx * dx + dy * dy) / (radius[i] * radius[i])
+            exponent = 0.5 * apart * apart + wide
+            if exponent < 12.0:
+                total += strength[j] * math.exp(-exponent)
+        out[i] = total / radius[i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -1,0 +1,80 @@
+"""`wakewise compare`: methods side by side on the same seed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wakewise.cli.console import Bars, print_json, print_table, shown
+from wakewise.cli.options import Json, Out, Preset, ScenarioFile, Seed, Sets, TargetName, TargetSize, Vehicle, overrides
+from wakewise.errors import InputError
+
+Methods = Annotated[str, typer.Option("--methods", help="Comma-separated; ratios are to the first.")]
+
+_ROWS = (
+    "success",
+    "rmse_mm",
+    "completeness_pct",
+    "target_speed_mean_m_s",
+    "exposure_speed_mean_m_s",
+    "bed_speed_p95_m_s",
+    "turbidity_mean_per_m",
+    "disturbance",
+    "position_rmse_mm",
+    "path_rmse_mm",
+    "velocity_deviation_pct",
+    "energy_kJ",
+    "sign_flips_per_s",
+    "solve_ms_median",
+)
+
+
+def compare(
+    scenario: ScenarioFile = None,
+    methods: Methods = "dp,wake-aware",
+    preset: Preset = "quick",
+    out: Out = None,
+    target: TargetName = None,
+    target_size: TargetSize = None,
+    vehicle: Vehicle = None,
+    seed: Seed = None,
+    sets: Sets = None,
+    json: Json = False,
+) -> None:
+    """Fly the same mission with each method in the same water, and set the outcomes side by side."""
+    from wakewise.experiments import UNITS, compare_methods
+    from wakewise.operation import load_scenario
+    from wakewise.reports import write_comparison, write_report
+
+    names = [name.strip() for name in methods.split(",") if name.strip()]
+    if len(names) != len(set(names)) or not names:
+        raise InputError(f"--methods: '{methods}', must be one or more different names such as dp,wake-aware")
+    changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size)
+    scenarios = {name: load_scenario(preset, scenario, changes | {"method": name}) for name in names}
+    folder = out or Path("runs") / f"{scenarios[names[0]].name}-compare"
+    figures = compare_methods(scenarios, folder, Bars())
+    with Bars().stage("report") as progress:
+        for name in names:
+            write_report(folder / name)
+        report = write_comparison({name: folder / name for name in names}, folder)
+        progress(1, 1)
+    if json:
+        print_json(figures)
+        return
+    from rich.table import Table
+
+    table = Table(title=f"{scenarios[names[0]].name}, seed {scenarios[names[0]].seed}")
+    table.add_column("figure")
+    for name in names:
+        table.add_column(name, justify="right")
+    table.add_column("unit")
+    for key in _ROWS:
+        table.add_row(key, *(shown(figures["methods"][name][key]) for name in names), UNITS[key])
+    table.add_section()
+    for key in figures["ratios"][names[0]]:
+        if key != "why":
+            table.add_row(f"{key} ratio", *(shown(figures["ratios"][name][key]) for name in names), f"to {names[0]}")
+    print_table(table)
+    typer.echo(f"report: {report}")

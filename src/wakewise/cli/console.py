@@ -1,0 +1,71 @@
+"""What a person sees: a bar per stage with time left on standard error, tables or JSON on standard output."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+stderr = Console(stderr=True, highlight=False)
+
+
+class Bars:
+    """A `Watch` that shows one progress bar per stage."""
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[Callable[..., None]]:
+        """Show a bar while the block runs; leave one line behind it."""
+        columns = (
+            SpinnerColumn(finished_text="[green]✓"),
+            TextColumn("{task.description:<12}"),
+            BarColumn(bar_width=30),
+            TextColumn("{task.percentage:>3.0f} %"),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+            TextColumn("[dim]{task.fields[note]}"),
+        )
+        with Progress(*columns, console=stderr) as progress:
+            task = progress.add_task(name, total=None, note="")
+
+            def advance(done: float, total: float, note: str = "") -> None:
+                progress.update(task, completed=done, total=total, note=note)
+
+            yield advance
+            known = progress.tasks[0].total or 1.0
+            progress.update(task, completed=known, total=known)
+
+    def skipped(self, name: str) -> None:
+        """Say that a stage was already done."""
+        stderr.print(f"[green]✓[/] {name:<12} [dim]already done")
+
+
+def print_json(value: Any) -> None:
+    """Print one JSON object and nothing else on standard output; NaN never leaves as a word JSON lacks."""
+    json.dump(value, sys.stdout, indent=2, allow_nan=False)
+    sys.stdout.write("\n")
+
+
+def print_table(table: Table) -> None:
+    """Print a table on standard output."""
+    Console(highlight=False).print(table)
+
+
+def shown(value: Any) -> str:
+    """A figure as people read it: four significant digits, words for what is missing."""
+    if value is None:
+        return "—"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        if value != 0 and math.isfinite(value) and abs(value) < 0.01:
+            return f"{value:.2g}"
+        return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}" if abs(value) < 10 else f"{value:.1f}"
+    return str(value)

@@ -1,0 +1,53 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+ScenarioFile = Annotated[
+    Path | None, typer.Argument(help="Scenario YAML file; any part of a scenario.", show_default=False)
+]
+Preset = Annotated[str, typer.Option("--preset", help="quick (minutes on two cores) or standard.")]
+Out = Annotated[Path | None, typer.Option("--out", help="Folder for the results; runs/NAME if not given.")]
+Sets = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="FIELD=VALUE", help="Change one field, such as tank.silt=0; may be repeated."),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
+Seed = Annotated[int | None, typer.Option("--seed", help="Seed of every random draw.", show_default=False)]
+Vehicle = Annotated[
+    str | None, typer.Option("--vehicle", help="Library name or vehicle YAML file.", show_default=False)
+]
+TargetName = Annotated[
+    str | None,
+    typer.Option("--target", help="branching, brain, plate, or a mesh file.", show_default=False),
+]
+TargetSize = Annotated[
+    float | None,
+    typer.Option("--target-size", metavar="M", help="Scale a mesh file's largest extent to this.", show_default=False),
+]
+
+
+def overrides(
+    sets: list[str] | None,
+    *,
+    seed: int | None,
+    vehicle: str | None,
+    target: str | None,
+    target_size: float | None,
+    method: str | None = None,
+) -> dict[str, Any]:
+    """Join the short options and --set into dotted fields; --set is read first, so the short options win."""
+    from wakewise.operation import parse_overrides
+
+    short = {
+        "seed": seed,
+        "vehicle": vehicle,
+        "target.kind": target,
+        "target.size_m": target_size,
+        "method": method,
+    }
+    return parse_overrides(sets or []) | {name: value for name, value in short.items() if value is not None}

@@ -1,0 +1,76 @@
+"""`wakewise scan`: fly, photograph, reconstruct, evaluate, report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wakewise.cli.console import Bars, print_json, print_table, shown
+from wakewise.cli.options import Json, Out, Preset, ScenarioFile, Seed, Sets, TargetName, TargetSize, Vehicle, overrides
+
+Method = Annotated[str | None, typer.Option("--method", help="dp or wake-aware.", show_default=False)]
+
+_HEADLINES = (
+    "success",
+    "rmse_mm",
+    "completeness_pct",
+    "completeness_visible_pct",
+    "f_score",
+    "registered_images",
+    "target_speed_mean_m_s",
+    "exposure_speed_mean_m_s",
+    "bed_speed_p95_m_s",
+    "turbidity_mean_per_m",
+    "position_rmse_mm",
+    "energy_kJ",
+    "solve_ms_median",
+    "collisions",
+    "wall_s",
+)
+
+
+def scan(
+    scenario: ScenarioFile = None,
+    preset: Preset = "quick",
+    out: Out = None,
+    method: Method = None,
+    target: TargetName = None,
+    target_size: TargetSize = None,
+    vehicle: Vehicle = None,
+    seed: Seed = None,
+    sets: Sets = None,
+    json: Json = False,
+) -> None:
+    """Fly layered orbits round a target, photograph it, reconstruct it, measure the model, write a report.
+
+    Stages that are done are skipped, so running the same command again continues where it stopped.
+    """
+    from wakewise.experiments import run_trial
+    from wakewise.operation import load_scenario
+    from wakewise.reports import write_report
+
+    changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, method=method)
+    resolved = load_scenario(preset, scenario, changes)
+    folder = out or Path("runs") / resolved.name
+    figures = run_trial(resolved, folder, Bars())
+    with Bars().stage("report") as progress:
+        report = write_report(folder)
+        progress(1, 1)
+    if json:
+        print_json(figures)
+        return
+    from rich.table import Table
+
+    table = Table(title=f"{resolved.method}, {Path(resolved.target.kind).stem} coral, seed {resolved.seed}")
+    table.add_column("figure")
+    table.add_column("value", justify="right")
+    table.add_column("unit")
+    for key in _HEADLINES:
+        table.add_row(key, shown(figures[key]), figures["units"][key])
+    print_table(table)
+    for key, reason in figures["why"].items():
+        if key in _HEADLINES:
+            typer.echo(f"{key}: {reason}")
+    typer.echo(f"report: {report}")

@@ -1,0 +1,110 @@
+"""The figures of a trial: what each is called, its unit, its definition, and how they are gathered and compared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+Figures = dict[str, Any]
+
+# key: (unit, definition). The order is that of tables. Target speeds are the excess over the flow without thrusters.
+_FIGURES: dict[str, tuple[str, str]] = {
+    "method": ("", "how thrusts were chosen"),
+    "seed": ("", "every random draw of the trial follows from it"),
+    "success": ("", "rmse_mm < 3 and completeness_pct > 85"),
+    "rmse_mm": ("mm", "root mean square distance from the reconstructed cloud, thinned to 0.8 mm, to the true surface, "
+                "each distance capped at rmse_cap_mm; only what stands 10 mm or more above the bed counts"),
+    "rmse_cap_mm": ("mm", "cap on a single distance in rmse_mm"),
+    "accuracy_median_mm": ("mm", "median distance from the cloud to the true surface"),
+    "completeness_pct": ("%", "share of the true surface with a cloud point within 3 mm"),
+    "completeness_visible_pct": ("%", "the same, over surface seen by at least three photographs"),
+    "completeness_1mm_pct": ("%", "share of the true surface with a cloud point within 1 mm"),
+    "completeness_2mm_pct": ("%", "share of the true surface with a cloud point within 2 mm"),
+    "f_score": ("", "harmonic mean of precision and recall at 3 mm (Tanks and Temples), 0 to 1"),
+    "images": ("", "photographs taken"),
+    "registered_images": ("", "photographs that found their place in the model"),
+    "features_per_image": ("", "mean number of SIFT keypoints in a photograph"),
+    "inlier_matches": ("", "feature matches that passed two-view geometry, summed over pairs"),
+    "reprojection_px": ("px", "mean reprojection error of the sparse model"),
+    "cameras_rmse_mm": ("mm", "rms distance of reconstructed camera centres from the vehicle's estimates, aligned"),
+    "target_speed_mean_m_s": ("m/s", "water speed at the target's surface, excess over the flow without thrusters, "
+                              "mean over surface and time from the first leg on"),
+    "target_speed_p95_m_s": ("m/s", "95th percentile over the surface of the same, mean over time"),
+    "exposure_speed_mean_m_s": ("m/s", "target_speed_mean_m_s while the shutter is open"),
+    "bed_speed_p95_m_s": ("m/s", "95th percentile of the excess speed just above the bed within 0.3 m of the target, "
+                          "mean over time"),
+    "turbidity_mean_per_m": ("1/m", "beam attenuation by silt around the target, mean over time"),
+    "disturbance": ("m2/s2", "D as the controller's wake model sees it, mean over time"),
+    "position_rmse_mm": ("mm", "distance of the true vehicle from where it was wished to be"),
+    "path_rmse_mm": ("mm", "distance of the true vehicle from the nearest point of the wished path"),
+    "velocity_deviation_pct": ("%", "rms difference of true and wished velocity over the rms wished velocity"),
+    "roll_pitch_rms_deg": ("deg", "rms error in roll and pitch"),
+    "energy_kJ": ("kJ", "electrical energy of the thrusters"),
+    "sign_flips_per_s": ("1/s", "reversals of thrust per thruster and second"),
+    "duration_s": ("s", "length of the flight"),
+    "solve_ms_median": ("ms", "thread CPU time of one control step, median"),
+    "solve_ms_p99": ("ms", "thread CPU time of one control step, 99th percentile"),
+    "fallbacks": ("", "control steps whose answer was not the method's own"),
+    "collisions": ("", "times the hull touched floor, walls or target"),
+    "wall_s": ("s", "time from start to figures, all sittings"),
+    "cpu_s": ("s", "CPU time of the same, all threads"),
+}  # fmt: skip
+
+UNITS = {key: unit for key, (unit, _) in _FIGURES.items()}
+DEFINITIONS = {key: text for key, (_, text) in _FIGURES.items()}
+
+# Ratio of two trials, named as in tables, and the figure it is taken from.
+_RATIOS = {
+    "target_speed": "target_speed_mean_m_s",
+    "exposure_speed": "exposure_speed_mean_m_s",
+    "disturbance": "disturbance",
+    "rmse": "rmse_mm",
+    "energy": "energy_kJ",
+    "position_rmse": "position_rmse_mm",
+}
+
+
+@dataclass
+class Gathering:
+    """Figures as the stages hand them in; those that no stage could compute get a reason."""
+
+    figures: Figures = field(default_factory=dict)
+    reasons: dict[str, str] = field(default_factory=dict)
+
+    def add(self, figures: Figures) -> None:
+        """Take in figures of a stage."""
+        self.figures.update(figures)
+
+    def missing(self, keys: tuple[str, ...], reason: str) -> None:
+        """Say why these could not be computed."""
+        self.reasons.update(dict.fromkeys(keys, reason))
+
+    def finish(self) -> Figures:
+        """All figures in order; null ones have their reason under `why`, every one its unit and definition."""
+        result: Figures = {key: self.figures.get(key) for key in _FIGURES}
+        result |= {key: value for key, value in self.figures.items() if key not in _FIGURES}
+        why = {
+            key: self.reasons.get(key, "the stage that computes it did not")
+            for key, value in result.items()
+            if value is None
+        }
+        return result | {"why": why, "units": UNITS, "definitions": DEFINITIONS}
+
+
+def comparison(methods: dict[str, Figures]) -> Figures:
+    """Trials side by side, and ratios of each to the first: null with a reason where a figure is missing or zero."""
+    first = next(iter(methods.values()))
+    ratios: dict[str, Figures] = {}
+    for name, figures in methods.items():
+        ratio: Figures = {}
+        why: dict[str, str] = {}
+        for short, key in _RATIOS.items():
+            value, base = figures.get(key), first.get(key)
+            if value is None or base is None:
+                ratio[short], why[short] = None, f"{key} is missing"
+            elif base == 0:
+                ratio[short], why[short] = None, f"{key} of the first method is zero"
+            else:
+                ratio[short] = value / base
+        ratios[name] = ratio | ({"why": why} if why else {})
+    return {"methods": methods, "ratios": ratios}

@@ -1,0 +1,71 @@
+"""Stages of a trial: who watches them, what they cost, and what is already done."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from wakewise.files import write_json
+from wakewise.interfaces import no_progress
+
+
+class Watch(Protocol):
+    """Shows a person how far a stage is."""
+
+    def stage(self, name: str) -> AbstractContextManager[Callable[..., None]]:
+        """Begin a stage; inside the block, call what it gives as `(done, total, note)`."""
+        ...
+
+    def skipped(self, name: str) -> None:
+        """Say that a stage was already done."""
+        ...
+
+
+class Quiet:
+    """A `Watch` that shows nothing."""
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[Callable[..., None]]:  # noqa: ARG002
+        """Show nothing."""
+        yield no_progress
+
+    def skipped(self, name: str) -> None:
+        """Say nothing."""
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """What each stage cost, kept in stages.json so that a trial done in several sittings adds up."""
+
+    path: Path
+
+    def read(self) -> dict[str, dict[str, float]]:
+        """Wall and CPU seconds by stage; CPU over all threads of the process."""
+        if not self.path.exists():
+            return {}
+        costs: dict[str, dict[str, float]] = json.loads(self.path.read_text(encoding="utf-8"))
+        return costs
+
+    @contextmanager
+    def account(self, name: str) -> Iterator[None]:
+        """Add what the block costs to this stage, also when it is cut short."""
+        wall, cpu = time.perf_counter(), time.process_time()
+        try:
+            yield
+        finally:
+            costs = self.read()
+            before = costs.get(name, {"wall_s": 0.0, "cpu_s": 0.0})
+            costs[name] = {
+                "wall_s": before["wall_s"] + time.perf_counter() - wall,
+                "cpu_s": before["cpu_s"] + time.process_time() - cpu,
+            }
+            write_json(self.path, costs)
+
+    def total(self, kind: str) -> float:
+        """Sum of "wall_s" or "cpu_s" over the stages."""
+        return sum(cost[kind] for cost in self.read().values())

@@ -1,0 +1,171 @@
+"""The one place where a scenario becomes objects.
+
+Here, and nowhere below, the controller's world and the true one are made side by side: the plant gets its own,
+perturbed vehicle parameters and its own water; the controller gets the nominal vehicle and a wake model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wakewise.control import make_controller
+from wakewise.estimation import PoseFilter
+from wakewise.geometry import Pose, quat_from_rotvec, quat_multiply
+from wakewise.imaging import PinholeCamera, Scene
+from wakewise.interfaces import BodyState, Controller, Estimator, ScalarGrid
+from wakewise.missions import Route, RoutePilot, TankBounds, check_clearance, plan_route
+from wakewise.operation.loop import Truth, WaterTruth
+from wakewise.operation.scenario import Scenario, TargetSettings
+from wakewise.tank import Tank
+from wakewise.targets import Region, Target, coral, coral_kinds, load_mesh, place_on_bed, sample_region
+from wakewise.vehicles import Vehicle, load_vehicle, perturbed
+from wakewise.wake import wake_model
+
+
+@dataclass(frozen=True, kw_only=True)
+class Seeds:
+    """One random stream for each part of a trial, so that a change in one leaves the draws of the others alone."""
+
+    plant: np.random.Generator
+    tank: np.random.Generator
+    region: np.random.Generator
+    start: np.random.Generator
+    imaging: np.random.Generator
+
+    @classmethod
+    def of(cls, seed: int) -> Seeds:
+        """Children of one seed, always spawned in this order."""
+        plant, tank, region, start, imaging = np.random.default_rng(seed).spawn(5)
+        return cls(plant=plant, tank=tank, region=region, start=start, imaging=imaging)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Mission:
+    """What is known before the flight: vehicle as believed, target, its water, the route."""
+
+    vehicle: Vehicle
+    target: Target
+    region: Region
+    route: Route
+    clearance_m: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Flight:
+    """Everything the loop needs, ready to fly."""
+
+    mission: Mission
+    pilot: RoutePilot
+    controller: Controller[Any]
+    estimator: Estimator[Any]
+    tank: Tank
+    witness: TankWitness
+    start: BodyState
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TankWitness:
+    """Reads the truth from the simulated tank, for the record."""
+
+    tank: Tank
+
+    def observe(self) -> Truth:
+        """Vehicle, thrusters and collisions now."""
+        tank = self.tank
+        return Truth(state=tank.state, thrusts_N=tank.thrusts_N, power_W=tank.power_W, collision=tank.collision)
+
+    def water(self) -> WaterTruth:
+        """Water at the target now."""
+        measure = self.tank.measure()
+        return WaterTruth(
+            target_speed_mean_m_s=measure.target_speed_mean_m_s,
+            target_speed_p95_m_s=measure.target_speed_p95_m_s,
+            bed_speed_p95_m_s=measure.bed_speed_p95_m_s,
+            turbidity_per_m=measure.turbidity_per_m,
+        )
+
+    def silt(self) -> ScalarGrid:
+        """Silt around the target now."""
+        return self.tank.concentration_grid()
+
+
+def build_target(settings: TargetSettings, bed_z_m: float) -> Target:
+    """The coral or mesh of a scenario, standing on the bed."""
+    if settings.kind in coral_kinds():
+        return place_on_bed(settings.kind, coral(settings.kind, settings.seed), bed_z_m)
+    path = Path(settings.kind).expanduser()
+    return place_on_bed(path.stem, load_mesh(path, settings.size_m), bed_z_m)
+
+
+def build_mission(scenario: Scenario) -> Mission:
+    """Plan a scenario's mission and check it against floor, walls and target.
+
+    Raises
+    ------
+    InputError
+        Unknown vehicle or target, or an orbit that would touch something.
+    """
+    length, width, depth = scenario.tank.size_m
+    vehicle = load_vehicle(scenario.vehicle)
+    target = build_target(scenario.target, depth)
+    route = plan_route(target.centre_W_m, scenario.mission)
+    bounds = TankBounds(
+        low_W_m=np.array([-length / 2, -width / 2, 0.0]), high_W_m=np.array([length / 2, width / 2, depth])
+    )
+    clearance_m = check_clearance(
+        route, vehicle.X_BC, vehicle.size_m, bounds, target.mesh.vertices_m, scenario.mission.clearance_m
+    )
+    region = sample_region(target, scenario.target.points, Seeds.of(scenario.seed).region)
+    return Mission(vehicle=vehicle, target=target, region=region, route=route, clearance_m=clearance_m)
+
+
+def build_flight(scenario: Scenario, mission: Mission) -> Flight:
+    """Put controller and tank side by side; they share nothing but the interfaces."""
+    seeds, tank_settings = Seeds.of(scenario.seed), scenario.tank
+    believed = mission.vehicle
+    trim_N = tank_settings.trim_N
+    if trim_N is None:
+        trim_N = float(seeds.plant.uniform(-tank_settings.trim_range_N, tank_settings.trim_range_N))
+    true_vehicle = perturbed(
+        believed,
+        seeds.plant,
+        mass_pct=tank_settings.mass_pct,
+        damping_pct=tank_settings.damping_pct,
+        added_mass_pct=tank_settings.added_mass_pct,
+        thrust_pct=tank_settings.thrust_pct,
+        trim_N=trim_N,
+        water_density_kg_m3=tank_settings.density_kg_m3,
+    )
+    wished = mission.route.body(0.0, believed.X_BC)
+    start = BodyState(X_WB=_misplaced(wished.X_WB, seeds.start))
+    tank = Tank(true_vehicle, mission.target, tank_settings, start, seeds.tank)
+    control = scenario.control
+    return Flight(
+        mission=mission,
+        pilot=RoutePilot(route=mission.route, X_BC=believed.X_BC, exposure_s=scenario.imaging.exposure_s),
+        controller=make_controller(scenario.method, believed, mission.region, wake_model(control.wake_model), control),
+        estimator=PoseFilter(believed, scenario.estimation),
+        tank=tank,
+        witness=TankWitness(tank=tank),
+        start=wished,
+    )
+
+
+def build_camera(scenario: Scenario) -> PinholeCamera:
+    """The camera of a scenario."""
+    return scenario.imaging.camera()
+
+
+def build_scene(scenario: Scenario, target: Target) -> Scene:
+    """The target on its bed, textured, as the camera finds it."""
+    return Scene.build(target, scenario.target.seed)
+
+
+def _misplaced(X_WB: Pose, rng: np.random.Generator, spread_m: float = 0.02, spread_rad: float = 0.03) -> Pose:
+    """Where the vehicle really is when the mission begins: near the start, not on it."""
+    turn = quat_from_rotvec(rng.normal(0.0, spread_rad, 3))
+    return Pose(X_WB.p_m + rng.normal(0.0, spread_m, 3), quat_multiply(X_WB.q, turn))

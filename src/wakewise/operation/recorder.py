@@ -1,0 +1,196 @@
+"""Keeps what a flight did: one row per control step, one entry per exposure, solve times apart.
+
+steps.parquet holds nothing that depends on the machine, so the same seed gives the same bytes; solve times are in
+timings.parquet. Column names carry units; frames and meanings are in docs/conventions.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from wakewise.arrays import Array
+from wakewise.files import whole_file
+from wakewise.geometry import Pose, quat_integrate
+from wakewise.interfaces import BodyState, ScalarGrid
+from wakewise.missions import Route
+from wakewise.operation.loop import Step, WaterTruth, Witness
+
+_STATE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "u_m_s", "v_m_s", "w_m_s", "p_rad_s", "q_rad_s", "r_rad_s")
+_WRENCH = ("wrench_X_N", "wrench_Y_N", "wrench_Z_N", "wrench_K_Nm", "wrench_M_Nm", "wrench_N_Nm")
+_WATER = ("target_speed_mean_m_s", "target_speed_p95_m_s", "bed_speed_p95_m_s", "turbidity_per_m")
+
+
+def step_columns(thrusters: int) -> list[str]:
+    """Names of the numeric columns of steps.parquet, in order, for a vehicle with this many thrusters."""
+    return [
+        "time_s",
+        *(f"{who}_{what}" for who in ("true", "est", "goal") for what in _STATE),
+        *(f"thrust_{i + 1}_N" for i in range(thrusters)),
+        *(f"command_{i + 1}_N" for i in range(thrusters)),
+        *_WRENCH,
+        "disturbance",
+        *_WATER,
+        "power_W",
+    ]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ExposureRecord:
+    """One opening of the shutter: true camera poses across it, the estimate at its opening, the silt in the water."""
+
+    time_s: float
+    X_WC_true: tuple[Pose, ...]
+    X_WC_est: Pose
+    silt: ScalarGrid
+
+
+@dataclass(kw_only=True, eq=False)
+class FlightRecorder:
+    """Collects a flight in memory and writes it whole at its end.
+
+    Parameters
+    ----------
+    route : Route
+        Gives the exposures and the names of the legs.
+    X_BC : Pose
+        Camera mount.
+    exposure_s : float
+        How long the shutter stays open.
+    instants : int
+        How many true poses are kept across each exposure.
+    thrusters : int
+    witness : Witness or None
+        Without one, true columns and water columns are NaN and no exposure is rendered.
+    water_every_s : float
+        How often the water is asked about; in between the last answer stands.
+    """
+
+    route: Route
+    X_BC: Pose
+    exposure_s: float
+    instants: int
+    thrusters: int
+    dt_s: float
+    witness: Witness | None
+    water_every_s: float = 0.1
+    exposures: list[ExposureRecord] = field(default_factory=list)
+    _rows: list[Array] = field(default_factory=list)
+    _legs: list[str] = field(default_factory=list)
+    _fallbacks: list[str] = field(default_factory=list)
+    _exposing: list[bool] = field(default_factory=list)
+    _collisions: list[bool] = field(default_factory=list)
+    _solve_ms: list[float] = field(default_factory=list)
+    _water: WaterTruth | None = None
+    _water_time_s: float = -np.inf
+
+    def __call__(self, step: Step) -> None:
+        """Take in one step of the loop."""
+        opens_s = self.route.exposures_s
+        k = sum(self._exposing)
+        exposing = bool(k < len(opens_s) and opens_s[k] < step.time_s + self.dt_s)
+        if self.witness is not None and (exposing or step.time_s >= self._water_time_s + self.water_every_s - 1e-9):
+            self._water, self._water_time_s = self.witness.water(), step.time_s
+        water = [getattr(self._water, name) if self._water is not None else np.nan for name in _WATER]
+        truth = step.truth
+        lost = np.full(13, np.nan)
+        row = [
+            np.array([step.time_s]),
+            state_vector(truth.state) if truth else lost,
+            state_vector(step.estimate),
+            state_vector(BodyState(X_WB=step.goal.X_WB, nu_B=step.goal.nu_B)),
+            truth.thrusts_N if truth else np.full(self.thrusters, np.nan),
+            step.command.thrusts_N,
+            step.command.wrench_B,
+            np.array([np.nan if step.command.disturbance is None else step.command.disturbance, *water]),
+            np.array([truth.power_W if truth else np.nan]),
+        ]
+        self._rows.append(np.concatenate(row))
+        self._legs.append(self.route.legs[self.route.leg_at(step.time_s)].name)
+        self._fallbacks.append(step.command.fallback or "")
+        self._exposing.append(exposing)
+        self._collisions.append(bool(truth and truth.collision))
+        self._solve_ms.append(1e3 * step.solve_s)
+        if exposing and truth is not None and self.witness is not None:
+            self.exposures.append(
+                ExposureRecord(
+                    time_s=float(opens_s[k]),
+                    X_WC_true=tuple(
+                        _moved(truth.state, float(opens_s[k]) - step.time_s + after_s) @ self.X_BC
+                        for after_s in np.linspace(0.0, self.exposure_s, self.instants)
+                    ),
+                    X_WC_est=_moved(step.estimate, float(opens_s[k]) - step.time_s) @ self.X_BC,
+                    silt=self.witness.silt(),
+                )
+            )
+
+    def frame(self) -> pl.DataFrame:
+        """The steps as a table."""
+        table = np.array(self._rows).reshape(len(self._rows), -1)
+        columns = {name: table[:, i] for i, name in enumerate(step_columns(self.thrusters))}
+        return pl.DataFrame(columns).with_columns(
+            exposing=pl.Series(self._exposing, dtype=pl.Boolean),
+            collision=pl.Series(self._collisions, dtype=pl.Boolean),
+            fallback=pl.Series(self._fallbacks, dtype=pl.String),
+            leg=pl.Series(self._legs, dtype=pl.String),
+        )
+
+    def write(self, folder: Path) -> None:
+        """Write exposures.npz and timings.parquet, then steps.parquet, whose presence says that the flight is whole."""
+        if self.exposures:
+            write_exposures(folder / "exposures.npz", self.exposures, self.exposure_s)
+        with whole_file(folder / "timings.parquet") as path:
+            pl.DataFrame({"solve_ms": self._solve_ms}).write_parquet(path)
+        with whole_file(folder / "steps.parquet") as path:
+            self.frame().write_parquet(path)
+
+
+def state_vector(state: BodyState) -> Array:
+    """Position, quaternion and twist in the order of the columns, shape (13,)."""
+    return np.concatenate([state.X_WB.p_m, state.X_WB.q, state.nu_B])
+
+
+def write_exposures(path: Path, exposures: list[ExposureRecord], exposure_s: float) -> None:
+    """Write what each photograph needs to be rendered later."""
+    with whole_file(path) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(
+            file,
+            time_s=np.array([e.time_s for e in exposures]),
+            X_WC_p_m=np.array([[X.p_m for X in e.X_WC_true] for e in exposures]),
+            X_WC_q=np.array([[X.q for X in e.X_WC_true] for e in exposures]),
+            X_WC_est_p_m=np.array([e.X_WC_est.p_m for e in exposures]),
+            X_WC_est_q=np.array([e.X_WC_est.q for e in exposures]),
+            silt_origin_W_m=exposures[0].silt.origin_W_m,
+            silt_spacing_m=np.array(exposures[0].silt.spacing_m),
+            silt_kg_m3=np.array([e.silt.values for e in exposures], dtype=np.float32),
+            exposure_s=np.array(exposure_s),
+        )
+
+
+def read_exposures(path: Path) -> list[ExposureRecord]:
+    """Read what `write_exposures` wrote."""
+    with np.load(path) as data:
+        origin, spacing = data["silt_origin_W_m"], float(data["silt_spacing_m"])
+        p, q, silt = data["X_WC_p_m"], data["X_WC_q"], data["silt_kg_m3"]
+        est_p, est_q = data["X_WC_est_p_m"], data["X_WC_est_q"]
+        return [
+            ExposureRecord(
+                time_s=float(time_s),
+                X_WC_true=tuple(Pose(p[k, i], q[k, i]) for i in range(p.shape[1])),
+                X_WC_est=Pose(est_p[k], est_q[k]),
+                silt=ScalarGrid(origin_W_m=origin, spacing_m=spacing, values=silt[k]),
+            )
+            for k, time_s in enumerate(data["time_s"])
+        ]
+
+
+def _moved(state: BodyState, dt_s: float) -> Pose:
+    """X_WB after a short while at constant twist: over one exposure the error is a dt^2 / 2, microns."""
+    X_WB = state.X_WB
+    return Pose(
+        X_WB.p_m + X_WB.R @ state.nu_B[:3] * dt_s,
+        quat_integrate(X_WB.q, state.nu_B[3:], dt_s),
+    )

@@ -1,0 +1,189 @@
+"""A scenario: everything a trial needs to know, as one frozen, checked record; read from and written to YAML."""
+
+from __future__ import annotations
+
+import difflib
+from importlib import resources
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+from pydantic import BaseModel, Field, ValidationError, field_validator
+
+from wakewise.control import METHODS, ControlSettings
+from wakewise.errors import InputError
+from wakewise.estimation import FilterSettings
+from wakewise.files import write_text
+from wakewise.imaging import ImagingSettings
+from wakewise.missions import MissionSettings
+from wakewise.reconstruction import ReconstructionSettings
+from wakewise.settings import Settings
+from wakewise.tank import TankSettings
+from wakewise.targets import coral_kinds
+
+PRESETS = ("quick", "standard")
+
+
+class TargetSettings(Settings):
+    """What is looked at: a procedural coral by name, or a mesh file."""
+
+    kind: str = Field("branching", description=f"one of {', '.join(coral_kinds())}, or the path of a mesh file")
+    size_m: float | None = Field(None, gt=0.0, le=3.0, description="scale the largest extent of a mesh file to this")
+    seed: int = Field(0, ge=0, description="which individual of a procedural coral")
+    points: int = Field(300, ge=20, le=10000, description="sample points that stand for the target's water in D")
+
+
+class Scenario(Settings):
+    """One trial, resolved: vehicle, target, mission, method, world, camera, reconstruction and seed."""
+
+    name: str = Field("scan", min_length=1, max_length=80, description="what the trial is called in its report")
+    seed: int = Field(1, ge=0, description="every random draw of the trial follows from it")
+    method: Literal[METHODS] = Field("wake-aware", description="how thrusts are chosen")  # type: ignore[valid-type]
+    vehicle: str = Field("paper", description="library name or path of a vehicle file")
+    target: TargetSettings = TargetSettings()
+    mission: MissionSettings = MissionSettings()
+    control: ControlSettings = ControlSettings()
+    estimation: FilterSettings = FilterSettings()
+    tank: TankSettings = TankSettings()
+    imaging: ImagingSettings = ImagingSettings()
+    reconstruction: ReconstructionSettings = ReconstructionSettings()
+
+    @field_validator("vehicle")
+    @classmethod
+    def _not_empty(cls, value: str) -> str:
+        if not value.strip():
+            raise ValueError("empty: give a library name or the path of a vehicle file")
+        return value
+
+
+def load_scenario(preset: str | None, path: Path | None, overrides: dict[str, Any]) -> Scenario:
+    """Lay a scenario file over a preset and the overrides over both, then check the whole.
+
+    Parameters
+    ----------
+    preset : str or None
+        One of `PRESETS`; None starts from the defaults.
+    path : Path or None
+        A scenario YAML file, which may hold any part of a scenario.
+    overrides : dict
+        Dotted field names to values, such as ``{"tank.silt": 0}``.
+
+    Raises
+    ------
+    InputError
+        Naming the file or field, what was found and what is allowed.
+    """
+    tree: dict[str, Any] = {}
+    source = "--set"
+    if preset is not None:
+        if preset not in PRESETS:
+            raise InputError(f"--preset: '{preset}', allowed are {', '.join(PRESETS)}")
+        text = resources.files("wakewise.operation").joinpath("presets", f"{preset}.yaml").read_text(encoding="utf-8")
+        tree = yaml.safe_load(text)
+    if path is not None:
+        source = str(path)
+        tree = _merged(tree, _read_yaml(path))
+    for name, value in overrides.items():
+        tree = _merged(tree, _nested(name, value))
+    return check_scenario(tree, source)
+
+
+def check_scenario(tree: dict[str, Any], source: str) -> Scenario:
+    """Turn a tree of plain values into a scenario; every fault becomes one line that names the field."""
+    try:
+        return Scenario.model_validate(tree)
+    except ValidationError as fault:
+        raise InputError(f"{source}: {describe_fault(fault, Scenario)}") from None
+
+
+def describe_fault(fault: ValidationError, model: type[BaseModel]) -> str:
+    """Say in one line which field of `model` is wrong, what was found and what is allowed (the first fault only)."""
+    first = fault.errors(include_url=False)[0]
+    where = ".".join(str(part) for part in first["loc"]) or "scenario"
+    if first["type"] == "extra_forbidden":
+        *parents, unknown = [str(part) for part in first["loc"]]
+        owner: Any = model
+        for part in parents:
+            annotation = owner.model_fields[part].annotation
+            owner = annotation if isinstance(annotation, type) and issubclass(annotation, BaseModel) else owner
+        allowed = list(owner.model_fields)
+        close = difflib.get_close_matches(unknown, allowed, 1)
+        hint = f"did you mean {close[0]}?" if close else f"allowed are {', '.join(allowed)}"
+        return f"{where}: no such field, {hint}"
+    found = first["input"]
+    shown = f"found {found!r}, " if isinstance(found, (str, int, float, bool, type(None))) else ""
+    message = first["msg"].removeprefix("Value error, ").replace("Input should", "should").replace("\n", " ")
+    return f"{where}: {shown}{message}"
+
+
+def parse_overrides(items: list[str]) -> dict[str, Any]:
+    """Parse ``field=value`` pairs of the command line; values are YAML, so numbers, lists and null work."""
+    overrides: dict[str, Any] = {}
+    for item in items:
+        name, equals, text = item.partition("=")
+        if not equals or not name.strip():
+            raise InputError(f"--set: '{item}', must be FIELD=VALUE such as tank.silt=0")
+        try:
+            overrides[name.strip()] = yaml.safe_load(text)
+        except yaml.YAMLError:
+            raise InputError(f"--set {name.strip()}: '{text}' is not a value that YAML can read") from None
+    return overrides
+
+
+def dump_scenario(scenario: Scenario, versions: dict[str, str] | None = None) -> str:
+    """YAML text of a scenario, everything resolved, with the versions that ran it as comments."""
+    head = "".join(f"# {name} {version}\n" for name, version in (versions or {}).items())
+    return head + yaml.safe_dump(scenario.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+
+
+def write_scenario(path: Path, scenario: Scenario, versions: dict[str, str]) -> None:
+    """Write a scenario whole or not at all."""
+    write_text(path, dump_scenario(scenario, versions))
+
+
+def read_scenario(path: Path) -> Scenario:
+    """Read a scenario that a trial left behind."""
+    return check_scenario(_read_yaml(path), str(path))
+
+
+def differences(a: BaseModel, b: BaseModel, prefix: str = "") -> list[str]:
+    """Fields in which two settings differ, as 'name value, now value'."""
+    lines: list[str] = []
+    for name in type(a).model_fields:
+        old, new = getattr(a, name), getattr(b, name)
+        if isinstance(old, BaseModel) and isinstance(new, BaseModel):
+            lines += differences(old, new, f"{prefix}{name}.")
+        elif old != new:
+            lines.append(f"{prefix}{name} {old}, now {new}")
+    return lines
+
+
+def _read_yaml(path: Path) -> dict[str, Any]:
+    try:
+        tree = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file, a scenario YAML file is needed") from None
+    except (OSError, UnicodeDecodeError):
+        raise InputError(f"{path}: cannot be read as text, a scenario YAML file is needed") from None
+    except yaml.YAMLError as fault:
+        mark = getattr(fault, "problem_mark", None)
+        line = f" line {mark.line + 1}" if mark else ""
+        raise InputError(f"{path}{line}: not YAML ({getattr(fault, 'problem', 'unreadable')})") from None
+    if not isinstance(tree, dict):
+        raise InputError(f"{path}: holds {type(tree).__name__}, must hold fields of a scenario such as 'seed: 1'")
+    return tree
+
+
+def _nested(dotted: str, value: Any) -> dict[str, Any]:
+    tree: Any = value
+    for part in reversed(dotted.split(".")):
+        tree = {part: tree}
+    return dict(tree)
+
+
+def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    result = dict(below)
+    for key, value in above.items():
+        old = result.get(key)
+        result[key] = _merged(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
+    return result

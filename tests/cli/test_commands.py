@@ -1,0 +1,62 @@
+"""Commands: help is documented, JSON is alone on standard output, small commands do what they say."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from wakewise.cli.main import run
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_the_documented_help_is_what_the_commands_print() -> None:
+    """docs/commands.md is up to date; `make docs` writes it anew."""
+    sys.path.insert(0, str(ROOT / "tools"))
+    try:
+        from write_command_docs import PAGE, page
+    finally:
+        sys.path.pop(0)
+    assert PAGE.read_text(encoding="utf-8") == page(), "run make docs"
+
+
+def test_help_is_quick_and_loads_no_heavy_library() -> None:
+    """Asking for help imports neither numba, nor OpenCV, nor pycolmap."""
+    code = (
+        "import sys, wakewise.cli.main; print([m for m in ('numba', 'cv2', 'pycolmap', 'viser') if m in sys.modules])"
+    )
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert shown.strip() == "[]"
+
+
+@pytest.mark.parametrize("name", ["paper", "bluerov2-heavy"])
+def test_a_vehicle_is_shown_to_machines_and_people(
+    name: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """--json prints one object with rank 6 and two null vectors; the table names every thruster; a drawing is SVG."""
+    assert run(["vehicle", "show", name, "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["rank"] == 6
+    assert len(facts["null_space"]) == 2
+    assert run(["vehicle", "show", name, "--drawing", str(tmp_path / "v.svg")]) == 0
+    shown = capsys.readouterr().out
+    assert all(thruster["name"] in shown for thruster in facts["thrusters"])
+    assert (tmp_path / "v.svg").read_text().startswith("<svg")
+
+
+def test_a_model_that_is_the_truth_scores_perfectly(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """Points drawn from a surface have next to no error against it and cover it."""
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.07)
+    ball.export(tmp_path / "truth.ply")
+    points = trimesh.PointCloud(trimesh.sample.sample_surface(ball, 40_000, seed=1)[0])
+    points.export(tmp_path / "cloud.ply")
+    assert run(["evaluate", str(tmp_path / "cloud.ply"), "--reference", str(tmp_path / "truth.ply"), "--json"]) == 0
+    score = json.loads(capsys.readouterr().out)
+    assert score["rmse_mm"] < 0.1
+    assert score["completeness_1mm_pct"] > 99.0
+    assert score["success"] is True
+    assert "completeness_visible_pct" in score["why"]

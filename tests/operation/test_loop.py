@@ -1,0 +1,123 @@
+"""The loop and its recorder, on a plant simple enough to know by heart."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from wakewise.geometry import Pose, quat_from_matrix
+from wakewise.interfaces import BodyState, Command, Goal, Measurement, ScalarGrid
+from wakewise.missions import MissionSettings, RoutePilot, plan_route
+from wakewise.missions.orbit import R_FC
+from wakewise.operation import FlightRecorder, Truth, WaterTruth, fly, read_exposures, step_columns
+
+ROUTE = plan_route(
+    np.array([0.0, 0.0, 1.4]), MissionSettings(elevations_deg=(30,), views=(4,), speed_m_s=0.5, settle_s=1)
+)
+X_BC = Pose(np.array([0.2, 0.0, 0.0]), quat_from_matrix(R_FC))
+DT_S = 0.02
+
+
+@dataclass
+class Perfect:
+    """Plant, estimator, controller and witness in one: it is always exactly where the goal was."""
+
+    commands: list[np.ndarray] = field(default_factory=list)
+    state: BodyState = field(default_factory=lambda: ROUTE.body(0.0, X_BC))
+    name: str = "perfect"
+
+    def init(self, start: BodyState | None = None) -> int:
+        return 0
+
+    def step(self, *arguments: object) -> object:
+        if len(arguments) == 2:
+            self.commands.append(np.asarray(arguments[0]))
+            return (Measurement(time_s=0.0),)
+        if isinstance(arguments[-1], Goal):
+            self.state = BodyState(X_WB=arguments[-1].X_WB, nu_B=arguments[-1].nu_B)
+            count = int(arguments[0]) + 1  # type: ignore[call-overload]
+            return count, Command(thrusts_N=np.full(2, float(count)), wrench_B=np.zeros(6))
+        return 0, self.state
+
+    def observe(self) -> Truth:
+        return Truth(state=self.state, thrusts_N=np.zeros(2), power_W=1.0, collision=False)
+
+    def water(self) -> WaterTruth:
+        return WaterTruth(
+            target_speed_mean_m_s=0.1, target_speed_p95_m_s=0.2, bed_speed_p95_m_s=0.3, turbidity_per_m=0.4
+        )
+
+    def silt(self) -> ScalarGrid:
+        return ScalarGrid(origin_W_m=np.zeros(3), spacing_m=0.1, values=np.ones((2, 3, 4)))
+
+
+def flown(witnessed: bool = True) -> tuple[FlightRecorder, Perfect]:
+    everything = Perfect()
+    witness = everything if witnessed else None
+    recorder = FlightRecorder(
+        route=ROUTE, X_BC=X_BC, exposure_s=0.01, instants=3, thrusters=2, dt_s=DT_S, witness=witness
+    )
+    fly(
+        pilot=RoutePilot(route=ROUTE, X_BC=X_BC, exposure_s=0.01),
+        controller=everything,  # type: ignore[arg-type]
+        estimator=everything,  # type: ignore[arg-type]
+        plant=everything,  # type: ignore[arg-type]
+        witness=witness,
+        start=everything.state,
+        thrusters=2,
+        duration_s=ROUTE.duration_s,
+        dt_s=DT_S,
+        record=recorder,
+    )
+    return recorder, everything
+
+
+def test_every_step_is_recorded_once_and_in_order() -> None:
+    """One row per control step, time in equal steps, columns as documented, each command flown once."""
+    recorder, plant = flown()
+    frame = recorder.frame()
+    assert len(frame) == round(ROUTE.duration_s / DT_S) == len(plant.commands)
+    np.testing.assert_allclose(np.diff(frame["time_s"].to_numpy()), DT_S, atol=1e-12)
+    assert frame.columns[: len(step_columns(2))] == step_columns(2)
+    assert frame["command_1_N"].to_list() == [command[0] for command in plant.commands]
+
+
+def test_each_exposure_is_recorded_at_its_place() -> None:
+    """A vehicle that is where it should be photographs from where it was planned, and its pose moves while it does."""
+    recorder, _ = flown()
+    assert len(recorder.exposures) == 4
+    assert int(recorder.frame()["exposing"].sum()) == 4
+    for exposure, planned, opens_s in zip(recorder.exposures, ROUTE.X_WC_planned, ROUTE.exposures_s, strict=True):
+        assert exposure.time_s == pytest.approx(opens_s)
+        np.testing.assert_allclose(exposure.X_WC_true[0].p_m, planned.p_m, atol=2e-3)
+        assert len(exposure.X_WC_true) == 3
+    middle = recorder.exposures[1]
+    moved = np.linalg.norm(middle.X_WC_true[-1].p_m - middle.X_WC_true[0].p_m)
+    assert moved == pytest.approx(0.5 * 0.01, rel=0.1)
+
+
+def test_a_flight_survives_its_files(tmp_path: Path) -> None:
+    """What is read back is what was recorded, and the bytes of steps.parquet do not depend on the clock."""
+    first, _ = flown()
+    second, _ = flown()
+    first.write(tmp_path / "a")
+    second.write(tmp_path / "b")
+    assert (tmp_path / "a/steps.parquet").read_bytes() == (tmp_path / "b/steps.parquet").read_bytes()
+    assert pl.read_parquet(tmp_path / "a/steps.parquet").equals(first.frame())
+    for written, read in zip(first.exposures, read_exposures(tmp_path / "a/exposures.npz"), strict=True):
+        assert read.time_s == written.time_s
+        np.testing.assert_array_equal(read.X_WC_true[2].p_m, written.X_WC_true[2].p_m)
+        np.testing.assert_array_equal(read.silt.values, written.silt.values)
+
+
+def test_at_sea_nobody_knows_the_truth() -> None:
+    """Without a witness the flight is recorded all the same; true columns hold NaN and no exposure is invented."""
+    recorder, _ = flown(witnessed=False)
+    frame = recorder.frame()
+    assert frame["true_x_m"].is_nan().all()
+    assert frame["target_speed_mean_m_s"].is_nan().all()
+    assert not frame["est_x_m"].is_nan().any()
+    assert recorder.exposures == []
+    assert int(frame["exposing"].sum()) == 4
