@@ -43,7 +43,7 @@ bench: setup
 	$(BIN)/python benchmarks/run.py
 
 docs: setup
-	$(BIN)/python tools/write_command_docs.py
+	$(BIN)/python tools/write_docs.py
 
 lock:
 	$(BIN)/python -m pip install --quiet uv

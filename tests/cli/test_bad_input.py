@@ -44,7 +44,7 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (["--set", "silt"], ["--set", "FIELD=VALUE"]),
         (["gone.yaml"], ["gone.yaml", "no such file"]),
         (["--nonsense"], ["nonsense"]),
-        (["--seed", "one"], ["seed", "one"]),
+        (["--seed", "one"], ["--seed", "integer"]),
     ],
 )
 def test_a_scan_that_cannot_be_flown_is_refused(arguments: list[str], words: list[str], capsys: Capsys) -> None:

@@ -12,14 +12,15 @@ from wakewise.cli.main import run
 ROOT = Path(__file__).parents[2]
 
 
-def test_the_documented_help_is_what_the_commands_print() -> None:
-    """docs/commands.md is up to date; `make docs` writes it anew."""
+def test_the_documentation_is_what_commands_and_settings_say() -> None:
+    """docs/commands.md and docs/scenario.md are up to date; `make docs` writes them anew."""
     sys.path.insert(0, str(ROOT / "tools"))
     try:
-        from write_command_docs import PAGE, page
+        from write_docs import DOCS, PAGES
     finally:
         sys.path.pop(0)
-    assert PAGE.read_text(encoding="utf-8") == page(), "run make docs"
+    for name, text in PAGES.items():
+        assert (DOCS / name).read_text(encoding="utf-8") == text(), f"docs/{name} is stale: run make docs"
 
 
 def test_help_is_quick_and_loads_no_heavy_library() -> None:
@@ -52,7 +53,7 @@ def test_a_model_that_is_the_truth_scores_perfectly(capsys: pytest.CaptureFixtur
 
     ball = trimesh.creation.icosphere(subdivisions=4, radius=0.07)
     ball.export(tmp_path / "truth.ply")
-    points = trimesh.PointCloud(trimesh.sample.sample_surface(ball, 40_000, seed=1)[0])
+    points = trimesh.PointCloud(trimesh.sample.sample_surface(ball, 400_000, seed=1)[0])
     points.export(tmp_path / "cloud.ply")
     assert run(["evaluate", str(tmp_path / "cloud.ply"), "--reference", str(tmp_path / "truth.ply"), "--json"]) == 0
     score = json.loads(capsys.readouterr().out)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -17,13 +18,16 @@ stderr = Console(stderr=True, highlight=False)
 
 
 class Bars:
-    """A `Watch` that shows one progress bar per stage."""
+    """A `Watch` that shows a progress bar while a stage runs and leaves one line behind it.
+
+    Where standard error is no terminal only that line is written. A stage that fails leaves nothing: the error speaks.
+    """
 
     @contextmanager
     def stage(self, name: str) -> Iterator[Callable[..., None]]:
-        """Show a bar while the block runs; leave one line behind it."""
+        """Show a bar while the block runs."""
         columns = (
-            SpinnerColumn(finished_text="[green]✓"),
+            SpinnerColumn(),
             TextColumn("{task.description:<12}"),
             BarColumn(bar_width=30),
             TextColumn("{task.percentage:>3.0f} %"),
@@ -32,15 +36,16 @@ class Bars:
             TimeRemainingColumn(),
             TextColumn("[dim]{task.fields[note]}"),
         )
-        with Progress(*columns, console=stderr) as progress:
+        began = time.perf_counter()
+        with Progress(*columns, console=stderr, transient=True, disable=not stderr.is_terminal) as progress:
             task = progress.add_task(name, total=None, note="")
 
             def advance(done: float, total: float, note: str = "") -> None:
                 progress.update(task, completed=done, total=total, note=note)
 
             yield advance
-            known = progress.tasks[0].total or 1.0
-            progress.update(task, completed=known, total=known)
+        took_s = round(time.perf_counter() - began)
+        stderr.print(f"[green]✓[/] {name:<12} {took_s // 60:>3}:{took_s % 60:02} min")
 
     def skipped(self, name: str) -> None:
         """Say that a stage was already done."""
@@ -55,7 +60,9 @@ def print_json(value: Any) -> None:
 
 def print_table(table: Table) -> None:
     """Print a table on standard output."""
-    Console(highlight=False).print(table)
+    console = Console(highlight=False)
+    # A pipe or a file has no width to fit into.
+    Console(highlight=False, width=console.width if console.is_terminal else 140).print(table)
 
 
 def shown(value: Any) -> str:

@@ -49,7 +49,10 @@ def run(arguments: Sequence[str] | None = None) -> int:
     try:
         code = app(args=arguments, standalone_mode=False)
         return code if isinstance(code, int) else 0
-    except (typer.TyperException, InputError) as fault:
+    except typer.TyperException as fault:
+        _say(fault.format_message())
+        return 2
+    except InputError as fault:
         _say(str(fault))
         return 2
     except WakewiseError as fault:

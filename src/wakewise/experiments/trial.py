@@ -23,6 +23,7 @@ from wakewise.experiments.metrics import Figures, Gathering, comparison
 from wakewise.experiments.stages import Ledger, Quiet, Watch
 from wakewise.files import write_json, write_text
 from wakewise.geometry import matrix_from_quat
+from wakewise.missions import SETTLING
 from wakewise.operation import (
     Mission,
     Scenario,
@@ -166,7 +167,8 @@ def nearby_pairs(names: list[str], axes_W: Array) -> list[tuple[str, str]]:
 def evaluate_trial(mission: Mission, folder: Path) -> dict[str, Any]:
     """Judge flight and model against the truth; what could not be computed gets a reason."""
     gathering = Gathering()
-    gathering.add(flight_figures(pl.read_parquet(folder / "steps.parquet")))
+    steps = pl.read_parquet(folder / "steps.parquet")
+    gathering.add(flight_figures(steps.filter(pl.col("leg") != SETTLING)))
     solve_ms = pl.read_parquet(folder / "timings.parquet")["solve_ms"].to_numpy()[50:]
     gathering.add({"solve_ms_median": float(np.median(solve_ms)), "solve_ms_p99": float(np.percentile(solve_ms, 99))})
     photos = pl.read_csv(folder / "images.csv")

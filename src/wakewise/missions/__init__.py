@@ -2,10 +2,11 @@
 
 from wakewise.missions.clearance import TankBounds, check_clearance
 from wakewise.missions.orbit import Orbit, layered_orbits
-from wakewise.missions.route import Leg, Route, RoutePilot, plan_route
+from wakewise.missions.route import SETTLING, Leg, Route, RoutePilot, plan_route
 from wakewise.missions.settings import MissionSettings
 
 __all__ = [
+    "SETTLING",
     "Leg",
     "MissionSettings",
     "Orbit",

@@ -12,6 +12,8 @@ from wakewise.interfaces import BodyState, Goal
 from wakewise.missions.orbit import Orbit, camera_pose, camera_twist, layered_orbits
 from wakewise.missions.settings import MissionSettings
 
+SETTLING = "settle"
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Leg:
@@ -98,6 +100,10 @@ class Route:
 
     def __post_init__(self) -> None:
         freeze(self, centre_W_m=(3,), starts_s=(None,), exposures_s=(None,))
+
+    def leg_name(self, time_s: float) -> str:
+        """What the vehicle is doing: the name of the leg under way, or `SETTLING` before the first."""
+        return SETTLING if time_s < self.starts_s[0] else self.legs[self.leg_at(time_s)].name
 
     def leg_at(self, time_s: float) -> int:
         """Index of the leg under way; before the first leg begins it is the first, held at its start."""

@@ -109,7 +109,7 @@ class FlightRecorder:
             np.array([truth.power_W if truth else np.nan]),
         ]
         self._rows.append(np.concatenate(row))
-        self._legs.append(self.route.legs[self.route.leg_at(step.time_s)].name)
+        self._legs.append(self.route.leg_name(step.time_s))
         self._fallbacks.append(step.command.fallback or "")
         self._exposing.append(exposing)
         self._collisions.append(bool(truth and truth.collision))

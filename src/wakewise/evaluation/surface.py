@@ -1,0 +1,256 @@
+"""How near a cloud of points is to the true surface, and how much of the surface it covers.
+
+*Accuracy* goes from the cloud to the truth, *completeness* from the truth to the cloud (DTU: H. Aanaes et al.,
+Large-scale data for multiple-view stereopsis, IJCV 120, 2016, doi 10.1007/s11263-016-0902-9). As shares within a
+threshold they are *precision* and *recall*, and their harmonic mean the *F-score* (Tanks and Temples: A. Knapitsch et
+al., ACM TOG 36(4), 2017, doi 10.1145/3072959.3073599).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from embreex import rtcore_scene
+from embreex.mesh_construction import TriangleMesh
+from scipy.spatial import KDTree
+
+from wakewise.arrays import Array, BoolArray, IntArray
+from wakewise.errors import InputError, StageError
+from wakewise.evaluation.alignment import Refinement, refine_icp
+from wakewise.evaluation.distance import MeshDistance
+
+SUCCESS_RMSE_MM = 3.0
+SUCCESS_COMPLETENESS_PCT = 85.0
+
+
+class Mesh(Protocol):
+    """Triangles: vertices, shape (n, 3), in m, and faces, shape (m, 3)."""
+
+    @property
+    def vertices_m(self) -> Array:
+        """Corners, shape (n, 3)."""
+        ...
+
+    @property
+    def faces(self) -> IntArray:
+        """Indices of corners, shape (m, 3)."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Crop:
+    """What counts, for truth and cloud alike.
+
+    Only what is higher than `clearance_m` above the bed at `bed_z_m` (world z points down): sand touches the foot of
+    the target and is no part of it. The cloud is cut to the truth's box grown by `margin_m`. No bed: nothing is cut
+    off below.
+    """
+
+    bed_z_m: float | None = None
+    clearance_m: float = 0.010
+    margin_m: float = 0.020
+
+    def keeps(self, points_W_m: Array, low_m: Array, high_m: Array) -> BoolArray:
+        """Which points count, given the corners of the truth's box; shape (n,)."""
+        keep = ((points_W_m >= low_m - self.margin_m) & (points_W_m <= high_m + self.margin_m)).all(axis=1)
+        return keep & self.above_bed(points_W_m)
+
+    def above_bed(self, points_W_m: Array) -> BoolArray:
+        """Which points are higher than the clearance; shape (n,)."""
+        if self.bed_z_m is None:
+            return np.ones(len(points_W_m), dtype=np.bool_)
+        return points_W_m[:, 2] < self.bed_z_m - self.clearance_m
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfaceScore:
+    """A model against the truth.
+
+    rmse_mm: root mean square distance from cloud to truth, each distance capped at `rmse_cap_mm` so that one stray
+    point cannot rule. accuracy_median_mm, accuracy_p90_mm: median and 90th percentile of the same distances, uncapped.
+    accuracy_*mm_pct: share of the cloud nearer than that (precision). completeness_*: share of the true surface that
+    has a cloud point nearer than that (recall); `completeness_pct` is at 3 mm. `_visible`: only over truth that at
+    least `visible_views` cameras saw; None where visibility was not given. f_score: harmonic mean of precision and
+    recall at 3 mm, 0 to 100. success: rmse_mm < 3 and completeness_pct > 85.
+    """
+
+    rmse_mm: float
+    rmse_cap_mm: float
+    accuracy_mean_mm: float
+    accuracy_median_mm: float
+    accuracy_p90_mm: float
+    accuracy_1mm_pct: float
+    accuracy_2mm_pct: float
+    accuracy_3mm_pct: float
+    completeness_mean_mm: float
+    completeness_1mm_pct: float
+    completeness_2mm_pct: float
+    completeness_pct: float
+    completeness_visible_pct: float | None
+    visible_pct: float | None
+    f_score: float
+    success: bool
+    icp_displacement_mm: float | None
+    icp_residual_mm: float | None
+    cloud_points: int
+    truth_samples: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Surface:
+    """Evenly spread samples of the true surface that counts: points and unit outward normals, shape (n, 3)."""
+
+    points_m: Array
+    normals: Array
+
+
+def sample_surface(mesh: Mesh, crop: Crop, rng: np.random.Generator, samples: int = 150_000) -> Surface:
+    """Sample the truth evenly by area, then drop what does not count.
+
+    Raises
+    ------
+    InputError
+        If the mesh has no area or nothing of it counts.
+    """
+    corners = np.asarray(mesh.vertices_m, dtype=np.float64)[np.asarray(mesh.faces)]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    twice_area = np.linalg.norm(cross, axis=1)
+    if len(corners) == 0 or not twice_area.sum() > 0.0:
+        raise InputError("reference mesh: has no area, it needs at least one real triangle")
+    # Stratified along the cumulative area: each sample has its own share of the surface.
+    where = (np.arange(samples) + rng.random(samples)) / samples
+    total = np.cumsum(twice_area)
+    face = np.minimum(np.searchsorted(total, where * total[-1], side="right"), len(corners) - 1)
+    root, v = np.sqrt(rng.random(samples)), rng.random(samples)
+    a, b, c = corners[face].transpose(1, 0, 2)
+    points = a + (b - a) * (root * (1 - v))[:, None] + (c - a) * (root * v)[:, None]
+    keep = crop.above_bed(points)
+    if not keep.any():
+        raise InputError(f"reference mesh: nothing of it is {crop.clearance_m:g} m or more above the bed")
+    normals = cross[face] / np.maximum(twice_area[face], 1e-300)[:, None]
+    return Surface(points_m=points[keep], normals=normals[keep])
+
+
+def count_views(surface: Surface, mesh: Mesh, centres_W_m: Array, min_cosine: float = 0.2) -> IntArray:
+    """How many cameras saw each sample: nothing of the mesh in between, and not at a grazing angle.
+
+    Parameters
+    ----------
+    centres_W_m : ndarray, shape (k, 3)
+        True camera centres; every camera is taken to look at the target.
+    min_cosine : float
+        Smallest cosine between the outward normal and the way to the camera (0.2 is 78 degrees).
+    """
+    scene = rtcore_scene.EmbreeScene()
+    TriangleMesh(scene, np.asarray(mesh.vertices_m, dtype=np.float32)[np.asarray(mesh.faces)])
+    start = surface.points_m + 5e-4 * surface.normals
+    seen = np.zeros(len(start), dtype=np.int64)
+    for centre in np.asarray(centres_W_m, dtype=np.float64):
+        way = centre - start
+        length = np.linalg.norm(way, axis=1)
+        rows = np.flatnonzero(np.einsum("ij,ij->i", way, surface.normals) > min_cosine * length)
+        if len(rows):
+            hit = scene.run(
+                start[rows].astype(np.float32), (way[rows] / length[rows, None]).astype(np.float32), query="OCCLUDED"
+            )
+            seen[rows] += np.asarray(hit) < 0
+    return seen
+
+
+def thin(points_m: Array, voxel_m: float) -> Array:
+    """One point, the mean, per cell of a grid, so that dense spots do not dominate; order follows the grid."""
+    if len(points_m) == 0:
+        return np.zeros((0, 3))
+    cells = np.floor(np.asarray(points_m) / voxel_m).astype(np.int64)
+    cells -= cells.min(axis=0)
+    spans = cells.max(axis=0) + 1
+    key = (cells[:, 0] * spans[1] + cells[:, 1]) * spans[2] + cells[:, 2]
+    _, row, count = np.unique(key, return_inverse=True, return_counts=True)
+    return np.stack([np.bincount(row, weights=points_m[:, k]) / count for k in range(3)], axis=1)
+
+
+def evaluate_surface(
+    cloud_W_m: Array,
+    mesh: Mesh,
+    *,
+    crop: Crop | None = None,
+    camera_centres_W_m: Array | None = None,
+    visible_views: int = 3,
+    icp: bool = True,
+    cap_mm: float = 20.0,
+    voxel_m: float = 0.0008,
+    rng: np.random.Generator | None = None,
+    samples: int = 150_000,
+) -> SurfaceScore:
+    """Score a cloud against a true mesh; `SurfaceScore` defines every figure.
+
+    Parameters
+    ----------
+    cloud_W_m : ndarray, shape (n, 3)
+        The model's points, already in the frame and scale of the truth (from camera positions).
+    crop : Crop
+        What counts; the default keeps the truth's box and 20 mm around it.
+    camera_centres_W_m : ndarray, shape (k, 3), optional
+        Where the photographs were taken from, for the figures over the visible surface.
+    icp : bool
+        Take out what is left of the misalignment with rigid ICP (no scale) before measuring.
+    voxel_m : float
+        The cloud is thinned to one mean point per cell of this size first.
+
+    Raises
+    ------
+    InputError
+        If the mesh is empty or nothing of it counts.
+    StageError
+        If too little of the cloud lies near the truth to say anything.
+    """
+    crop = crop or Crop()
+    rng = rng or np.random.default_rng(0)
+    surface = sample_surface(mesh, crop, rng, samples)
+    low, high = surface.points_m.min(axis=0), surface.points_m.max(axis=0)
+    cloud = np.asarray(cloud_W_m, dtype=np.float64).reshape(-1, 3)
+    kept = cloud[crop.keeps(cloud, low, high)]
+    if len(kept) < 100:
+        raise StageError(f"model: {len(kept)} of its {len(cloud)} points lie about the truth, needs at least 100")
+    refinement: Refinement | None = None
+    if icp:
+        refinement = refine_icp(kept, surface.points_m, surface.normals)
+        moved = refinement.apply(cloud)
+        kept = moved[crop.keeps(moved, low, high)]
+    even = thin(kept, voxel_m)
+    to_truth_mm = 1e3 * MeshDistance(mesh.vertices_m, mesh.faces)(even)
+    to_cloud_mm = 1e3 * np.asarray(KDTree(even).query(surface.points_m)[0])
+    seen = None
+    if camera_centres_W_m is not None:
+        seen = count_views(surface, mesh, camera_centres_W_m) >= visible_views
+    precision, recall = _share(to_truth_mm, 3.0), _share(to_cloud_mm, 3.0)
+    rmse = float(np.sqrt((np.minimum(to_truth_mm, cap_mm) ** 2).mean()))
+    return SurfaceScore(
+        rmse_mm=rmse,
+        rmse_cap_mm=cap_mm,
+        accuracy_mean_mm=float(to_truth_mm.mean()),
+        accuracy_median_mm=float(np.median(to_truth_mm)),
+        accuracy_p90_mm=float(np.percentile(to_truth_mm, 90)),
+        accuracy_1mm_pct=_share(to_truth_mm, 1.0),
+        accuracy_2mm_pct=_share(to_truth_mm, 2.0),
+        accuracy_3mm_pct=precision,
+        completeness_mean_mm=float(to_cloud_mm.mean()),
+        completeness_1mm_pct=_share(to_cloud_mm, 1.0),
+        completeness_2mm_pct=_share(to_cloud_mm, 2.0),
+        completeness_pct=recall,
+        completeness_visible_pct=_share(to_cloud_mm[seen], 3.0) if seen is not None and seen.any() else None,
+        visible_pct=100.0 * float(seen.mean()) if seen is not None else None,
+        f_score=2 * precision * recall / (precision + recall) if precision + recall > 0 else 0.0,
+        success=rmse < SUCCESS_RMSE_MM and recall > SUCCESS_COMPLETENESS_PCT,
+        icp_displacement_mm=refinement.displacement_mm if refinement else None,
+        icp_residual_mm=refinement.residual_mm if refinement else None,
+        cloud_points=len(even),
+        truth_samples=len(surface.points_m),
+    )
+
+
+def _share(distance_mm: Array, threshold_mm: float) -> float:
+    """Share in percent of distances below a threshold."""
+    return 100.0 * float((distance_mm < threshold_mm).mean())

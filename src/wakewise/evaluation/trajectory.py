@@ -1,0 +1,60 @@
+"""Error of a camera path against the true one, paired instant by instant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from wakewise.arrays import Array
+from wakewise.errors import InputError
+from wakewise.evaluation.alignment import umeyama
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrajectoryError:
+    """Absolute trajectory error (ATE) of positions, in mm, over `pairs` instants, and the scale that alignment took."""
+
+    rmse_mm: float
+    mean_mm: float
+    median_mm: float
+    max_mm: float
+    scale: float
+    pairs: int
+
+
+def trajectory_error(
+    estimate_m: Array, truth_m: Array, align: Literal["none", "rigid", "similarity"] = "rigid"
+) -> TrajectoryError:
+    """Absolute trajectory error after the chosen alignment (least squares over all instants).
+
+    J. Sturm et al., A benchmark for the evaluation of RGB-D SLAM systems, IROS 2012, doi 10.1109/IROS.2012.6385773,
+    eq. 2; the similarity for paths whose scale is open, such as those of one camera.
+
+    Parameters
+    ----------
+    estimate_m, truth_m : ndarray, shape (n, 3)
+        Positions at the same instants.
+
+    Raises
+    ------
+    InputError
+        If the shapes differ or the path cannot fix the alignment.
+    """
+    estimate, truth = np.asarray(estimate_m, dtype=np.float64), np.asarray(truth_m, dtype=np.float64)
+    if estimate.shape != truth.shape or estimate.ndim != 2 or estimate.shape[1] != 3 or len(estimate) == 0:
+        raise InputError(f"trajectories: shapes {estimate.shape} and {truth.shape}, allowed is the same (n, 3), n >= 1")
+    scale = 1.0
+    if align != "none":
+        similarity = umeyama(estimate, truth, with_scale=align == "similarity")
+        estimate, scale = similarity.apply(estimate), similarity.scale
+    error_mm = 1e3 * np.linalg.norm(estimate - truth, axis=1)
+    return TrajectoryError(
+        rmse_mm=float(np.sqrt((error_mm**2).mean())),
+        mean_mm=float(error_mm.mean()),
+        median_mm=float(np.median(error_mm)),
+        max_mm=float(error_mm.max()),
+        scale=scale,
+        pairs=len(error_mm),
+    )

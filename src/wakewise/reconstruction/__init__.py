@@ -1,0 +1,21 @@
+"""Photographs to a 3D model with COLMAP and semi-global stereo, in stages that take files and leave files."""
+
+from wakewise.reconstruction.clouds import Cloud, read_cloud, write_cloud, write_mesh
+from wakewise.reconstruction.photos import Photo, read_photos
+from wakewise.reconstruction.pipeline import Model, reconstruct
+from wakewise.reconstruction.references import match_references, read_reference_cameras
+from wakewise.reconstruction.settings import ReconstructionSettings
+
+__all__ = [
+    "Cloud",
+    "Model",
+    "Photo",
+    "ReconstructionSettings",
+    "match_references",
+    "read_cloud",
+    "read_photos",
+    "read_reference_cameras",
+    "reconstruct",
+    "write_cloud",
+    "write_mesh",
+]

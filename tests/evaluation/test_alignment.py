@@ -1,0 +1,105 @@
+"""Laws of alignment: it undoes what was done, ignores what is wrong, and refuses what it cannot know."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wakewise.errors import InputError, StageError
+from wakewise.evaluation import refine_icp, robust_similarity, umeyama
+from wakewise.geometry import matrix_from_quat, quat_from_rotvec
+
+
+def rotation(*rotvec):
+    return matrix_from_quat(quat_from_rotvec(np.array(rotvec)))
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10_000), st.floats(0.01, 100.0), st.integers(3, 40))
+def test_umeyama_undoes_any_similarity(seed, scale, n):
+    """The similarity that was applied comes back, whatever it was."""
+    rng = np.random.default_rng(seed)
+    B = rng.normal(size=(n, 3))
+    R, t = rotation(*rng.normal(size=3)), rng.normal(size=3)
+    found = umeyama(B, scale * B @ R.T + t)
+    assert np.isclose(found.scale, scale, rtol=1e-6)
+    assert np.allclose(found.R_AB, R, atol=1e-5)
+    assert np.allclose(found.t_A_m, t, atol=1e-5 * (1 + scale))
+
+
+def test_umeyama_never_mirrors():
+    """A mirrored set gets a proper rotation, not the reflection that would fit exactly."""
+    B = np.random.default_rng(0).normal(size=(20, 3))
+    found = umeyama(B, B * [1, 1, -1])
+    assert np.isclose(np.linalg.det(found.R_AB), 1.0)
+
+
+def test_umeyama_without_scale_keeps_size():
+    """A rigid fit has scale 1 even where the sets differ in size."""
+    B = np.random.default_rng(0).normal(size=(20, 3))
+    assert umeyama(B, 2 * B, with_scale=False).scale == 1.0
+
+
+def test_points_on_a_line_are_refused():
+    """The turn about a line is open, so no answer is given."""
+    line = np.outer(np.arange(5.0), [1.0, 2.0, 3.0])
+    with pytest.raises(InputError, match="one line"):
+        umeyama(line, line)
+    with pytest.raises(InputError, match=r"\(n, 3\)"):
+        umeyama(line, line[:4])
+
+
+def test_a_third_of_wrong_pairs_changes_nothing():
+    """With wrong pairs the fit is that of the right ones alone."""
+    rng = np.random.default_rng(3)
+    B = rng.normal(size=(48, 3))
+    A = 0.4 * B @ rotation(0.3, -1.0, 0.5).T + [1, 2, 3] + rng.normal(0, 0.003, (48, 3))
+    bad = rng.choice(48, 16, replace=False)
+    A[bad] += rng.normal(0, 0.5, (16, 3)) + 0.3
+    good = np.setdiff1d(np.arange(48), bad)
+    found, inliers = robust_similarity(B, A, rng)
+    right = umeyama(B[good], A[good])
+    assert not inliers[bad].any()
+    assert inliers[good].sum() >= 30
+    assert np.allclose(found.apply(B), right.apply(B), atol=0.002)
+
+
+def test_without_wrong_pairs_least_squares_stands():
+    """Noise alone rejects no pair: the robust fit is the least-squares one."""
+    rng = np.random.default_rng(5)
+    B = rng.normal(size=(11, 3))
+    A = B + rng.normal(0, 0.006, B.shape)
+    found, inliers = robust_similarity(B, A, rng)
+    assert inliers.all()
+    assert np.allclose(found.apply(B), umeyama(B, A).apply(B))
+
+
+def bumpy(n, rng):
+    """Samples and normals of an ellipsoid, which fixes all six degrees of freedom."""
+    axes = np.array([0.05, 0.07, 0.09])
+    u = rng.normal(size=(n, 3))
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    normals = u / axes
+    return u * axes, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def test_icp_takes_out_a_small_motion():
+    """A cloud that was moved by 2 mm and a degree lies on the surface again, and its size is left alone."""
+    rng = np.random.default_rng(0)
+    surface, normals = bumpy(40_000, rng)
+    cloud = bumpy(20_000, rng)[0] @ rotation(0.01, 0.01, -0.01).T + [0.001, -0.001, 0.0015]
+    found = refine_icp(cloud, surface, normals)
+    axes = np.array([0.05, 0.07, 0.09])
+    level = np.linalg.norm(found.apply(cloud) / axes, axis=1)
+    assert np.abs(level - 1).max() < 0.01
+    assert 1.0 < found.displacement_mm < 4.0
+    assert found.residual_mm < 0.3
+    assert found.matched_pct > 99.0
+
+
+def test_icp_refuses_a_cloud_elsewhere():
+    """Far from the surface nothing matches, and that is said."""
+    rng = np.random.default_rng(0)
+    surface, normals = bumpy(5_000, rng)
+    with pytest.raises(StageError, match="ICP"):
+        refine_icp(surface + 0.5, surface, normals)

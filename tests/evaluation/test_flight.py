@@ -1,0 +1,90 @@
+"""Flight figures on flights whose figures are known in closed form."""
+
+import numpy as np
+import polars as pl
+import pytest
+
+from wakewise.errors import InputError
+from wakewise.evaluation import flight_figures
+from wakewise.evaluation.flight import path_distance, rising_edges, roll_pitch_rms_deg, sign_flips
+from wakewise.geometry import quat_from_euler
+
+
+def table(n=400, dt=0.05, late_s=0.0, **extra):
+    """A lap on a circle of 0.5 m, flown `late_s` behind the goal."""
+    t = dt * np.arange(n)
+    columns = {"time_s": t}
+    for who, at in (("goal", t), ("true", t - late_s)):
+        angle = 0.3 * at
+        columns |= {f"{who}_x_m": 0.5 * np.cos(angle), f"{who}_y_m": 0.5 * np.sin(angle), f"{who}_z_m": 0 * t + 1.0}
+        q = np.array([quat_from_euler(0.0, 0.0, a + np.pi / 2) for a in angle])
+        columns |= {f"{who}_q{k}": q[:, i] for i, k in enumerate("wxyz")}
+        columns |= {f"{who}_u_m_s": 0 * t + 0.15, f"{who}_v_m_s": 0 * t, f"{who}_w_m_s": 0 * t}
+    return pl.DataFrame(columns | extra)
+
+
+def test_being_late_is_no_path_error():
+    """Lateness costs position error (chord of the arc) but no path error."""
+    figures = flight_figures(table(late_s=0.2))
+    assert figures["position_rmse_mm"] == pytest.approx(1e3 * 2 * 0.5 * np.sin(0.03), rel=1e-6)
+    inner = path_distance(
+        *(table(late_s=0.2).select(f"{w}_{k}_m" for k in "xyz").to_numpy()[10:] for w in ("true", "goal")),
+        table()["time_s"].to_numpy()[10:],
+    )
+    assert 1e3 * inner[5:].max() < 0.05
+    assert figures["velocity_deviation_pct"] == pytest.approx(100 * 2 * np.sin(0.03), rel=1e-6)
+
+
+def test_next_lap_does_not_hide_this_one():
+    """Only the path near in time counts: standing still at the start is an error later."""
+    t = np.arange(0, 30, 0.1)
+    goal = np.stack([np.sin(0.3 * t), np.cos(0.3 * t), 0 * t], axis=1)
+    assert path_distance(np.tile(goal[:1], (len(t), 1)), goal, t)[100] > 0.5
+
+
+def test_energy_and_means_are_integrals_over_time():
+    """100 W for 20 s is 2 kJ; the exposure mean takes only exposing rows; missing values are left out."""
+    n = 400
+    speed = np.where(np.arange(n) < 200, 0.02, 0.04)
+    steps = table(
+        power_W=np.full(n, 100.0),
+        target_speed_mean_m_s=speed,
+        exposing=np.arange(n) >= 300,
+        disturbance=np.where(np.arange(n) < 100, np.nan, 3.0),
+        collision=np.isin(np.arange(n), [5, 6, 50]),
+        fallback=["late" if i == 7 else "" for i in range(n)],
+    )
+    figures = flight_figures(steps)
+    assert figures["energy_kJ"] == pytest.approx(2.0)
+    assert figures["duration_s"] == pytest.approx(20.0)
+    assert figures["target_speed_mean_m_s"] == pytest.approx(0.03)
+    assert figures["exposure_speed_mean_m_s"] == pytest.approx(0.04)
+    assert figures["disturbance"] == pytest.approx(3.0)
+    assert (figures["collisions"], figures["fallbacks"]) == (2, 1)
+
+
+def test_reversals_ignore_chatter_about_zero():
+    """A thruster reverses when it pushes the other way, not when it flickers about nothing."""
+    assert sign_flips(np.array([[1.0, 0.05, -0.05, 1.0, -1.0, 0.0, -1.0, 2.0]]).T) == 2
+    assert rising_edges(np.array([True, True, False, True])) == 2
+    t1 = np.tile([5.0, -5.0], 200)
+    figures = flight_figures(table(thrust_1_N=t1, thrust_2_N=np.ones(400)))
+    assert figures["sign_flips_per_s"] == pytest.approx(399 / 20)
+
+
+def test_attitude_error_is_against_the_goal():
+    """Three degrees of roll and four of pitch make 3.54 degrees over both; yaw does not count."""
+    goal = np.array([quat_from_euler(0.0, 0.0, 0.5)])
+    true = np.array([quat_from_euler(np.radians(3), np.radians(4), -0.9)])
+    assert roll_pitch_rms_deg(true, goal) == pytest.approx(np.sqrt(12.5))
+
+
+def test_missing_columns_give_none_and_no_rows_an_error():
+    """A figure that cannot be computed is None, never 0."""
+    figures = flight_figures(pl.DataFrame({"time_s": [0.0, 0.1]}))
+    assert figures.pop("duration_s") == pytest.approx(0.2)
+    assert set(figures.values()) == {None}
+    with pytest.raises(InputError, match="time_s"):
+        flight_figures(pl.DataFrame({"x": [1]}))
+    with pytest.raises(InputError, match="grow"):
+        flight_figures(pl.DataFrame({"time_s": [0.0, 0.0]}))

@@ -1,0 +1,134 @@
+"""Laws of the surface score, on shapes whose distances are known in closed form."""
+
+import os
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import trimesh
+
+from wakewise.errors import InputError, StageError
+from wakewise.evaluation import Crop, count_views, evaluate_surface, sample_surface, thin
+
+DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[3] / "shared" / "data"))
+RADIUS = 0.06
+
+
+def ball(radius=RADIUS):
+    mesh = trimesh.creation.icosphere(4, radius)
+    return SimpleNamespace(vertices_m=np.asarray(mesh.vertices), faces=np.asarray(mesh.faces))
+
+
+def shell(n, radius, rng):
+    u = rng.normal(size=(n, 3))
+    return radius * u / np.linalg.norm(u, axis=1, keepdims=True)
+
+
+def test_offset_shell_has_that_error():
+    """Points 0.5 mm outside a sphere: RMSE and median are 0.5 mm, everything is covered at 1 mm, and it succeeds."""
+    score = evaluate_surface(shell(400_000, RADIUS + 0.0005, np.random.default_rng(0)), ball(), icp=False)
+    assert score.rmse_mm == pytest.approx(0.5, abs=0.06)
+    assert score.accuracy_median_mm == pytest.approx(0.5, abs=0.06)
+    assert score.completeness_1mm_pct > 99.0
+    assert score.f_score > 99.9
+    assert score.success
+
+
+def test_half_a_shell_covers_half():
+    """A perfect half is accurate and not complete."""
+    points = shell(400_000, RADIUS, np.random.default_rng(0))
+    score = evaluate_surface(points[points[:, 0] > 0], ball(), icp=False)
+    assert score.rmse_mm < 0.1
+    assert score.completeness_pct == pytest.approx(50.0 + 100 * 0.003 / (2 * RADIUS), abs=1.0)
+    assert not score.success
+
+
+def test_density_does_not_weigh():
+    """Fifty thousand copies of one bad spot, in one cell of the grid, count as that spot."""
+    rng = np.random.default_rng(0)
+    good = shell(200_000, RADIUS, rng)
+    bad = np.array([[87.5, 0.5, 0.5]]) * 0.0008 + rng.normal(0, 1e-5, (50_000, 3))
+    once = evaluate_surface(np.concatenate([good, bad[:1]]), ball(), icp=False)
+    often = evaluate_surface(np.concatenate([good, bad]), ball(), icp=False)
+    assert often.rmse_mm == pytest.approx(once.rmse_mm, abs=0.02)
+
+
+def test_cap_limits_what_a_stray_point_can_do():
+    """With a cap of 1 mm no error above 1 mm is in the RMSE, and what lies beyond the box does not count at all."""
+    points = np.concatenate([shell(20_000, RADIUS + 0.01, np.random.default_rng(0)), [[9.0, 9, 9]]])
+    score = evaluate_surface(points, ball(), icp=False, cap_mm=1.0)
+    assert score.rmse_mm == pytest.approx(1.0)
+    assert score.accuracy_p90_mm > 9.0
+
+
+def test_sand_at_the_foot_does_not_count():
+    """Below the clearance above the bed neither truth nor cloud is looked at."""
+    crop = Crop(bed_z_m=RADIUS, clearance_m=0.02)
+    surface = sample_surface(ball(), crop, np.random.default_rng(0), 20_000)
+    assert surface.points_m[:, 2].max() < RADIUS - 0.02
+    rng = np.random.default_rng(0)
+    sand = np.column_stack([rng.uniform(-0.07, 0.07, (50_000, 2)), np.full(50_000, RADIUS - 0.005)])
+    cloud = shell(200_000, RADIUS, rng)
+    with_sand = evaluate_surface(np.concatenate([cloud, sand]), ball(), crop=crop, icp=False)
+    assert with_sand == evaluate_surface(cloud, ball(), crop=crop, icp=False)
+
+
+def test_icp_takes_out_a_shift_and_reports_it():
+    """A bunny moved by 2 mm scores as one that was not moved, with the displacement named."""
+    path = DATA / "mesh_bunny" / "bunny.ply"
+    if not path.exists():
+        pytest.skip(f"{path.name} is not among the shared data")
+    loaded = trimesh.load(path)
+    vertices = np.asarray(loaded.vertices) - loaded.centroid
+    mesh = SimpleNamespace(vertices_m=0.15 * vertices / np.ptp(vertices, axis=0).max(), faces=np.asarray(loaded.faces))
+    rng = np.random.default_rng(0)
+    cloud = sample_surface(mesh, Crop(), rng, 80_000).points_m
+    cloud = cloud + np.array([0.0012, -0.0012, 0.0012])
+    moved = evaluate_surface(cloud, mesh)
+    assert moved.icp_displacement_mm == pytest.approx(2.08, abs=0.15)
+    assert moved.rmse_mm < 0.2
+    assert evaluate_surface(cloud, mesh, icp=False).rmse_mm > 0.7
+
+
+def test_views_see_the_side_that_faces_them():
+    """A far camera sees a cap of the sphere, bounded by the grazing angle; the far side never."""
+    surface = sample_surface(ball(), Crop(), np.random.default_rng(0), 20_000)
+    seen = count_views(surface, ball(), np.array([[100.0, 0, 0], [100.0, 1, 0]]), min_cosine=0.2)
+    cosine = surface.points_m[:, 0] / RADIUS
+    assert (seen[cosine > 0.25] == 2).all()
+    assert (seen[cosine < 0.15] == 0).all()
+
+
+def test_something_between_hides_the_surface():
+    """A second ball before the first one casts a shadow of no view."""
+    one, two = trimesh.creation.icosphere(3, RADIUS), trimesh.creation.icosphere(3, RADIUS)
+    two.apply_translation([0.3, 0, 0])
+    both = trimesh.util.concatenate([one, two])
+    mesh = SimpleNamespace(vertices_m=np.asarray(both.vertices), faces=np.asarray(both.faces))
+    surface = sample_surface(mesh, Crop(), np.random.default_rng(0), 20_000)
+    seen = count_views(surface, mesh, np.array([[100.0, 0, 0]]))
+    middle = (np.linalg.norm(surface.points_m[:, 1:], axis=1) < 0.04) & (surface.points_m[:, 0] > 0)
+    assert (seen[middle & (surface.points_m[:, 0] < 0.1)] == 0).all()
+    assert (seen[middle & (surface.points_m[:, 0] > 0.3)] == 1).all()
+
+
+def test_thinning_keeps_one_mean_per_cell():
+    """Two points of a cell become their mean; an empty cloud stays empty."""
+    out = thin(np.array([[0.1, 0.1, 0.1], [0.3, 0.1, 0.1], [5.0, 0, 0]]), 1.0)
+    assert np.allclose(sorted(out.tolist()), [[0.2, 0.1, 0.1], [5, 0, 0]])
+    assert len(thin(np.zeros((0, 3)), 1.0)) == 0
+
+
+def test_what_cannot_be_scored_is_refused():
+    """No points near, no area, nothing above the bed: each is said."""
+    with pytest.raises(StageError, match="0 of its 5 points"):
+        evaluate_surface(np.full((5, 3), 9.0), ball())
+    with pytest.raises(InputError, match="no area"):
+        sample_surface(
+            SimpleNamespace(vertices_m=np.zeros((3, 3)), faces=np.array([[0, 1, 2]])),
+            Crop(),
+            np.random.default_rng(0),
+        )
+    with pytest.raises(InputError, match="above the bed"):
+        sample_surface(ball(), Crop(bed_z_m=-1.0), np.random.default_rng(0))

@@ -1,0 +1,113 @@
+"""Points and stamps survive the disk, and damage is noticed."""
+
+import numpy as np
+import pytest
+
+from wakewise.errors import InputError, StageError
+from wakewise.reconstruction import Cloud, read_cloud, write_cloud, write_mesh
+from wakewise.reconstruction.colmap import call, no_stderr
+from wakewise.reconstruction.features import default_pairs
+from wakewise.reconstruction.settings import ReconstructionSettings
+from wakewise.reconstruction.stages import fingerprint, run_stage
+
+
+def test_cloud_comes_back(tmp_path):
+    """Positions and normals to single precision, colours to a 255th."""
+    rng = np.random.default_rng(0)
+    normals = rng.normal(size=(50, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    cloud = Cloud(points_m=rng.normal(size=(50, 3)), normals=normals, colours=rng.random((50, 3)))
+    write_cloud(tmp_path / "a.ply", cloud)
+    back = read_cloud(tmp_path / "a.ply")
+    assert np.allclose(back.points_m, cloud.points_m, atol=1e-6)
+    assert np.allclose(back.normals, cloud.normals, atol=1e-6)
+    assert np.allclose(back.colours, cloud.colours, atol=0.5 / 255 + 1e-9)
+
+
+def test_mesh_is_a_cloud_too(tmp_path):
+    """The corners of a coloured mesh are read as points."""
+    corners = np.eye(3)
+    write_mesh(tmp_path / "m.ply", corners, np.array([[0, 1, 2]]), np.full((3, 3), 0.2))
+    assert np.allclose(read_cloud(tmp_path / "m.ply").points_m, corners)
+
+
+@pytest.mark.parametrize("data", [b"", b"ply\nnonsense", b"\x00" * 40])
+def test_what_is_no_cloud_is_refused(tmp_path, data):
+    """A damaged file is an input error in one line, as is a missing one."""
+    (tmp_path / "x.ply").write_bytes(data)
+    with pytest.raises(InputError, match=r"x\.ply") as caught:
+        read_cloud(tmp_path / "x.ply")
+    assert "\n" not in str(caught.value)
+    with pytest.raises(InputError, match="does not exist"):
+        read_cloud(tmp_path / "y.ply")
+
+
+def test_stage_runs_once_and_again_when_it_must(tmp_path):
+    """Same key and product: skipped. Another key, a lost product or a damaged stamp: done again."""
+    product, runs = tmp_path / "p.txt", []
+
+    def work():
+        runs.append(1)
+        product.write_text("x")
+        return {"n": len(runs)}
+
+    def go(key):
+        return run_stage(tmp_path, "s", key, (product,), work)
+
+    assert not go("a").skipped
+    assert go("a").skipped and go("a").figures == {"n": 1}
+    assert not go("b").skipped
+    product.unlink()
+    assert not go("b").skipped
+    (tmp_path / "stages" / "s.json").write_text("{")
+    assert not go("b").skipped
+    assert len(runs) == 4
+
+
+def test_failed_stage_leaves_no_stamp(tmp_path):
+    """A stage that fails is not taken for done, even if an older product lies there."""
+    product = tmp_path / "p.txt"
+    product.write_text("old")
+
+    def fail():
+        raise StageError("no")
+
+    with pytest.raises(StageError):
+        run_stage(tmp_path, "s", "a", (product,), fail)
+    assert not run_stage(tmp_path, "s", "a", (product,), dict).skipped
+
+
+def test_fingerprint_tells_inputs_apart():
+    """Order of keys does not matter, values do."""
+    assert fingerprint({"a": 1, "b": 2}) == fingerprint({"b": 2, "a": 1})
+    assert fingerprint({"a": 1}) != fingerprint({"a": 2})
+
+
+def test_small_sets_match_all_pairs_large_ones_neighbours():
+    """80 photos make 3160 pairs; 200 make far fewer, with no pair twice and everyone within reach of the next."""
+    settings = ReconstructionSettings()
+    assert len(default_pairs([f"{k}" for k in range(80)], settings)) == 80 * 79 // 2
+    names = [f"{k:03d}" for k in range(200)]
+    pairs = default_pairs(names, settings)
+    assert len(set(pairs)) == len(pairs) < 200 * 15
+    assert ("000", "010") in pairs and ("000", "128") in pairs and ("000", "050") not in pairs
+
+
+def test_a_failing_call_is_a_stage_error_in_one_line():
+    """What COLMAP says becomes one line with the name of the stage."""
+
+    def fail(cancellation_token):
+        raise ValueError("one\ntwo")
+
+    with pytest.raises(StageError, match="mapping: COLMAP stopped: one two"):
+        call(fail, "mapping")
+
+
+def test_quiet_is_over_when_it_is_over(capfd):
+    """Standard error is closed inside and open again after."""
+    import os
+
+    with no_stderr():
+        os.write(2, b"inside")
+    os.write(2, b"after")
+    assert capfd.readouterr().err == "after"

@@ -1,0 +1,140 @@
+"""What is and what is not a folder of photos; what is and what is not a table of cameras."""
+
+import os
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from wakewise.errors import InputError
+from wakewise.reconstruction import match_references, read_photos, read_reference_cameras
+from wakewise.reconstruction.photos import decode
+
+DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[3] / "shared" / "data"))
+
+
+def put(folder, *names):
+    for name in names:
+        cv2.imwrite(str(folder / name), np.full((20, 30, 3), 128, dtype=np.uint8))
+
+
+def test_photos_are_sorted_measured_and_told_apart(tmp_path):
+    """Names in order, sizes in pixels; other files are left alone; the same bytes have the same digest."""
+    put(tmp_path, "b.png", "a.jpg", "c.PNG")
+    (tmp_path / "images.csv").write_text("name")
+    photos = read_photos(tmp_path)
+    assert [p.name for p in photos] == ["a.jpg", "b.png", "c.PNG"]
+    assert {(p.width, p.height) for p in photos} == {(30, 20)}
+    assert photos[1].digest == photos[2].digest != photos[0].digest
+
+
+@pytest.mark.parametrize("what", ["missing", "file", "empty", "none", "few", "broken", "cut"])
+def test_what_is_no_folder_of_photos_is_named(tmp_path, what, capfd):
+    """One line that names the folder or the file and what is needed."""
+    folder = tmp_path / "photos"
+    expected = {
+        "missing": "does not exist",
+        "file": "is a file",
+        "empty": "is empty",
+        "none": "notes.txt is none",
+        "few": "holds 2 photos, at least 3",
+        "broken": "b.png: is no image",
+        "cut": "b.png: is no image",
+    }[what]
+    if what == "file":
+        folder.write_text("x")
+    elif what != "missing":
+        folder.mkdir()
+    if what == "none":
+        (folder / "notes.txt").write_text("x")
+    if what == "few":
+        put(folder, "a.png", "b.png")
+    if what in ("broken", "cut"):
+        put(folder, "a.png", "b.png", "c.png")
+        whole = (folder / "b.png").read_bytes()
+        (folder / "b.png").write_bytes(b"no image" if what == "broken" else whole[: len(whole) // 2])
+    with pytest.raises(InputError, match=expected) as caught:
+        read_photos(folder)
+    assert "\n" not in str(caught.value)
+    assert capfd.readouterr().err == ""
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.binary(max_size=200))
+def test_no_bytes_crash_the_decoder(data):
+    """Any bytes are an image or None."""
+    image = decode(data)
+    assert image is None or (image.ndim == 3 and image.dtype == np.uint8)
+
+
+def test_csv_of_cameras(tmp_path):
+    """Columns by name, in any order, others ignored."""
+    path = tmp_path / "cameras.csv"
+    path.write_text("z_m,name,x_m,y_m,more\n3,a.png,1,2,x\n6,b.png,4,5,y\n")
+    found = read_reference_cameras(path)
+    assert found["a.png"].tolist() == [1, 2, 3]
+    assert found["b.png"].tolist() == [4, 5, 6]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("name,x_m,y_m\na,1,2\n", "no column z_m"),
+        ("name,x_m,y_m,z_m\na,1,2,up\n", "line 2"),
+        ("name,x_m,y_m,z_m\na,1,2,nan\n", "finite"),
+        ("name,x_m,y_m,z_m\na,1\n", "line 2"),
+        ("name,x_m,y_m,z_m\n", "holds no cameras"),
+        ("", "no column"),
+    ],
+)
+def test_bad_csv_is_named(tmp_path, text, expected):
+    """Each fault is told with its line or column."""
+    path = tmp_path / "cameras.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=expected):
+        read_reference_cameras(path)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.binary(max_size=120))
+def test_any_bytes_are_cameras_or_an_input_error(tmp_path, data):
+    """No file makes the reader fail in any other way."""
+    for name in ("cameras.csv", "folder/a.png.camera"):
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(data)
+        try:
+            found = read_reference_cameras(path if path.suffix == ".csv" else path.parent)
+        except InputError:
+            continue
+        assert all(np.all(np.isfinite(p)) and p.shape == (3,) for p in found.values())
+
+
+def test_folders_without_cameras_and_nothing_at_all(tmp_path):
+    """An empty folder and a missing path are told apart."""
+    with pytest.raises(InputError, match=r"holds no \.camera"):
+        read_reference_cameras(tmp_path)
+    with pytest.raises(InputError, match="does not exist"):
+        read_reference_cameras(tmp_path / "x")
+
+
+def test_fountain_cameras_are_read():
+    """The surveyed centres of a real set, a few metres apart."""
+    folder = DATA / "strecha_fountain" / "gt_dense_cameras"
+    if not folder.is_dir():
+        pytest.skip(f"{folder.parent.name} is not among the shared data")
+    found = read_reference_cameras(folder)
+    centres = np.array(list(found.values()))
+    assert sorted(found)[0] == "0000.jpg" and len(found) == 11
+    assert 1.0 < np.linalg.norm(np.ptp(centres, axis=0)) < 20.0
+
+
+def test_references_match_by_name_or_stem():
+    """A reference for 1.png serves 1.jpg; photos without one are left out; fewer than three matches are refused."""
+    references = {f"{k}.png": np.full(3, float(k)) for k in range(4)}
+    assert set(match_references(references, ["0.png", "1.jpg", "2.png", "9.png"])) == {"0.png", "1.jpg", "2.png"}
+    with pytest.raises(InputError, match=r"2 of 3 photos .*0\.png for 0\.png"):
+        match_references(references, ["0.png", "1.png", "x.png"])
