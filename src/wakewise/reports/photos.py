@@ -70,10 +70,17 @@ def contact_sheet(trial: Trial, leg_of: dict[int, str]) -> str:
             count = sum(leg_of.get(k, "") == leg for k in range(len(shots)))
             parts.append("</div>" if parts else "")
             if leg:
-                parts.append(f'<p class="sheet-leg">{escape(leg)}<span>{count} photographs</span></p>')
+                parts.append(
+                    f'<p class="sheet-leg">{escape(leg)}<span>{count} photograph{"s" if count > 1 else ""}</span></p>'
+                )
             parts.append('<div class="sheet">')
         parts.append(_photo(shot, i, marked, width))
     return "".join(parts) + "</div>"
+
+
+def _turbidity(per_m: float) -> str:
+    """A figure with what matters to an eye: over half a metre, 0.001 /m takes half a thousandth of the light."""
+    return "< 0.001" if 0.0 < per_m < 0.001 else number(per_m, 2)
 
 
 def _photo(shot: Photograph, index: int, marked: Extremes, width: int) -> str:
@@ -84,7 +91,7 @@ def _photo(shot: Photograph, index: int, marked: Extremes, width: int) -> str:
         "": "",
     }
     sharpness = "" if shot.sharpness is None else f"sharpness {number(shot.sharpness)}"
-    turbidity = "" if shot.turbidity_per_m is None else f"turbidity {number(shot.turbidity_per_m, 2)} /m"
+    turbidity = "" if shot.turbidity_per_m is None else f"turbidity {_turbidity(shot.turbidity_per_m)} /m"
     facts = [f"<b>{shot.time_s:.1f} s</b>", sharpness, turbidity]
     lines = "".join(f"<span>{fact}</span>" for fact in facts if fact)
     said = " · ".join(f for f in (shot.name, f"{shot.time_s:.1f} s", sharpness, turbidity, kind) if f)

@@ -125,11 +125,16 @@ def _energy(trial: Trial) -> str:
 
 def _flown(trial: Trial, errors: ModelErrors | None) -> str:
     legs = [name for name, _, _ in figures.legs(trial)]
-    orbits = len({name for name in legs if "orbit" in name})
+    orbits = len({name for name in legs if name.startswith("orbit")})
     duration = trial.metrics.number("duration_s")
     lead = "The path that the vehicle really took and the photographs where they were really taken."
     if orbits:
-        lead = f"{orbits} orbits" + ("" if duration is None else f" in {number(duration)} s") + ". " + lead
+        lead = (
+            (f"{orbits} orbits" if orbits > 1 else "One orbit")
+            + ("" if duration is None else f" in {number(duration)} s")
+            + ". "
+            + lead
+        )
     lead += (
         '<span class="on-screen"> Drag to turn, scroll to come closer, press play to fly again; the button at the '
         "lower right hides parts.</span>"
@@ -163,18 +168,22 @@ def _flown(trial: Trial, errors: ModelErrors | None) -> str:
     )
 
 
+def _leg_of(trial: Trial, time_s: float) -> str:
+    """Leg on which a photograph was taken; the shutter opens just where an orbit begins and ends, so orbits go first."""
+    near_s = 0.05
+    names = [name for name, start, stop in figures.legs(trial) if start - near_s <= time_s <= stop + near_s]
+    return next((name for name in names if name.startswith("orbit")), names[0] if names else "")
+
+
 def _seen(trial: Trial) -> str:
     if not trial.photographs:
         gap = missing("the photographs", absence(trial, "images.csv"))
         return section("seen", "What was seen", "No photographs are on record.", gap)
-    leg_of = {
-        i: next((name for name, start, stop in figures.legs(trial) if start <= shot.time_s <= stop), "")
-        for i, shot in enumerate(trial.photographs)
-    }
+    leg_of = {i: _leg_of(trial, shot.time_s) for i, shot in enumerate(trial.photographs)}
     lead = (
         f"{len(trial.photographs)} photographs in the order they were taken"
-        '<span class="on-screen">; a click enlarges</span>. Sharpness is that of the whole image as recorded, so '
-        "compare it between photographs of the same orbit."
+        '<span class="on-screen">; a click enlarges</span>. Sharpness is that of the target as it '
+        "appears in the picture (variance of the Laplacian), so compare it between photographs of the same orbit."
     )
     return section("seen", "What was seen", lead, contact_sheet(trial, leg_of))
 
