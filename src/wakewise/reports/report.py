@@ -169,7 +169,7 @@ def _flown(trial: Trial, errors: ModelErrors | None) -> str:
 
 
 def _leg_of(trial: Trial, time_s: float) -> str:
-    """Leg on which a photograph was taken; the shutter opens just where an orbit begins and ends, so orbits go first."""
+    """Leg on which a photograph was taken; shutters open just where an orbit begins and ends, so orbits go first."""
     near_s = 0.05
     names = [name for name, start, stop in figures.legs(trial) if start - near_s <= time_s <= stop + near_s]
     return next((name for name in names if name.startswith("orbit")), names[0] if names else "")
