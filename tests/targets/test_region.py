@@ -5,8 +5,8 @@ import pytest
 import trimesh
 
 from wakewise.errors import InputError
-from wakewise.targets import Mesh, coral, place_on_bed, sample_region
-from wakewise.targets.region import DECAY_M, SHELL_M, distance_to_mesh
+from wakewise.targets import Mesh, MeshDistance, coral, place_on_bed, sample_region
+from wakewise.targets.region import DECAY_M, SHELL_M
 
 BED_Z_M = 1.5
 
@@ -14,14 +14,6 @@ BED_Z_M = 1.5
 def ball(radius_m=0.07, height_m=0.1, subdivisions=4):
     mesh = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius_m)
     return place_on_bed("ball", Mesh(mesh.vertices + np.array([0, 0, height_m]), mesh.faces), BED_Z_M)
-
-
-def slow_distance(point, triangle):
-    """Distance from a point to a triangle by fine sampling of it, from above."""
-    a, b, c = triangle
-    u, v = np.meshgrid(np.linspace(0, 1, 201), np.linspace(0, 1, 201))
-    u, v = u[u + v <= 1.0], v[u + v <= 1.0]
-    return np.linalg.norm(a + u[:, None] * (b - a) + v[:, None] * (c - a) - point, axis=1).min()
 
 
 @pytest.mark.parametrize("kind", ["branching", "brain", "plate"])
@@ -35,9 +27,13 @@ def test_half_of_the_points_lie_on_the_surface_and_half_in_the_water(kind):
     np.testing.assert_array_equal(region.weights, np.exp(-region.distance_m / DECAY_M))
     assert np.all(region.distance_m[:75] == 0)
     assert np.all((region.distance_m[75:] > 0) & (region.distance_m[75:] < SHELL_M * 1.02))
-    np.testing.assert_allclose(distance_to_mesh(region.points_W_m[:75], target.mesh), 0.0, atol=1e-9)
     np.testing.assert_allclose(
-        distance_to_mesh(region.points_W_m[75:], target.mesh), region.distance_m[75:], atol=1e-12
+        MeshDistance(target.mesh.vertices_m, target.mesh.faces)(region.points_W_m[:75]), 0.0, atol=1e-9
+    )
+    np.testing.assert_allclose(
+        MeshDistance(target.mesh.vertices_m, target.mesh.faces)(region.points_W_m[75:]),
+        region.distance_m[75:],
+        atol=1e-12,
     )
 
 
@@ -84,17 +80,6 @@ def test_the_same_generator_gives_the_same_points():
     one, two, other = (sample_region(target, 60, np.random.default_rng(seed)) for seed in (5, 5, 6))
     np.testing.assert_array_equal(one.points_W_m, two.points_W_m)
     assert not np.array_equal(one.points_W_m, other.points_W_m)
-
-
-def test_distance_meets_its_slow_twin():
-    """Closest points in faces, on edges and at corners agree with sampling the triangles."""
-    rng = np.random.default_rng(3)
-    triangles = rng.normal(size=(6, 3, 3))
-    points = 1.5 * rng.normal(size=(25, 3))
-    slow = [min(slow_distance(p, t) for t in triangles) for p in points]
-    fast = distance_to_mesh(points, Mesh(triangles.reshape(-1, 3), np.arange(18).reshape(6, 3)))
-    assert np.all(fast <= np.array(slow) + 1e-12)
-    np.testing.assert_allclose(fast, slow, atol=0.01)
 
 
 @pytest.mark.parametrize("n", [0, 1, 20_000])

@@ -4,7 +4,6 @@ Pure functions whose results carry their unit in their name.
 """
 
 from wakewise.evaluation.alignment import Refinement, Similarity, refine_icp, robust_similarity, umeyama
-from wakewise.evaluation.distance import MeshDistance
 from wakewise.evaluation.flight import flight_figures
 from wakewise.evaluation.surface import (
     Crop,
@@ -19,7 +18,6 @@ from wakewise.evaluation.trajectory import TrajectoryError, trajectory_error
 
 __all__ = [
     "Crop",
-    "MeshDistance",
     "Refinement",
     "Similarity",
     "Surface",

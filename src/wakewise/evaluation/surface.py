@@ -19,7 +19,7 @@ from scipy.spatial import KDTree
 from wakewise.arrays import Array, BoolArray, IntArray
 from wakewise.errors import InputError, StageError
 from wakewise.evaluation.alignment import Refinement, refine_icp
-from wakewise.evaluation.distance import MeshDistance
+from wakewise.targets import MeshDistance
 
 SUCCESS_RMSE_MM = 3.0
 SUCCESS_COMPLETENESS_PCT = 85.0

@@ -56,9 +56,10 @@ class Mission:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Flight:
-    """Everything the loop needs, ready to fly."""
+    """Everything the loop needs, ready to fly; `true_vehicle` is what the tank flies, known to nobody else."""
 
     mission: Mission
+    true_vehicle: Vehicle
     pilot: RoutePilot
     controller: Controller[Any]
     estimator: Estimator[Any]
@@ -146,6 +147,7 @@ def build_flight(scenario: Scenario, mission: Mission) -> Flight:
     control = scenario.control
     return Flight(
         mission=mission,
+        true_vehicle=true_vehicle,
         pilot=RoutePilot(route=mission.route, X_BC=believed.X_BC, exposure_s=scenario.imaging.exposure_s),
         controller=make_controller(scenario.method, believed, mission.region, wake_model(control.wake_model), control),
         estimator=PoseFilter(believed, scenario.estimation),

@@ -12,8 +12,9 @@ from scipy.spatial import KDTree
 
 from wakewise.arrays import Array, BoolArray
 from wakewise.errors import InputError, StageError
-from wakewise.evaluation import Crop, MeshDistance, refine_icp, sample_surface, thin
+from wakewise.evaluation import Crop, refine_icp, sample_surface, thin
 from wakewise.reports.trial import Surface, Trial
+from wakewise.targets import MeshDistance
 
 VOXEL_M = 0.0008
 """The cloud is thinned to one mean point per cell of this size, as the score does."""

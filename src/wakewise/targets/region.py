@@ -18,11 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
-from numba import njit
 from scipy.spatial import KDTree
 
 from wakewise.arrays import Array, BoolArray, freeze
 from wakewise.errors import InputError
+from wakewise.targets.distance import MeshDistance
 from wakewise.targets.mesh import Mesh
 from wakewise.targets.target import Target
 
@@ -86,15 +86,8 @@ def sample_region(target: Target, n: int, rng: np.random.Generator) -> Region:
     water = _water_points(target, surface, max(CANDIDATES_AT_LEAST, CANDIDATES_PER_POINT * (n - on_surface)), rng)
     wet = _one_per_cell(water, n - on_surface)
     points = np.concatenate([_one_per_cell(surface, on_surface), wet])
-    distance = np.concatenate([np.zeros(on_surface), distance_to_mesh(wet, target.mesh)])
+    distance = np.concatenate([np.zeros(on_surface), MeshDistance(target.mesh.vertices_m, target.mesh.faces)(wet)])
     return Region(points_W_m=points, weights=np.exp(-distance / DECAY_M), distance_m=distance)
-
-
-def distance_to_mesh(points_m: Array, mesh: Mesh) -> Array:
-    """Exact distance, shape (n,), from points, shape (n, 3), to the nearest point of any face (unsigned)."""
-    middles = mesh.triangles_m.mean(axis=1)
-    reach = np.linalg.norm(mesh.triangles_m - middles[:, None], axis=2).max(axis=1)
-    return np.asarray(_nearest(np.ascontiguousarray(points_m), mesh.triangles_m, middles, reach))
 
 
 def _surface_points(target: Target, count: int, rng: np.random.Generator) -> Array:
@@ -160,51 +153,3 @@ def _one_per_cell(candidates: Array, cells: int) -> Array:
 
     cut(candidates, 0, cells)
     return chosen
-
-
-@njit(cache=True)
-def _nearest(points, triangles, middles, reach):  # type: ignore[no-untyped-def]
-    """Smallest distance over all faces; a face whose bounding sphere is farther than the best so far is passed by.
-
-    The face with the nearest middle goes first, so that almost every other is passed by.
-    """
-    distance = np.empty(points.shape[0])
-    gap2 = np.empty(middles.shape[0])
-    for j in range(points.shape[0]):
-        p = points[j]
-        for f in range(middles.shape[0]):
-            gap2[f] = (p[0] - middles[f, 0]) ** 2 + (p[1] - middles[f, 1]) ** 2 + (p[2] - middles[f, 2]) ** 2
-        best = _to_triangle(p, triangles[np.argmin(gap2)])
-        for f in range(middles.shape[0]):
-            if gap2[f] < (best + reach[f]) ** 2:
-                best = min(best, _to_triangle(p, triangles[f]))
-        distance[j] = best
-    return distance
-
-
-@njit(cache=True)
-def _to_segment(p, a, b):  # type: ignore[no-untyped-def]
-    along, length2 = 0.0, 0.0
-    for k in range(3):
-        along += (p[k] - a[k]) * (b[k] - a[k])
-        length2 += (b[k] - a[k]) ** 2
-    t = min(1.0, max(0.0, along / length2)) if length2 > 0.0 else 0.0
-    gap2 = 0.0
-    for k in range(3):
-        gap2 += (p[k] - a[k] - t * (b[k] - a[k])) ** 2
-    return np.sqrt(gap2)
-
-
-@njit(cache=True)
-def _to_triangle(p, corners):  # type: ignore[no-untyped-def]
-    """Distance to the plane when the foot of the perpendicular lies in the face, else to the nearest edge."""
-    a, b, c = corners[0], corners[1], corners[2]
-    normal = np.cross(b - a, c - a)
-    length2 = normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2
-    if length2 > 0.0:
-        over_ab = np.dot(np.cross(b - a, p - a), normal)
-        over_bc = np.dot(np.cross(c - b, p - b), normal)
-        over_ca = np.dot(np.cross(a - c, p - c), normal)
-        if over_ab >= 0.0 and over_bc >= 0.0 and over_ca >= 0.0:
-            return abs(np.dot(p - a, normal)) / np.sqrt(length2)
-    return min(_to_segment(p, a, b), _to_segment(p, b, c), _to_segment(p, c, a))

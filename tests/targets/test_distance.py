@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from wakewise.errors import InputError
-from wakewise.evaluation import MeshDistance
+from wakewise.targets import MeshDistance
 
 
 def slow_distance(point, corners):
