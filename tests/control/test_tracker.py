@@ -6,7 +6,7 @@ import pytest
 from wakewise.control import ControlSettings, make_tracker
 from wakewise.geometry import Pose, matrix_from_quat, quat_from_euler, quat_multiply, rotvec_from_quat
 from wakewise.interfaces import BodyState, Goal
-from wakewise.vehicles import damping_wrench, load_vehicle, restoring_wrench
+from wakewise.vehicles import acceleration, coriolis_wrench, damping_wrench, load_vehicle, restoring_wrench
 
 VEHICLE = load_vehicle("paper")
 TRACKER = make_tracker(VEHICLE, ControlSettings())
@@ -20,7 +20,8 @@ def plain_wrench(tracker, dt, estimate, goal, force_W, moment_B):
     error = np.r_[R_WB.T @ (goal.X_WB.p_m - estimate.X_WB.p_m), rotvec_from_quat(quat_multiply(conjugate, goal.X_WB.q))]
     twist = np.r_[R_BG @ goal.nu_B[:3], R_BG @ goal.nu_B[3:]]
     feed = -restoring_wrench(tracker.body, goal.X_WB.q)
-    feed = np.r_[R_BG @ feed[:3], feed[3:]] - damping_wrench(tracker.body, twist)
+    bend = coriolis_wrench(tracker.body, twist)
+    feed = np.r_[R_BG @ feed[:3], feed[3:]] - damping_wrench(tracker.body, twist) - bend
     integral = np.r_[R_WB.T @ force_W, moment_B] + tracker.ki * error * dt
     integral = np.clip(integral, -tracker.integral_limit, tracker.integral_limit)
     return tracker.kp * error + tracker.kd * (twist - estimate.nu_B) + feed + integral, integral
@@ -48,11 +49,10 @@ def test_the_kernel_equals_its_twin():
 
 
 def test_at_the_goal_only_the_feed_forward_is_left():
-    """On the goal, moving as wished, the wrench is what holds the attitude plus the drag."""
+    """On the goal, moving as wished, the wrench is just what keeps the twist as it is: no acceleration is left."""
     X, nu = Pose(np.array([1.0, 2.0, 0.5]), quat_from_euler(0.1, -0.3, 1.0)), np.array([0.1, 0, 0, 0, 0, 0.2])
     _, wrench = TRACKER.wrench(TRACKER.init(), 0.02, BodyState(X_WB=X, nu_B=nu), Goal(X_WB=X, nu_B=nu))
-    expected = -restoring_wrench(TRACKER.body, X.q) - damping_wrench(TRACKER.body, nu)
-    np.testing.assert_allclose(wrench, expected, atol=1e-12)
+    np.testing.assert_allclose(acceleration(TRACKER.body, X.q, nu, wrench, np.zeros(3)), 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("axis", range(6))

@@ -11,7 +11,7 @@ from wakewise.arrays import Array, freeze
 from wakewise.control.settings import ControlSettings
 from wakewise.control.stability import Gains, stable_gain_scale, vehicle_axes, wished_gains
 from wakewise.interfaces import BodyState, Goal
-from wakewise.vehicles import RigidBody, Vehicle, compile_body, damping_wrench, restoring_wrench
+from wakewise.vehicles import RigidBody, Vehicle, compile_body, coriolis_wrench, damping_wrench, restoring_wrench
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,8 +55,9 @@ class Tracker:
 
         Errors are those of Goal over estimate in the body frame: position, rotation vector, and twist (the goal's
         twist is turned from its own body frame into B). Feed-forward, from the nominal vehicle: what holds it at the
-        goal's attitude, and the drag at the goal's twist in still water. While the last allocation could not make all
-        of its wrench (`saturated`), the integral does not grow.
+        goal's attitude, the drag at the goal's twist in still water, and the Coriolis and centripetal wrench that
+        bends its path. While the last allocation could not make all of its wrench (`saturated`), the integral does
+        not grow.
         """
         feed = -restoring_wrench(self.body, goal.X_WB.q)
         wrench = np.empty(6)
@@ -83,7 +84,7 @@ class Tracker:
             force_W,
             moment_B,
         )
-        wrench -= damping_wrench(self.body, twist_B)
+        wrench -= damping_wrench(self.body, twist_B) + coriolis_wrench(self.body, twist_B)
         return TrackerState(force_W_N=force_W, moment_B_Nm=moment_B), wrench
 
 
