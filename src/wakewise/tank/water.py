@@ -34,7 +34,7 @@ SPREAD = 0.094 / math.sqrt(2 * math.log(2))  # dsigma/dpath beyond the core, for
 _CORE_SPREAD = SPREAD * (1 - 1 / math.sqrt(2))  # so that sigma reaches D/2 where SPREAD x path does
 _CORE_PATH = 1 / (2 * SPREAD)  # 6.27 diameters
 _EMISSION_SPACING = 0.6  # of the first sigma: Gaussians this close add up to a smooth row (ripple below 1e-6)
-_MERGE_SPACING = 0.5  # of sigma: a pair closer than this becomes one, which leaves rows no coarser than one sigma
+_MERGE_SPACING = 0.7  # of sigma: a closer pair becomes one, so rows are no coarser than 1.4 sigma (ripple 1e-4)
 _STEEPEST_GRAZE = math.sin(math.radians(10))  # parcels that come down flatter than this slide along the bed
 _GUST_MEMORY = 1.0  # integral time of the turbulence, in sigma over speed at the parcel
 
@@ -87,7 +87,7 @@ class Water:
         current_W_m_s: Array | None = None,
         half_size_m: tuple[float, float] = (math.inf, math.inf),
         turbulence: float = 0.0,
-        rest_speed_m_s: float = 5e-4,
+        rest_speed_m_s: float = 1e-3,
         max_parcels: int = 4096,
     ) -> None:
         self._areas = np.array(disk_areas_m2, dtype=np.float64)
@@ -366,10 +366,10 @@ def _merge_pairs(
 def _gust_per_turbulence() -> float:
     """Impulse fluctuation per parcel for a given relative fluctuation on the axis of a row of parcels.
 
-    Parcels d = 0.75 sigma apart (rows lie between half and one) fluctuate independently; on the axis one adds 2 A, so
+    Parcels d = 1.05 sigma apart (rows lie between 0.7 and 1.4) fluctuate independently; on the axis one adds 2 A, so
     u'/u = a sqrt(sum (2A)^2) / sum 2A.
     """
-    x = 0.75 * np.arange(-200, 201)[:, None] * np.array([0.0, 0.0, 1.0]) + np.array([0.0, 0.0, 0.2])
+    x = 1.05 * np.arange(-200, 201)[:, None] * np.array([0.0, 0.0, 1.0]) + np.array([0.0, 0.0, 0.2])
     one = np.array([[0.0, 0.0, 1.0]])
     along = parcel_velocity(x, np.zeros((1, 3)), one, np.ones(1), math.inf)[:, 2]
     return float(along.sum() / np.sqrt((along**2).sum()))
