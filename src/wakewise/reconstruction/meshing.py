@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 import pycolmap
 import trimesh
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from wakewise.arrays import Array
+from wakewise.arrays import Array, IntArray
 from wakewise.errors import StageError
 from wakewise.interfaces import Progress
 from wakewise.reconstruction.clouds import read_cloud, write_mesh
@@ -26,6 +28,7 @@ def mesh_points(
 
     M. Kazhdan and H. Hoppe, Screened Poisson surface reconstruction, ACM TOG 32(3), 2013, doi 10.1145/2487228.2487237.
     The surface closes every hole; what lies farther than 6 point spacings from a point is invented and is cut off.
+    So are crumbs, pieces that hang together with nothing and are next to nothing beside the largest.
 
     Returns
     -------
@@ -59,11 +62,22 @@ def mesh_points(
     faces = faces[near[faces].all(axis=1)]
     if len(faces) == 0:
         raise StageError("mesh: none of the surface lies near the dense points")
+    faces = without_crumbs(faces, len(vertices))
     used, index = np.unique(faces, return_inverse=True)
     colours = cloud.colours[nearest[used]].mean(axis=1)
     write_mesh(out, vertices[used], index.reshape(faces.shape), colours)
     progress(1, 1, "mesh")
     return {"mesh_vertices": len(used), "mesh_faces": len(faces)}
+
+
+def without_crumbs(faces: IntArray, vertices: int, share: float = 0.005) -> IntArray:
+    """Faces, shape (m, 3), less those of pieces with fewer faces than this share of the largest piece's."""
+    edges = np.concatenate([faces[:, :2], faces[:, 1:]])
+    graph = coo_array((np.ones(len(edges), dtype=np.int8), (edges[:, 0], edges[:, 1])), shape=(vertices, vertices))
+    piece = connected_components(graph, directed=False)[1][faces[:, 0]]
+    count = np.bincount(piece)
+    kept: IntArray = faces[count[piece] >= share * count.max()]
+    return kept
 
 
 def _depth(points_m: Array, spacing_m: float, most: int) -> int:
