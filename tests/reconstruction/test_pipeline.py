@@ -1,5 +1,6 @@
 """The whole way on a small relief, what a second run skips, and what an interrupt leaves behind."""
 
+import dataclasses
 import json
 import shutil
 
@@ -8,7 +9,7 @@ import pytest
 from relief import CENTRE, FOCAL, height
 
 from wakewise.errors import InputError, StageError
-from wakewise.reconstruction import ReconstructionSettings, read_cloud, reconstruct
+from wakewise.reconstruction import Model, ReconstructionSettings, read_cloud, reconstruct
 
 SETTINGS = ReconstructionSettings(max_features=1500, first_octave=0, stereo_partners=2, agreeing_views=1, mesh_depth=6)
 REGION = (CENTRE, 0.06)
@@ -116,3 +117,12 @@ def test_bad_input_is_named_before_anything_runs(relief_photos, tmp_path):
     with pytest.raises(InputError, match=r"nothing\.png"):
         reconstruct(folder, tmp_path / "a", SETTINGS, pairs=[("00.png", "nothing.png")])
     shutil.rmtree(tmp_path / "a", ignore_errors=True)
+
+
+def test_a_figure_that_is_null_says_why():
+    """Without references and without a mesh the summary holds null, never zero, and a reason beside each."""
+    figures = dict.fromkeys(field.name for field in dataclasses.fields(Model))
+    summary = Model(**(figures | {"images": 3, "skipped": ()})).summary()
+    assert set(summary["why"]) == {name for name, value in summary.items() if value is None}
+    assert "no reference cameras" in summary["why"]["cameras_rmse_mm"]
+    assert "no mesh" in summary["why"]["mesh_faces"]

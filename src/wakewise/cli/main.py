@@ -25,6 +25,9 @@ app.command("reconstruct")(reconstruct.reconstruct_photos)
 app.command("evaluate")(evaluate.evaluate)
 app.add_typer(vehicle.app, name="vehicle")
 
+_INTERRUPTED = 130
+_STOPPED = "stopped; what was finished is kept, run the same command again to go on"
+
 
 def _show_version(value: bool) -> None:
     if value:
@@ -48,6 +51,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0 done, 1 failed on good input, 2 bad input, 130 stopped by Ctrl-C."""
     try:
         code = app(args=arguments, standalone_mode=False)
+        if code == _INTERRUPTED:  # Ctrl-C inside a command
+            _say(_STOPPED)
         return code if isinstance(code, int) else 0
     except typer.TyperException as fault:
         _say(fault.format_message())
@@ -59,8 +64,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
         _say(str(fault))
         return 1
     except (KeyboardInterrupt, typer.Abort):
-        _say("stopped; what was finished is kept, run the same command again to go on")
-        return 130
+        _say(_STOPPED)
+        return _INTERRUPTED
 
 
 def _say(message: str) -> None:

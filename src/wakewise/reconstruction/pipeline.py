@@ -41,7 +41,7 @@ class Model:
 
     reprojection_px: mean over all observations. cameras_rmse_mm: distance of registered cameras from their references
     after the similarity, None without references. stages_s: what each stage took when it ran; `skipped` were done
-    before. wall_s: this call. Lengths of a model without references have no unit.
+    before. wall_s: this call. A model without references has no scale, so its lengths are None.
     """
 
     images: int
@@ -59,7 +59,7 @@ class Model:
     scale: float | None
     dense_points: int
     depth_maps: int
-    point_spacing_mm: float
+    point_spacing_mm: float | None
     mesh_vertices: int | None
     mesh_faces: int | None
     wall_s: float
@@ -67,8 +67,15 @@ class Model:
     skipped: tuple[str, ...]
 
     def summary(self) -> dict[str, Any]:
-        """All figures as plain values for JSON."""
-        return {**asdict(self), "skipped": list(self.skipped)}
+        """All figures as plain values for JSON, with a reason (`why`) for each that is null."""
+        figures = {**asdict(self), "skipped": list(self.skipped)}
+        reason = {"mesh_vertices": "no mesh was asked for", "mesh_faces": "no mesh was asked for"}
+        why = {
+            key: reason.get(key, "no reference cameras were given, so the model has no scale")
+            for key, value in figures.items()
+            if value is None
+        }
+        return figures | {"why": why}
 
 
 def reconstruct(
@@ -162,6 +169,8 @@ def reconstruct(
     figures: dict[str, Any] = {"mesh_vertices": None, "mesh_faces": None}
     for result in results.values():
         figures |= result.figures
+    if references is None:
+        figures["point_spacing_mm"] = None
     model = Model(
         images=len(found),
         wall_s=time.perf_counter() - start,
