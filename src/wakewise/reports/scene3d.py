@@ -76,7 +76,7 @@ def _aim(server: viser.ViserServer, trial: Trial) -> None:
         away = upright(np.array([pose.p_m for pose in eyes if pose]), trial.bed_z_m) - centre
         reach = float(np.linalg.norm(away, axis=1).max())
     centre = centre + np.array([0.0, 0.0, 0.2 * reach])
-    server.initial_camera.look_at = tuple(centre)
+    server.initial_camera.look_at = tuple(centre + reach * np.array([0.0, 0.0, 0.2]))
     server.initial_camera.position = tuple(centre + reach * np.array([1.4, -1.6, 1.2]))
     server.initial_camera.up = (0.0, 0.0, 1.0)
     server.initial_camera.fov = float(np.radians(45.0))
