@@ -2,30 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
 from wakewise.geometry import Pose, look_at
 from wakewise.imaging import Scene
+from wakewise.targets import Mesh, Target
 
 R_BC = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 BED_Z = 1.5
-
-
-@dataclass(frozen=True)
-class BoxMesh:
-    vertices_m: np.ndarray
-    faces: np.ndarray
-
-
-@dataclass(frozen=True)
-class BoxTarget:
-    mesh: BoxMesh
-    centre_W_m: np.ndarray
-    radius_m: float
-    bed_z_m: float
 
 
 def box(size=(0.12, 0.1, 0.08)):
@@ -34,7 +20,8 @@ def box(size=(0.12, 0.1, 0.08)):
     centre = np.array([0.0, 0.0, BED_Z - 0.5 * size[2]])
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     faces = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
-    return BoxTarget(BoxMesh(0.5 * signs * size + centre, faces), centre, 0.5 * float(np.linalg.norm(size)), BED_Z)
+    mesh = Mesh(0.5 * signs * size + centre, faces)
+    return Target(name="box", mesh=mesh, centre_W_m=centre, radius_m=0.5 * float(np.linalg.norm(size)), bed_z_m=BED_Z)
 
 
 @cache

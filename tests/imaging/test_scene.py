@@ -1,31 +1,15 @@
 """The scene: what is refused, what stands where, and how daylight falls."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from imaging_helpers import BED_Z, BoxMesh, box, box_scene
+from imaging_helpers import BED_Z, box, box_scene
 
 from wakewise.errors import InputError
 from wakewise.imaging import Scene
 from wakewise.imaging.daylight import sky_radiance
-from wakewise.imaging.scene import _checked_mesh, _icosphere, vertex_normals
+from wakewise.imaging.scene import _icosphere, facing_out, vertex_normals
 from wakewise.imaging.texture import bake_bed
-
-
-@pytest.mark.parametrize(
-    ("vertices", "faces"),
-    [
-        (np.zeros((0, 3)), np.zeros((0, 3), int)),
-        (np.eye(3), np.array([[0, 1, 3]])),
-        (np.array([[0, 0, 0], [1, 0, 0], [np.nan, 1, 0]]), np.array([[0, 1, 2]])),
-        (np.eye(3), np.array([[0, 1]])),
-    ],
-)
-def test_unusable_meshes_are_refused(vertices, faces):
-    """No face, an index outside, NaN or a face that is no triangle raises InputError."""
-    with pytest.raises(InputError, match="target mesh"):
-        Scene.build(replace(box(), mesh=BoxMesh(vertices, faces)), 0)
+from wakewise.targets import Mesh
 
 
 @pytest.mark.parametrize("wrong", [{"seed": -1}, {"seed": 0, "bed_half_m": 0.0}, {"seed": 0, "stones": -1}])
@@ -52,8 +36,8 @@ def test_normals_point_out_whatever_the_winding():
     scene, target = box_scene(), box()
     away = scene.vertices_F_m[:8] + scene.foot_W_m - target.centre_W_m
     assert (np.sum(scene.normals[:8] * away, axis=1) > 0).all()
-    turned = _checked_mesh(BoxMesh(target.mesh.vertices_m, target.mesh.faces[:, ::-1]))
-    assert np.allclose(vertex_normals(*turned), scene.normals[:8], atol=1e-6)
+    turned = facing_out(Mesh(target.mesh.vertices_m, target.mesh.faces[:, ::-1]))
+    assert np.allclose(vertex_normals(turned.vertices_m, turned.faces), scene.normals[:8], atol=1e-6)
     bed = slice(8, int(scene.faces[scene.first_face[1] : scene.first_face[2]].max()) + 1)
     assert (scene.normals[bed, 2] < -0.5).all()
 

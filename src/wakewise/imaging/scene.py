@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
@@ -19,34 +19,13 @@ from wakewise.arrays import Array, IntArray
 from wakewise.errors import InputError
 from wakewise.imaging.daylight import bake_daylight
 from wakewise.imaging.texture import BED_MAP_LEVELS, BED_MAP_SIZE, BED_TEXEL_M, Maps, bake_bed, bed_heights
+from wakewise.targets import Mesh, Target
 
 TARGET, BED, STONE = 0, 1, 2
 """Numbers of the three kinds of surface, as ray casting returns them."""
 
 APRON_M = 12.0
 """Half width of the whole bed: beyond it there is only water."""
-
-
-class MeshLike(Protocol):
-    """A triangle mesh: `vertices_m` (n, 3) in m and `faces` (m, 3)."""
-
-    @property
-    def vertices_m(self) -> Array: ...  # noqa: D102
-    @property
-    def faces(self) -> IntArray: ...  # noqa: D102
-
-
-class TargetLike(Protocol):
-    """A target standing on the bed; its mesh is in the world (NED)."""
-
-    @property
-    def mesh(self) -> MeshLike: ...  # noqa: D102
-    @property
-    def centre_W_m(self) -> Array: ...  # noqa: D102
-    @property
-    def radius_m(self) -> float: ...  # noqa: D102
-    @property
-    def bed_z_m(self) -> float: ...  # noqa: D102
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -69,7 +48,7 @@ class Scene:
     embree: Any
 
     @classmethod
-    def build(cls, target: TargetLike, seed: int, *, bed_half_m: float = 1.5, stones: int = 200) -> Scene:
+    def build(cls, target: Target, seed: int, *, bed_half_m: float = 1.5, stones: int = 200) -> Scene:
         """Lay the bed, scatter the stones, light everything and make it ready for rays.
 
         Parameters
@@ -85,9 +64,8 @@ class Scene:
         Raises
         ------
         InputError
-            If the mesh is empty or its indices point outside, or a number is out of range.
+            If a number is out of range.
         """
-        vertices, faces = _checked_mesh(target.mesh)
         if seed < 0:
             raise InputError(f"scene: seed {seed}, must not be negative")
         if not 0.3 <= bed_half_m < APRON_M:
@@ -96,7 +74,7 @@ class Scene:
             raise InputError(f"scene: {stones} stones, must not be negative")
         noise_seed = seed % 65521 * 1000
         foot_W = np.array([target.centre_W_m[0], target.centre_W_m[1], target.bed_z_m])
-        vertices = vertices - foot_W
+        vertices, faces = target.mesh.vertices_m - foot_W, facing_out(target.mesh).faces
         clear_m = float(np.max(np.hypot(vertices[:, 0], vertices[:, 1])))
 
         bed_vertices, bed_faces = _bed(clear_m, bed_half_m, noise_seed)
@@ -132,20 +110,10 @@ def vertex_normals(vertices_m: Array, faces: IntArray) -> Array:
     return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
 
 
-def _checked_mesh(mesh: MeshLike) -> tuple[Array, IntArray]:
-    """Copy the mesh, refuse what cannot be drawn, and turn it inside out if its volume is negative."""
-    vertices = np.array(mesh.vertices_m, dtype=np.float64)
-    faces = np.array(mesh.faces, dtype=np.int64)
-    if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
-        raise InputError(f"target mesh: vertices {vertices.shape}, faces {faces.shape}, must be (n, 3) and (m>0, 3)")
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise InputError(f"target mesh: faces name vertices {faces.min()} to {faces.max()}, there are {len(vertices)}")
-    if not np.all(np.isfinite(vertices)):
-        raise InputError("target mesh: a vertex holds NaN or infinity, every coordinate must be finite")
-    a, b, c = (vertices[faces[:, k]] - vertices.mean(axis=0) for k in range(3))
-    if np.sum(a * np.cross(b, c)) < 0.0:
-        faces = faces[:, ::-1].copy()
-    return vertices, faces
+def facing_out(mesh: Mesh) -> Mesh:
+    """The mesh, turned inside out if its volume is negative."""
+    about_middle = Mesh(mesh.vertices_m - mesh.vertices_m.mean(axis=0), mesh.faces)
+    return mesh if about_middle.volume_m3 >= 0.0 else Mesh(mesh.vertices_m, mesh.faces[:, ::-1])
 
 
 def _bed(clear_m: float, half_m: float, seed: int) -> tuple[Array, IntArray]:
