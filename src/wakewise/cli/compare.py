@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from wakewise.cli.console import Bars, print_json, print_table, shown
-from wakewise.cli.options import Json, Out, Preset, ScenarioFile, Seed, Sets, TargetName, TargetSize, Vehicle, overrides
+from wakewise.cli.options import (
+    Json,
+    Out,
+    Preset,
+    ScenarioFile,
+    Seed,
+    Sets,
+    TargetName,
+    TargetSize,
+    Vehicle,
+    default_folder,
+    overrides,
+)
 from wakewise.errors import InputError
 
 Methods = Annotated[str, typer.Option("--methods", help="Comma-separated; ratios are to the first.")]
@@ -53,7 +64,7 @@ def compare(
         raise InputError(f"--methods: '{methods}', must be one or more different names such as dp,wake-aware")
     changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size)
     scenarios = {name: load_scenario(preset, scenario, changes | {"method": name}) for name in names}
-    folder = out or Path("runs") / f"{scenarios[names[0]].name}-compare"
+    folder = out or default_folder(scenarios[names[0]], "compare")
     figures = compare_methods(scenarios, folder, Bars())
     with Bars().stage("report") as progress:
         for name in names:

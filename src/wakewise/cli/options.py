@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from wakewise.operation import Scenario
 
 ScenarioFile = Annotated[
     Path | None, typer.Argument(help="Scenario YAML file; any part of a scenario.", show_default=False)
 ]
 Preset = Annotated[str, typer.Option("--preset", help="quick (minutes on two cores) or standard.")]
-Out = Annotated[Path | None, typer.Option("--out", help="Folder for the results; runs/NAME if not given.")]
+Out = Annotated[
+    Path | None, typer.Option("--out", help="Folder for the results; runs/NAME-TARGET-METHOD-SEED if not given.")
+]
 Sets = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="FIELD=VALUE", help="Change one field, such as tank.silt=0; may be repeated."),
@@ -29,6 +34,11 @@ TargetSize = Annotated[
     float | None,
     typer.Option("--target-size", metavar="M", help="Scale a mesh file's largest extent to this.", show_default=False),
 ]
+
+
+def default_folder(scenario: Scenario, what: str) -> Path:
+    """Folder of a trial that was given none: another target, method or seed goes elsewhere."""
+    return Path("runs") / f"{scenario.name}-{Path(scenario.target.kind).stem}-{what}-{scenario.seed}"
 
 
 def overrides(

@@ -8,7 +8,19 @@ from typing import Annotated
 import typer
 
 from wakewise.cli.console import Bars, print_json, print_table, shown
-from wakewise.cli.options import Json, Out, Preset, ScenarioFile, Seed, Sets, TargetName, TargetSize, Vehicle, overrides
+from wakewise.cli.options import (
+    Json,
+    Out,
+    Preset,
+    ScenarioFile,
+    Seed,
+    Sets,
+    TargetName,
+    TargetSize,
+    Vehicle,
+    default_folder,
+    overrides,
+)
 
 Method = Annotated[str | None, typer.Option("--method", help="dp or wake-aware.", show_default=False)]
 
@@ -53,7 +65,7 @@ def scan(
 
     changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, method=method)
     resolved = load_scenario(preset, scenario, changes)
-    folder = out or Path("runs") / resolved.name
+    folder = out or default_folder(resolved, resolved.method)
     figures = run_trial(resolved, folder, Bars())
     with Bars().stage("report") as progress:
         report = write_report(folder)
