@@ -40,7 +40,7 @@ def step_columns(thrusters: int) -> list[str]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ExposureRecord:
-    """One opening of the shutter: true camera poses across it, the estimate at its opening, the silt in the water."""
+    """One opening of the shutter: true camera poses across it, the estimate at its middle, the silt in the water."""
 
     time_s: float
     X_WC_true: tuple[Pose, ...]
@@ -122,7 +122,7 @@ class FlightRecorder:
                         _moved(truth.state, float(opens_s[k]) - step.time_s + after_s) @ self.X_BC
                         for after_s in np.linspace(0.0, self.exposure_s, self.instants)
                     ),
-                    X_WC_est=_moved(step.estimate, float(opens_s[k]) - step.time_s) @ self.X_BC,
+                    X_WC_est=_moved(step.estimate, float(opens_s[k]) - step.time_s + 0.5 * self.exposure_s) @ self.X_BC,
                     silt=self.witness.silt(),
                 )
             )
