@@ -97,7 +97,9 @@ def test_each_exposure_is_recorded_at_its_place() -> None:
     moved = np.linalg.norm(middle.X_WC_true[-1].p_m - middle.X_WC_true[0].p_m)
     speed = np.linalg.norm(ROUTE.camera(middle.time_s)[1])
     assert moved == pytest.approx(speed * 0.01, rel=0.1)
-    np.testing.assert_allclose(middle.X_WC_est.p_m, middle.X_WC_true[1].p_m, atol=1e-9)
+    # This plant jumps to its goal at once, so its estimate, taken before, is one step behind.
+    behind = np.linalg.norm(middle.X_WC_est.p_m - middle.X_WC_true[1].p_m)
+    assert behind == pytest.approx(speed * DT_S, rel=0.1)
 
 
 def test_a_flight_survives_its_files(tmp_path: Path) -> None:
