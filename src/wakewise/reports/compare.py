@@ -20,6 +20,7 @@ from wakewise.reports.words import grouped, number, shown, unit, verdict
 VIEW_PIXELS = 300
 PHOTO_WIDTH = 720
 VIEWPOINTS = 3
+_PLAIN = 0.01  # a smaller difference, relative to the larger value, is none
 # Where less is better, where more is; for the rest a difference is neither.
 _LESS = (
     "rmse_mm", "accuracy_median_mm", "accuracy_mean_mm", "accuracy_p90_mm", "completeness_mean_mm", "cameras_rmse_mm",
@@ -83,7 +84,9 @@ def _headline(trials: Mapping[str, Trial]) -> str:
     lines = []
     for name in others:
         ratio = _ratio(trials, name, "target_speed_mean_m_s")
-        if ratio is not None:
+        if ratio is not None and abs(ratio - 1.0) <= _PLAIN:
+            lines.append(f"With {name} the water at the target moved as fast as with {first}.")
+        elif ratio is not None:
             lines.append(f"With {name} the water at the target moved at {number(ratio)} times its speed with {first}.")
     for name, trial in trials.items():
         lines.append(f"{name}: {verdict(trial).headline}")
@@ -117,14 +120,15 @@ def _figures(trials: Mapping[str, Trial]) -> str:
             f"<tbody>{rows}</tbody></table>"
         )
     content = f'<div class="wide">{"".join(tables)}</div>' if tables else missing("the figures", "none recorded")
-    lead = f"Ratios are to {escape(first)}. The better value of a row is bold where less or more is plainly better."
+    lead = f"Ratios are to {escape(first)}. The better value of a row is bold where it is better by more than 1 %."
     return section("figures", "The figures", lead, content)
 
 
 def _row(trials: Mapping[str, Trial], key: str) -> str:
     known = {name: value for name, trial in trials.items() if (value := trial.metrics.number(key)) is not None}
     best = None
-    if len(set(known.values())) > 1 and key in _LESS + _MORE:
+    values = list(known.values())
+    if values and max(values) - min(values) > _PLAIN * max(map(abs, values)) and key in _LESS + _MORE:
         best = min(known.values()) if key in _LESS else max(known.values())
     cells = []
     for i, (name, trial) in enumerate(trials.items()):
