@@ -37,6 +37,7 @@ _FIGURES: dict[str, tuple[str, str]] = {
     "disturbance": ("m2/s2", "D as the controller's wake model sees it, mean over time"),
     "position_rmse_mm": ("mm", "distance of the true vehicle from where it was wished to be"),
     "path_rmse_mm": ("mm", "distance of the true vehicle from the nearest point of the wished path"),
+    "estimate_rmse_mm": ("mm", "distance of the estimated vehicle from the true one"),
     "velocity_deviation_pct": ("%", "rms difference of true and wished velocity over the rms wished velocity"),
     "roll_pitch_rms_deg": ("deg", "rms error in roll and pitch"),
     "energy_kJ": ("kJ", "electrical energy of the thrusters"),

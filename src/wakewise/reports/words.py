@@ -25,7 +25,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
     ),
     "The water": ("target_speed", "exposure_speed", "bed_speed", "turbidity", "disturbance"),
     "The flight": (
-        "method", "seed", "duration", "position", "path", "velocity", "roll", "energy", "sign", "collisions", "legs",
+        "method", "seed", "duration", "position", "path", "estimate", "velocity", "roll", "energy", "sign",
+        "collisions", "legs",
     ),
     "The computation": ("solve", "fallbacks", "wall", "cpu", "memory", "stages"),
 }  # fmt: skip
