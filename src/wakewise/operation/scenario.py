@@ -74,7 +74,7 @@ def load_scenario(preset: str | None, path: Path | None, overrides: dict[str, An
         Naming the file or field, what was found and what is allowed.
     """
     tree: dict[str, Any] = {}
-    source = "--set"
+    source = "scenario"
     if preset is not None:
         if preset not in PRESETS:
             raise InputError(f"--preset: '{preset}', allowed are {', '.join(PRESETS)}")
