@@ -40,7 +40,7 @@ test: check
 	$(BIN)/pytest -n 2
 
 bench: setup
-	$(BIN)/python benchmarks/run.py
+	$(BIN)/wakewise bench
 
 docs: setup
 	$(BIN)/python tools/write_docs.py

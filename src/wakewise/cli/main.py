@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import typer
 
 from wakewise import __version__
-from wakewise.cli import compare, evaluate, reconstruct, scan, vehicle
+from wakewise.cli import bench, compare, evaluate, reconstruct, scan, vehicle
 from wakewise.errors import InputError, WakewiseError
 
 app = typer.Typer(
@@ -23,6 +23,7 @@ app.command("scan")(scan.scan)
 app.command("compare")(compare.compare)
 app.command("reconstruct")(reconstruct.reconstruct_photos)
 app.command("evaluate")(evaluate.evaluate)
+app.command("bench")(bench.bench)
 app.add_typer(vehicle.app, name="vehicle")
 
 _INTERRUPTED = 130

@@ -1,0 +1,32 @@
+"""Which benches there are."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from wakewise.errors import InputError
+from wakewise.experiments.benches.timing import BenchOptions
+
+BENCHES = {
+    "allocator": "exact allocation against SciPy's SLSQP and the pseudo-inverse",
+    "disturbance": "the Gram matrix of D against the sum over points",
+    "dynamics": "one step of the vehicle, with and without Jacobians",
+    "imaging": "one photograph",
+    "tank": "the world of a trial against the clock",
+}
+"""Name of each bench and what it measures; the module of that name in this folder holds it."""
+
+
+def run_bench(name: str, options: BenchOptions) -> dict[str, Any]:
+    """Run one bench and return its figures.
+
+    Raises
+    ------
+    InputError
+        If there is no bench of that name.
+    """
+    if name not in BENCHES:
+        raise InputError(f"bench {name!r}: no such bench, allowed {', '.join(BENCHES)}")
+    result: dict[str, Any] = import_module(f"wakewise.experiments.benches.{name}").run(options)
+    return result
