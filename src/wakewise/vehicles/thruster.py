@@ -4,14 +4,66 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from wakewise.arrays import Array, freeze
+from wakewise.arrays import Array, frozen
 from wakewise.errors import InputError
 
 REACH_M = 10.0
 """Furthest a thruster may sit from the body origin; beyond it a file most likely holds millimetres."""
+
+
+_ZERO_ALLOWED = frozenset({"max_forward_N", "max_reverse_N", "time_constant_s"})
+
+
+class Mounted(Protocol):
+    """Anything with a thruster's name, place and axis."""
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+
+    @property
+    def p_BT_m(self) -> Array:
+        """Centre of the disk, shape (3,)."""
+
+    @property
+    def axis_B(self) -> Array:
+        """Direction of the force, shape (3,)."""
+
+
+def mount(record: Mounted) -> None:
+    """Check and freeze place and axis of a frozen record, and give the axis unit length (call in `__post_init__`).
+
+    Raises
+    ------
+    InputError
+        If a number is not finite, the axis has no length, or the place is more than 10 m away.
+    """
+    where = f"thruster {record.name}"
+    place = frozen(record.p_BT_m, (3,), f"{where}: p_BT_m")
+    axis = frozen(record.axis_B, (3,), f"{where}: axis_B")
+    length = float(np.linalg.norm(axis))
+    if length < 1e-6:
+        raise InputError(f"{where}: axis {axis.tolist()} has length {length:g}, it must not be zero")
+    # A unit axis is kept to the last bit, so that a copy of a thruster is the same thruster.
+    if abs(length - 1.0) > 1e-14:
+        axis = frozen(axis / length, (3,), f"{where}: axis_B")
+    distance = float(np.linalg.norm(place))
+    if distance > REACH_M:
+        raise InputError(f"{where}: {distance:g} m from the body origin, at most {REACH_M:g} m (are these metres?)")
+    object.__setattr__(record, "p_BT_m", place)
+    object.__setattr__(record, "axis_B", axis)
+
+
+def require_limit(where: str, field: str, value: float) -> None:
+    """Refuse a limit, area, lag or gain of a thruster that is not finite or out of range."""
+    low_allowed = field in _ZERO_ALLOWED
+    if not math.isfinite(value) or value < 0.0 or (value == 0.0 and not low_allowed):
+        allowed = "at least 0" if low_allowed else "more than 0"
+        raise InputError(f"{where}: {field} = {value:g}, must be finite and {allowed}")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,30 +104,11 @@ class Thruster:
     gain: float = 1.0
 
     def __post_init__(self) -> None:
-        freeze(self, p_BT_m=(3,), axis_B=(3,))
+        mount(self)
         where = f"thruster {self.name}"
-        length = float(np.linalg.norm(self.axis_B))
-        if length < 1e-6:
-            raise InputError(f"{where}: axis {self.axis_B.tolist()} has length {length:g}, it must not be zero")
-        # A unit axis is kept to the last bit, so that a copy of a thruster is the same thruster.
-        if abs(length - 1.0) > 1e-14:
-            axis = self.axis_B / length
-            axis.setflags(write=False)
-            object.__setattr__(self, "axis_B", axis)
-        distance = float(np.linalg.norm(self.p_BT_m))
-        if distance > REACH_M:
-            raise InputError(f"{where}: {distance:g} m from the body origin, at most {REACH_M:g} m (are these metres?)")
-        for field, low_allowed in (
-            ("max_forward_N", True),
-            ("max_reverse_N", True),
-            ("disk_area_m2", False),
-            ("time_constant_s", True),
-            ("gain", False),
-        ):
-            value = float(getattr(self, field))
-            if not math.isfinite(value) or value < 0.0 or (value == 0.0 and not low_allowed):
-                allowed = "at least 0" if low_allowed else "more than 0"
-                raise InputError(f"{where}: {field} = {value:g}, must be finite and {allowed}")
+        for field in ("max_forward_N", "max_reverse_N", "disk_area_m2", "time_constant_s"):
+            require_limit(where, field, float(getattr(self, field)))
+        require_limit(where, "gain", self.gain)
 
     @property
     def wrench_per_newton_B(self) -> Array:
