@@ -45,9 +45,17 @@ def test_the_null_space_makes_no_wrench_and_is_orthonormal(vehicle: Vehicle) -> 
     assert np.allclose(N.T @ N, np.eye(N.shape[1]), atol=1e-14)
 
 
-def test_both_layouts_fight_in_one_horizontal_squeeze_and_one_vertical_twist(vehicle: Vehicle) -> None:
+@pytest.mark.parametrize("name", ["paper", "bluerov2-heavy", "bluerov2-heavy-gazebo", "bluerov2-heavy-wu"])
+def test_four_and_four_fight_in_one_horizontal_squeeze_and_one_vertical_twist(name: str) -> None:
     expected = 0.5 * np.array([[1, 1, 1, 1, 0, 0, 0, 0], [0, 0, 0, 0, 1, -1, -1, 1]]).T
-    assert np.allclose(vehicle.null_space, expected, atol=1e-14)
+    assert np.allclose(load_vehicle(name).null_space, expected, atol=1e-14)
+
+
+def test_the_sparsest_null_vector_comes_first_and_stays_sparse() -> None:
+    """RexROV's horizontals cancel alone; its slanted thrusters need the horizontals' help."""
+    first, second = load_vehicle("rexrov").null_space.T
+    assert np.allclose(first, 0.5 * np.array([0, 0, 0, 0, 1, 1, 1, 1]), atol=1e-9)
+    assert np.all(np.abs(second) > 0.05)
 
 
 @settings(max_examples=50, deadline=None)

@@ -1,51 +1,204 @@
-"""`wakewise vehicle`: what Wakewise knows about a vehicle."""
+"""`wakewise vehicle`: the library, and what Wakewise knows about a vehicle."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from wakewise.cli import vehicle_import, vehicle_thruster
 from wakewise.cli.console import print_json, print_table, shown
 from wakewise.cli.options import Json
 
-app = typer.Typer(help="What Wakewise knows about a vehicle.", no_args_is_help=False, rich_markup_mode=None)
+app = typer.Typer(
+    help="Vehicles: list, show, check, import; their thrusters.", no_args_is_help=False, rich_markup_mode=None
+)
+app.command("import")(vehicle_import.import_file)
+app.command("thruster")(vehicle_thruster.thruster)
+app.command("lag")(vehicle_thruster.lag)
 
-Name = Annotated[str, typer.Argument(help="Library name or path of a vehicle file.")]
+Name = Annotated[str, typer.Argument(help="Library name, vehicle file, or a file that `vehicle import` can read.")]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", help="Also write a drawing (.svg) or a page (.html) to this file.", show_default=False),
+]
 Drawing = Annotated[
     Path | None, typer.Option("--drawing", help="Also write an SVG drawing to this file.", show_default=False)
 ]
+Matrix = Annotated[
+    str | None,
+    typer.Option(
+        "--matrix",
+        metavar="FILE",
+        help="Allocation matrix to compare with the geometry: YAML, six lines of numbers, motor factors as CSV, "
+        "or the word ardusub for ArduSub's frame.",
+        show_default=False,
+    ),
+]
+SkipMissing = Annotated[bool, typer.Option("--skip-missing", help="Leave out xacro includes that are not there.")]
+Packages = Annotated[
+    list[str] | None,
+    typer.Option("--package", metavar="NAME=DIR", help="Where a package of a xacro file is; may be repeated."),
+]
+
+
+@app.command("list")
+def list_vehicles(json: Json = False) -> None:
+    """List the library: thrusters, rank, and whether each vehicle can fly or what its file lacks."""
+    from wakewise.vehicles import allocation_rank, draft_names, load_draft, summary_line
+
+    drafts = [load_draft(name) for name in draft_names()]
+    if json:
+        rows = [
+            {
+                "name": draft.name,
+                "title": draft.title,
+                "thrusters": len(draft.thruster_names),
+                "rank": allocation_rank(draft),
+                "can_fly": not draft.missing,
+                "missing": list(draft.missing),
+            }
+            for draft in drafts
+        ]
+        print_json({"vehicles": rows})
+        return
+    width = max(len(draft.name) for draft in drafts)
+    for draft in drafts:
+        typer.echo(f"{draft.name:<{width}}  {summary_line(draft)}")
 
 
 @app.command("show")
-def show(vehicle: Name = "paper", drawing: Drawing = None, json: Json = False) -> None:
+def show(
+    vehicle: Name = "paper",
+    out: Out = None,
+    drawing: Drawing = None,
+    package: Packages = None,
+    skip_missing: SkipMissing = False,
+    json: Json = False,
+) -> None:
     """Show a vehicle: thrusters, rank, what redundancy it has, limits, where the figures are from."""
+    from wakewise.errors import InputError
     from wakewise.files import write_text
-    from wakewise.vehicles import describe, drawing_svg, load_vehicle
+    from wakewise.vehicles import describe, drawing_svg, find_vehicle, parameters, vehicle_page
 
-    record = load_vehicle(vehicle)
-    facts = describe(record)
+    draft = find_vehicle(vehicle, packages=_folders(package), skip_missing=skip_missing)
+    facts = describe(draft)
+    if out is not None:
+        if out.suffix not in (".svg", ".html"):
+            raise InputError(f"--out {out}: allowed are files that end in .svg or .html")
+        write_text(out, drawing_svg(draft) if out.suffix == ".svg" else vehicle_page(draft))
     if drawing is not None:
-        write_text(drawing, drawing_svg(record))
+        write_text(drawing, drawing_svg(draft))
     if json:
         print_json(facts)
         return
-    from rich.table import Table
-
-    typer.echo(f"{record.title}\n")
-    table = Table(title="thrusters (body frame: x forward, y right, z down)")
-    for column in ("name", "x m", "y m", "z m", "force axis", "forward N", "reverse N"):
-        table.add_column(column, justify="left" if column in ("name", "force axis") else "right")
-    for thruster in record.thrusters:
-        axis = " ".join(f"{value:+.3f}" for value in thruster.axis_B)
-        place = (f"{value:.3f}" for value in thruster.p_BT_m)
-        table.add_row(thruster.name, *place, axis, shown(thruster.max_forward_N), shown(thruster.max_reverse_N))
-    print_table(table)
-    typer.echo(f"rank {facts['rank']} of 6, null space of dimension {len(facts['null_space'])}:")
-    for vector in facts["null_space"]:
-        typer.echo(f"  {vector['name']}: " + " ".join(f"{value:+.3f}" for value in vector["thrusts"]))
+    typer.echo(f"{draft.title}\n")
+    _print_thrusters(facts)
+    rows = [[p.quantity, p.value or "missing", p.unit, "estimate" if p.estimate else ""] for p in parameters(draft)]
+    _print_rows("parameters", ["quantity", "value", "unit", ""], rows, left=4)
+    _print_allocation(facts)
+    for group in facts["provenance"]:
+        typer.echo(f"source of {group['group'].replace('_', ' ')}: {' '.join(group['source'].split())}")
     typer.echo(f"source: {facts['source']}")
     typer.echo(f"does not claim: {facts['does_not_claim']}")
-    if drawing is not None:
-        typer.echo(f"drawing: {drawing}")
+    _print_lacks(facts)
+    for path in (out, drawing):
+        if path is not None:
+            typer.echo(f"written: {path}")
+
+
+@app.command("check")
+def check(
+    vehicle: Name,
+    matrix: Matrix = None,
+    package: Packages = None,
+    skip_missing: SkipMissing = False,
+    json: Json = False,
+) -> None:
+    """Check a vehicle's thrusters: rank, null space, achievable wrench, single failures, stated matrix."""
+    from wakewise.vehicles import check_report, compare_with, find_vehicle
+
+    draft = find_vehicle(vehicle, packages=_folders(package), skip_missing=skip_missing)
+    facts = check_report(draft, None if matrix is None else compare_with(draft, matrix))
+    if json:
+        print_json(facts)
+        return
+    typer.echo(f"{draft.title}\n")
+    _print_allocation(facts)
+    rows = [[failure["thruster"], failure["name"], failure["rank"], failure["words"]] for failure in facts["failures"]]
+    _print_rows("if one thruster fails", ["", "thruster", "rank", "what is left"], rows, left=4)
+    found = facts["mixing"]
+    if found is not None:
+        typer.echo(f"{found['stated_by']}: {found['agree']} of {found['compared']} entries agree with the geometry")
+        for entry in facts["mixing_disagreements"]:
+            typer.echo(f"  {entry['text']}")
+        for note in found["notes"]:
+            typer.echo(f"  note: {note}")
+    _print_lacks(facts)
+
+
+def _print_thrusters(facts: dict[str, Any]) -> None:
+    if not facts["thrusters"]:
+        typer.echo("its file holds a matrix, but no places of thrusters")
+        return
+    rows = [
+        [
+            t["number"],
+            t["name"],
+            *(f"{value + 0.0:.3f}" for value in t["position_m"]),
+            " ".join(f"{value + 0.0:+.3f}" for value in t["axis"]),
+            shown(t["max_forward_N"]),
+            shown(t["max_reverse_N"]),
+        ]
+        for t in facts["thrusters"]
+    ]
+    columns = ["", "name", "x m", "y m", "z m", "force axis", "forward N", "reverse N"]
+    _print_rows("thrusters (body frame: x forward, y right, z down)", columns, rows, left=2)
+
+
+def _print_allocation(facts: dict[str, Any]) -> None:
+    typer.echo(f"rank {facts['rank']} of 6, {facts['actuation']}")
+    typer.echo(f"null space of dimension {len(facts['null_space'])}{':' if facts['null_space'] else ''}")
+    for vector in facts["null_space"]:
+        thrusts = " ".join(f"{value + 0.0:+.3f}" for value in vector["thrusts"])
+        typer.echo(f"  {vector['name']}: {thrusts}  ({vector['words']})")
+    wrench = facts["achievable_wrench"]
+    if wrench is None:
+        typer.echo(f"achievable wrench: not known, {facts['why']['achievable_wrench']}")
+        return
+    columns = ["axis", "lowest", "highest", "unit", "lowest, others free", "highest, others free"]
+    keys = ("lowest", "highest", "unit", "lowest_others_free", "highest_others_free")
+    rows = [[axis, *(shown(w[key]) for key in keys)] for axis, w in wrench.items()]
+    _print_rows("achievable wrench, the other five axes at zero", columns, rows, left=1)
+
+
+def _print_lacks(facts: dict[str, Any]) -> None:
+    if facts["missing"]:
+        typer.echo(f"missing, so it cannot fly: {', '.join(facts['missing'])}")
+    for note in facts["notes"]:
+        typer.echo(f"note: {' '.join(note.split())}")
+
+
+def _print_rows(title: str, columns: list[str], rows: list[list[Any]], left: int) -> None:
+    """A table whose first `left` columns are words and the others figures."""
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left")
+    for index, column in enumerate(columns):
+        table.add_column(column, justify="left" if index < left or column in ("unit", "force axis") else "right")
+    for row in rows:
+        table.add_row(*(str(value) for value in row))
+    print_table(table)
+
+
+def _folders(packages: list[str] | None) -> dict[str, Path]:
+    from wakewise.errors import InputError
+
+    folders = {}
+    for item in packages or []:
+        name, equals, folder = item.partition("=")
+        if not name or not equals or not folder:
+            raise InputError(f"--package {item}: allowed is NAME=DIR")
+        folders[name] = Path(folder)
+    return folders

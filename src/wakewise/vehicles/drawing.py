@@ -1,276 +1,260 @@
-"""A drawing of a vehicle from above and from the side: thrusters, the jets of positive thrust, the camera's view."""
+"""A drawing of a vehicle from above, from starboard and from ahead: thrusters, jets of positive thrust, camera view."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+import textwrap
+from collections.abc import Callable
 from html import escape
 
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.vehicles.vehicle import Vehicle
+from wakewise.errors import InputError
+from wakewise.vehicles.check import AnyVehicle, actuation
+from wakewise.vehicles.describe import as_draft
+from wakewise.vehicles.draft import VehicleDraft
+from wakewise.vehicles.drawing_marks import (
+    FRAME,
+    HULL,
+    INK,
+    JET,
+    MUTED,
+    Sizes,
+    View,
+    arrow,
+    badge,
+    buoyancy_mark,
+    camera_mark,
+    camera_marks,
+    centre_marks,
+    gravity_mark,
+    hull_half_m,
+    label_place,
+    text,
+    thruster_marks,
+)
 
-INK, MUTED, FRAME, HULL, JET, LENS = "#1d2b36", "#64748b", "#cbd5e1", "#eef3f7", "#0f7bbd", "#e8a317"
-WIDTH, HEIGHT, TOP, BOTTOM = 980.0, 500.0, 86.0, 56.0
-JET_LENGTH_DISKS = 2.2
-FACE_ON = 0.35
-"""A thruster whose axis shows less of its length than this on paper is drawn as a ring."""
+WIDTH, MARGIN, GAP, PAD, HEAD = 1080.0, 24.0, 16.0, 18.0, 40.0
+TALLEST = 700.0
+"""Height that the two rows of panels may take together."""
+
+NARROWEST_CELL = 300.0
+"""Room that the legend needs beside the view from above."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class View:
-    """One panel: which body axes point right and down on paper, and which points at the reader."""
+def drawing_svg(vehicle: AnyVehicle, *, titled: bool = True) -> str:
+    """Draw a vehicle as one self-contained SVG in three views to one scale.
 
-    title: str
-    right: int
-    down: int
-    toward_reader: Array
-    centre_px: tuple[float, float]
-    px_per_m: float
-    origin_m: float
+    Arrows and the streams around them are the jets of positive thrust, opposite to the force on the vehicle; a dot in
+    a ring is a jet toward the reader and a cross one away from the reader. What a draft does not state is left out or
+    dashed. `titled` puts the name and a line of figures on top.
 
-    def place(self, point_B_m: Array) -> tuple[float, float]:
-        """Page coordinates of a point of the body."""
-        cx, cy = self.centre_px
-        return (
-            cx + (float(point_B_m[self.right]) - self.origin_m) * self.px_per_m,
-            cy + float(point_B_m[self.down]) * self.px_per_m,
-        )
-
-    def direction(self, vector_B: Array) -> tuple[float, float]:
-        """Page components of a direction of the body, shortened by perspective."""
-        return float(vector_B[self.right]), float(vector_B[self.down])
-
-
-def drawing_svg(vehicle: Vehicle) -> str:
-    """Draw a vehicle as one self-contained SVG, from above and from starboard, to one scale.
-
-    Arrows are the jets of positive thrust, opposite to the force on the vehicle; a dot in a ring is a jet toward the
-    reader and a cross one away from the reader.
+    Raises
+    ------
+    InputError
+        If the vehicle has no thruster places, that is, only a matrix.
     """
-    views = _views(vehicle)
+    draft = as_draft(vehicle)
+    if not draft.thrusters:
+        raise InputError(f"drawing of {draft.name}: its file holds a matrix but no places of thrusters")
+    sizes = _sizes(draft)
+    heading = _heading(draft) if titled else []
+    top = MARGIN + 18.0 * len(heading) + (14.0 if heading else 0.0)
+    views, height, cell = _views(draft, sizes, top)
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:.0f} {HEIGHT:.0f}" role="img" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:.0f} {height:.0f}" role="img" '
         f'font-family="system-ui, -apple-system, Segoe UI, Roboto, sans-serif" font-size="12" fill="{INK}">',
-        f"<title>{escape(vehicle.title)}, seen from above and from starboard</title>",
-        f'<rect width="{WIDTH:.0f}" height="{HEIGHT:.0f}" fill="#ffffff"/>',
-        _text(24, 32, vehicle.title, size=18, weight=600),
-        _text(24, 52, _summary(vehicle), colour=MUTED),
+        f"<title>{escape(draft.title)}, seen from above, from starboard and from ahead</title>",
+        f'<rect width="{WIDTH:.0f}" height="{height:.0f}" fill="#ffffff"/>',
     ]
-    for view in views:
-        parts += _panel(vehicle, view)
-    parts += [_scale_bar(views[0]), _legend(), "</svg>"]
+    for line, (words, size, weight, colour) in enumerate(heading):
+        parts.append(text(MARGIN, MARGIN + 14.0 + 18.0 * line, words, size=size, weight=weight, colour=colour))
+    for number, view in enumerate(views):
+        parts += _panel(draft, view, sizes, number)
+    parts += [*_legend(draft, sizes, cell, views[0].px_per_m), "</svg>"]
     return "\n".join(parts) + "\n"
 
 
-def _views(vehicle: Vehicle) -> tuple[View, View]:
-    jet_m = JET_LENGTH_DISKS * _disk_m(vehicle)
-    reach = np.abs(vehicle.thruster_positions_B_m).max(axis=0) + 0.75 * jet_m
-    half = np.maximum(0.5 * vehicle.size_m, reach)
-    cone_m = _cone_length(vehicle)
-    front = max(float(half[0]), float(vehicle.X_BC.p_m[0]) + cone_m)
-    origin_m = 0.5 * (front - float(half[0]))
-    room_px = (0.5 * WIDTH - 48.0, HEIGHT - TOP - BOTTOM - 40.0)
-    scale = min(room_px[0] / (front + float(half[0])), room_px[1] / (2.0 * max(float(half[1]), float(half[2]))))
-    middle = TOP + 20.0 + 0.5 * (HEIGHT - TOP - BOTTOM - 20.0)
-    return (
-        View(
-            title="From above",
-            right=0,
-            down=1,
-            toward_reader=np.array([0.0, 0.0, -1.0]),
-            centre_px=(0.25 * WIDTH, middle),
-            px_per_m=scale,
-            origin_m=origin_m,
-        ),
-        View(
-            title="From starboard",
-            right=0,
-            down=2,
-            toward_reader=np.array([0.0, 1.0, 0.0]),
-            centre_px=(0.75 * WIDTH, middle),
-            px_per_m=scale,
-            origin_m=origin_m,
-        ),
+def _heading(draft: VehicleDraft) -> list[tuple[str, int, int, str]]:
+    lines = [(draft.title, 19, 650, INK), (_summary(draft), 12, 400, MUTED), (actuation(draft), 12, 400, MUTED)]
+    if draft.missing:
+        stated = textwrap.wrap(f"Not stated by its file: {', '.join(draft.missing)}.", 150)
+        lines += [(line, 12, 400, "#b4232c") for line in stated]
+    return lines
+
+
+def _summary(draft: VehicleDraft) -> str:
+    said = []
+    if draft.size_m is not None:
+        said.append(" x ".join(f"{1000.0 * s:.0f}" for s in draft.size_m) + " mm")
+    if draft.mass_kg is not None:
+        said.append(f"{draft.mass_kg:g} kg")
+    said.append(f"{len(draft.thrusters)} thrusters")
+    limits = draft.thrust_limits_N
+    if limits is not None:
+        said.append(f"up to {limits[1].max():g} N forward and {-limits[0].min():g} N reverse each")
+    return ", ".join(said)
+
+
+def _sizes(draft: VehicleDraft) -> Sizes:
+    half = hull_half_m(draft)
+    areas = [t.disk_area_m2 for t in draft.thrusters if t.disk_area_m2 is not None]
+    disk = 2.0 * math.sqrt(max(areas) / math.pi) if areas else 0.16 * float(half[:2].min())
+    return Sizes(
+        disk_m=disk,
+        disk_stated=len(areas) == len(draft.thrusters),
+        jet_m=max(1.6 * disk, 0.42 * float(half[0])),
+        cone_m=0.5 * float(half[0]),
     )
 
 
-def _panel(vehicle: Vehicle, view: View) -> list[str]:
-    left = view.centre_px[0] - 0.25 * WIDTH
-    parts = [
-        f'<rect x="{left + 16:.1f}" y="{TOP - 16:.1f}" width="{0.5 * WIDTH - 32:.1f}" '
-        f'height="{HEIGHT - TOP - BOTTOM + 16:.1f}" rx="8" fill="none" stroke="{FRAME}"/>',
-        _text(left + 30, TOP + 6, view.title, weight=600),
-    ]
-    length, breadth = float(vehicle.size_m[view.right]), float(vehicle.size_m[view.down])
-    corner = np.zeros(3)
-    corner[view.right], corner[view.down] = -0.5 * length, -0.5 * breadth
-    x, y = view.place(corner)
-    parts.append(
-        f'<rect x="{x:.1f}" y="{y:.1f}" width="{length * view.px_per_m:.1f}" height="{breadth * view.px_per_m:.1f}" '
-        f'rx="10" fill="{HULL}" stroke="{MUTED}" stroke-width="1.2"/>'
-    )
-    parts += _camera(vehicle, view)
-    # Furthest from the reader first, so that near thrusters lie on top.
-    order = np.argsort(vehicle.thruster_positions_B_m @ view.toward_reader, kind="stable")
-    labels: dict[tuple[int, int], list[int]] = {}
-    for index in order:
-        parts += _thruster(vehicle, view, int(index))
-        labels.setdefault(_label_place(vehicle, view, int(index)), []).append(int(index) + 1)
-    for (px, py), numbers in labels.items():
-        parts += _label(px, py, "·".join(str(n) for n in sorted(numbers)))
-    parts += _centres(vehicle, view) if view.down == 2 else []
-    parts += _axes(view, left + 40, HEIGHT - BOTTOM - 46)
-    return parts
+def _views(
+    draft: VehicleDraft, sizes: Sizes, top: float
+) -> tuple[list[View], float, tuple[float, float, float, float]]:
+    """Three panels to one scale, the page's height, and the box that is left for the legend."""
+    low, high = _extent(draft, sizes)
+    span = high - low
+    scale = (WIDTH - 2.0 * MARGIN - GAP - 4.0 * PAD) / float(span[0] + span[1])
+    scale = min(scale, (TALLEST - GAP - 2.0 * (HEAD + PAD)) / float(span[1] + span[2]))
+    scale = min(scale, (WIDTH - 2.0 * MARGIN - GAP - 2.0 * PAD - NARROWEST_CELL) / float(span[0]))
+    right_width = max(NARROWEST_CELL, span[1] * scale + 2.0 * PAD)
+    left_width = WIDTH - 2.0 * MARGIN - GAP - right_width
+    upper, lower = span[1] * scale + HEAD + PAD, span[2] * scale + HEAD + PAD
+    right, down = MARGIN + left_width + GAP, top + upper + GAP
+    x, y, z = np.eye(3)
 
-
-def _thruster(vehicle: Vehicle, view: View, index: int) -> list[str]:
-    thruster = vehicle.thrusters[index]
-    x, y = view.place(thruster.p_BT_m)
-    radius_px = math.sqrt(thruster.disk_area_m2 / math.pi) * view.px_per_m
-    jet_B = -thruster.axis_B
-    dx, dy = view.direction(jet_B)
-    seen = math.hypot(dx, dy)
-    if seen < FACE_ON:
-        toward = float(jet_B @ view.toward_reader) > 0.0
-        ring = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius_px:.1f}" fill="#ffffff" stroke="{INK}" stroke-width="2"/>'
-        r = 0.25 * radius_px
-        dot = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{r:.1f}" fill="{JET}"/>'
-        strokes = f"M{x - r:.1f} {y - r:.1f}l{2 * r:.1f} {2 * r:.1f}m0 {-2 * r:.1f}l{-2 * r:.1f} {2 * r:.1f}"
-        cross = f'<path d="{strokes}" stroke="{JET}" stroke-width="2"/>'
-        return [ring, dot if toward else cross]
-    ux, uy = dx / seen, dy / seen
-    length = JET_LENGTH_DISKS * 2.0 * radius_px * seen
-    # A round jet widens by about 11 degrees to each side of its axis.
-    spread = 0.6 * radius_px + 0.2 * length
-    tip_x, tip_y = x + length * ux, y + length * uy
-    head = 7.0
-    half_disk = max(radius_px, 6.0)
-    # A disk whose axis leans out of the page shows as an ellipse.
-    flat = max(half_disk * math.sqrt(max(0.0, 1.0 - seen * seen)), 3.0)
-    angle = math.degrees(math.atan2(uy, ux))
-    return [
-        f'<path d="M{x - 0.6 * radius_px * uy:.1f} {y + 0.6 * radius_px * ux:.1f}'
-        f"L{tip_x - spread * uy:.1f} {tip_y + spread * ux:.1f}"
-        f"L{tip_x + spread * uy:.1f} {tip_y - spread * ux:.1f}"
-        f'L{x + 0.6 * radius_px * uy:.1f} {y - 0.6 * radius_px * ux:.1f}Z" fill="{JET}" fill-opacity="0.13"/>',
-        f'<path d="M{x:.1f} {y:.1f}L{tip_x - head * ux:.1f} {tip_y - head * uy:.1f}" stroke="{JET}" stroke-width="2"/>',
-        f'<path d="M{tip_x:.1f} {tip_y:.1f}L{tip_x - head * ux - 0.55 * head * uy:.1f} '
-        f"{tip_y - head * uy + 0.55 * head * ux:.1f}L{tip_x - head * ux + 0.55 * head * uy:.1f} "
-        f'{tip_y - head * uy - 0.55 * head * ux:.1f}Z" fill="{JET}"/>',
-        f'<ellipse cx="{x:.1f}" cy="{y:.1f}" rx="{flat:.1f}" ry="{half_disk:.1f}" fill="#ffffff" stroke="{INK}" '
-        f'stroke-width="2" transform="rotate({angle:.1f} {x:.1f} {y:.1f})"/>',
-    ]
-
-
-def _label_place(vehicle: Vehicle, view: View, index: int) -> tuple[int, int]:
-    """Where the number goes: behind the disk as its jet sees it, or beside a ring, toward the middle."""
-    thruster = vehicle.thrusters[index]
-    x, y = view.place(thruster.p_BT_m)
-    dx, dy = view.direction(thruster.axis_B)
-    seen = math.hypot(dx, dy)
-    if seen >= FACE_ON:
-        return round(x + 15.0 * dx / seen), round(y + 15.0 * dy / seen)
-    radius_px = math.sqrt(thruster.disk_area_m2 / math.pi) * view.px_per_m
-    return round(x + math.copysign(radius_px + 12.0, view.centre_px[0] - x)), round(y)
-
-
-def _label(x: float, y: float, text: str) -> list[str]:
-    width = 9.0 + 6.5 * len(text)
-    return [
-        f'<rect x="{x - 0.5 * width:.1f}" y="{y - 8:.1f}" width="{width:.1f}" height="16" rx="8" fill="{INK}"/>',
-        _text(x, y + 4, text, colour="#ffffff", size=11, weight=600, anchor="middle"),
-    ]
-
-
-def _camera(vehicle: Vehicle, view: View) -> list[str]:
-    eye = vehicle.X_BC.p_m
-    R_BC = vehicle.X_BC.R
-    x, y = view.place(eye)
-    reach = _cone_length(vehicle)
-    parts = []
-    if view.down == 1:
-        half = math.tan(0.5 * vehicle.camera_fov_rad)
-        corners = [view.place(eye + reach * (R_BC[:, 2] + side * half * R_BC[:, 0])) for side in (-1.0, 1.0)]
-        parts.append(
-            f'<path d="M{x:.1f} {y:.1f}L{corners[0][0]:.1f} {corners[0][1]:.1f}L{corners[1][0]:.1f} '
-            f'{corners[1][1]:.1f}Z" fill="{LENS}" fill-opacity="0.18" stroke="{LENS}" stroke-opacity="0.6"/>'
+    def panel(
+        title: str, right_B: Array, down_B: Array, toward_B: Array, box: tuple[float, float, float, float]
+    ) -> View:
+        middle = 0.5 * (low + high)
+        return View(
+            title=title,
+            right_B=right_B,
+            down_B=down_B,
+            toward_B=toward_B,
+            origin_px=(
+                box[0] + 0.5 * box[2] - float(right_B @ middle) * scale,
+                box[1] + HEAD + 0.5 * (box[3] - HEAD - PAD) - float(down_B @ middle) * scale,
+            ),
+            box_px=box,
+            px_per_m=scale,
         )
-    end_x, end_y = view.place(eye + reach * R_BC[:, 2])
-    parts += [
-        f'<path d="M{x:.1f} {y:.1f}L{end_x:.1f} {end_y:.1f}" stroke="{LENS}" stroke-width="1.5" '
-        'stroke-dasharray="6 4"/>',
-        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="6" fill="{LENS}" stroke="{INK}" stroke-width="1.5"/>',
+
+    views = [
+        panel("From above", x, y, -z, (MARGIN, top, left_width, upper)),
+        panel("From starboard", x, z, y, (MARGIN, down, left_width, lower)),
+        panel("From ahead", -y, z, x, (right, down, right_width, lower)),
     ]
+    return views, down + lower + MARGIN, (right, top, right_width, upper)
+
+
+def _extent(draft: VehicleDraft, sizes: Sizes) -> tuple[Array, Array]:
+    """Lowest and highest body coordinates that the drawing must show, with room for labels."""
+    half = hull_half_m(draft)
+    points = [half, -half]
+    for thruster in draft.thrusters:
+        wide = 0.5 * sizes.disk_m * 1.6
+        points += [thruster.p_BT_m + wide, thruster.p_BT_m - wide, thruster.p_BT_m - sizes.jet_m * thruster.axis_B]
+    if draft.X_BC is not None:
+        points.append(draft.X_BC.p_m + sizes.cone_m * draft.X_BC.R[:, 2])
+    low, high = np.min(points, axis=0), np.max(points, axis=0)
+    # Symmetric sideways, so that the middle of the vehicle is the middle of the panel.
+    reach = max(float(high[1]), float(-low[1]))
+    low[1], high[1] = -reach, reach
+    edge = 0.04 * float((high - low).max())
+    return low - edge, high + edge
+
+
+def _panel(draft: VehicleDraft, view: View, sizes: Sizes, number: int) -> list[str]:
+    left, top, width, height = view.box_px
+    parts = [
+        f'<rect x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}" rx="10" fill="#ffffff" '
+        f'stroke="{FRAME}"/>',
+        text(left + 14, top + 21, view.title, weight=600, size=13),
+        *_axes(view, left + width - 62, top + 16),
+    ]
+    half = hull_half_m(draft)
+    x, y = view.origin_px
+    across = float(np.abs(view.right_B) @ half) * view.px_per_m
+    along = float(np.abs(view.down_B) @ half) * view.px_per_m
+    dash = "" if draft.size_m is not None else ' stroke-dasharray="5 4"'
+    parts.append(
+        f'<rect x="{x - across:.1f}" y="{y - along:.1f}" width="{2 * across:.1f}" height="{2 * along:.1f}" rx="12" '
+        f'fill="{HULL}" stroke="#9fb0bf" stroke-width="1.2"{dash}/>'
+    )
+    parts += camera_marks(draft, view, sizes)
+    # Furthest from the reader first, so that near thrusters lie on top.
+    order = np.argsort([float(t.p_BT_m @ view.toward_B) for t in draft.thrusters], kind="stable")
+    labels: dict[tuple[int, int], list[int]] = {}
+    for index in map(int, order):
+        parts += thruster_marks(draft, view, index, sizes, f"jet-{number}-{index}")
+        labels.setdefault(label_place(draft, view, index, sizes), []).append(index + 1)
+    parts += centre_marks(draft, view)
+    for (px, py), numbers in labels.items():
+        parts += badge(px, py, "·".join(str(n) for n in sorted(numbers)))
     return parts
-
-
-def _centres(vehicle: Vehicle, view: View) -> list[str]:
-    gx, gy = view.place(vehicle.p_BG_m)
-    bx, by = view.place(vehicle.p_BB_m)
-    return [
-        f'<circle cx="{gx:.1f}" cy="{gy:.1f}" r="4" fill="{INK}"/>',
-        f'<circle cx="{bx:.1f}" cy="{by:.1f}" r="4" fill="#ffffff" stroke="{INK}" stroke-width="1.5"/>',
-    ]
 
 
 def _axes(view: View, x: float, y: float) -> list[str]:
-    names = "xyz"
+    """Which body axes the panel shows, as a small corner; a negative axis points the other way."""
+    across, down = int(np.argmax(np.abs(view.right_B))), int(np.argmax(np.abs(view.down_B)))
+    sign = float(np.sign(view.right_B[across]))
+    corner = x if sign > 0.0 else x + 24.0
     return [
-        f'<path d="M{x:.1f} {y:.1f}h26m-5 -3l5 3l-5 3M{x:.1f} {y:.1f}v26m-3 -5l3 5l3 -5" fill="none" '
-        f'stroke="{MUTED}" stroke-width="1.3"/>',
-        _text(x + 31, y + 4, f"{names[view.right]} (fore)", colour=MUTED, size=11),
-        _text(
-            x + 5, y + 32, f"{names[view.down]} ({'starboard' if view.down == 1 else 'down'})", colour=MUTED, size=11
-        ),
+        arrow(corner, y, corner + 24.0 * sign, y, MUTED, head=5.0),
+        arrow(corner, y, corner, y + 24.0, MUTED, head=5.0),
+        text(corner + 32.0 * sign, y + 4, "xyz"[across], colour=MUTED, size=11, anchor="middle"),
+        text(corner - 10.0 * sign, y + 24, "xyz"[down], colour=MUTED, size=11, anchor="middle"),
     ]
 
 
-def _scale_bar(view: View) -> str:
-    length = 0.1 * view.px_per_m
-    x, y = WIDTH - 40.0 - length, HEIGHT - 24.0
-    return (
-        f'<path d="M{x:.1f} {y - 4:.1f}v8m0 -4h{length:.1f}m0 -4v8" fill="none" stroke="{INK}" stroke-width="1.5"/>'
-        + _text(x - 10, y + 4, "100 mm", colour=MUTED, size=11, anchor="end")
-    )
+def _legend(draft: VehicleDraft, sizes: Sizes, box: tuple[float, float, float, float], px_per_m: float) -> list[str]:
+    left, top, _, height = box
+    x = left + 20.0
+    ring = f'<circle cx="{x:.1f}" cy="{{y:.1f}}" r="7" fill="#ffffff" stroke="{INK}" stroke-width="1.5"/>'
+    rows: list[tuple[Callable[[float], str], str]] = [
+        (lambda y: arrow(x - 12, y, x + 14, y, JET), "jet of positive thrust (the water's way)"),
+        (
+            lambda y: ring.format(y=y) + f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.4" fill="{JET}"/>',
+            "jet toward you",
+        ),
+        (
+            lambda y: (
+                ring.format(y=y) + f'<path d="M{x - 3:.1f} {y - 3:.1f}l6 6m0 -6l-6 6" stroke="{JET}" stroke-width="2"/>'
+            ),
+            "jet away from you",
+        ),
+    ]
+    if draft.X_BC is not None:
+        fov = "" if draft.camera_fov_rad is None else f", {math.degrees(draft.camera_fov_rad):.0f} degrees across"
+        rows.append((lambda y: camera_mark(x, y), f"camera{fov}"))
+    if draft.p_BG_m is not None:
+        rows.append((lambda y: gravity_mark(x, y), "centre of gravity"))
+    if draft.p_BB_m is not None:
+        rows.append((lambda y: buoyancy_mark(x, y), "centre of buoyancy"))
+    dashed = [
+        word for word, stated in (("size", draft.size_m is not None), ("propellers", sizes.disk_stated)) if not stated
+    ]
+    if dashed:
+        line = f'<path d="M{x - 12:.1f} {{y:.1f}}h26" stroke="{INK}" stroke-width="1.5" stroke-dasharray="4 3"/>'
+        rows.append((lambda y: line.format(y=y), f"{' and '.join(dashed)} not stated, drawn to show"))
+    step = min(25.0, (height - 80.0) / len(rows))
+    parts = []
+    for row, (mark, words) in enumerate(rows):
+        y = top + 30.0 + row * step
+        parts += [mark(y), text(x + 28, y + 4, words, colour=MUTED)]
+    return [*parts, *_scale_bar(x - 12, top + height - 16.0, px_per_m)]
 
 
-def _legend() -> str:
-    y = HEIGHT - 24.0
-    return (
-        f'<path d="M24 {y:.1f}h22" stroke="{JET}" stroke-width="2"/><path d="M52 {y:.1f}l-7 -4v8z" fill="{JET}"/>'
-        + _text(60, y + 4, "jet of positive thrust (dot: toward you, cross: away)", colour=MUTED, size=11)
-        + f'<circle cx="368" cy="{y:.1f}" r="5" fill="{LENS}" stroke="{INK}" stroke-width="1.2"/>'
-        + _text(379, y + 4, "camera, horizontal view", colour=MUTED, size=11)
-        + f'<circle cx="536" cy="{y:.1f}" r="4" fill="{INK}"/>'
-        + _text(546, y + 4, "centre of gravity", colour=MUTED, size=11)
-        + f'<circle cx="662" cy="{y:.1f}" r="4" fill="#ffffff" stroke="{INK}" stroke-width="1.5"/>'
-        + _text(672, y + 4, "of buoyancy", colour=MUTED, size=11)
-    )
-
-
-def _summary(vehicle: Vehicle) -> str:
-    size = " x ".join(f"{1000.0 * s:.0f}" for s in vehicle.size_m)
-    forward, reverse = float(vehicle.thrust_upper_N.max()), float(-vehicle.thrust_lower_N.min())
-    return (
-        f"{size} mm, {vehicle.mass_kg:g} kg, {len(vehicle.thrusters)} thrusters, "
-        f"up to {forward:g} N forward and {reverse:g} N reverse each"
-    )
-
-
-def _cone_length(vehicle: Vehicle) -> float:
-    return 0.3 * float(vehicle.size_m[0])
-
-
-def _disk_m(vehicle: Vehicle) -> float:
-    return 2.0 * math.sqrt(float(vehicle.disk_areas_m2.max()) / math.pi)
-
-
-def _text(
-    x: float, y: float, text: str, *, colour: str = INK, size: int = 12, weight: int = 400, anchor: str = "start"
-) -> str:
-    return (
-        f'<text x="{x:.1f}" y="{y:.1f}" fill="{colour}" font-size="{size}" font-weight="{weight}" '
-        f'text-anchor="{anchor}">{escape(text)}</text>'
-    )
+def _scale_bar(x: float, y: float, px_per_m: float) -> list[str]:
+    """A bar of 1, 2 or 5 times a power of ten, 60 to 150 pixels long."""
+    wanted_m = 60.0 / px_per_m
+    power = 10.0 ** math.floor(math.log10(wanted_m))
+    length_m = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= wanted_m)
+    length = length_m * px_per_m
+    said = f"{1000.0 * length_m:.0f} mm" if length_m < 1.0 else f"{length_m:g} m"
+    return [
+        f'<path d="M{x:.1f} {y - 4:.1f}v8m0 -4h{length:.1f}m0 -4v8" fill="none" stroke="{INK}" stroke-width="1.5"/>',
+        text(x + length + 10, y + 4, said, colour=MUTED),
+    ]

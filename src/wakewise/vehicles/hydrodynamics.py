@@ -42,14 +42,9 @@ class Hydrodynamics:
 
     def __post_init__(self) -> None:
         freeze(self, added_mass=(6, 6), linear_damping=(6, 6), quadratic_damping=(6, 6))
-        scale = float(np.abs(self.added_mass).max())
-        if not np.allclose(self.added_mass, self.added_mass.T, rtol=0.0, atol=1e-9 * scale):
-            raise InputError("added_mass: not symmetric, it must equal its transpose")
-        _require_semidefinite("added_mass", self.added_mass)
-        _require_semidefinite("linear_damping", 0.5 * (self.linear_damping + self.linear_damping.T))
-        diagonal = np.diag(self.quadratic_damping)
-        if np.any(self.quadratic_damping != np.diag(diagonal)) or np.any(diagonal < 0.0):
-            raise InputError(f"quadratic_damping: diagonal {diagonal.tolist()}, must be diagonal and at least 0")
+        require_added_mass(self.added_mass)
+        require_linear_damping(self.linear_damping)
+        require_quadratic_damping(self.quadratic_damping)
 
     @classmethod
     def diagonal(cls, *, added_mass: Array, linear_damping: Array, quadratic_damping: Array) -> Hydrodynamics:
@@ -59,6 +54,26 @@ class Hydrodynamics:
             linear_damping=np.diag(linear_damping),
             quadratic_damping=np.diag(quadratic_damping),
         )
+
+
+def require_added_mass(matrix: Array) -> None:
+    """Refuse an added mass, shape (6, 6), that is not symmetric and positive semidefinite."""
+    scale = float(np.abs(matrix).max())
+    if not np.allclose(matrix, matrix.T, rtol=0.0, atol=1e-9 * scale):
+        raise InputError("added_mass: not symmetric, it must equal its transpose")
+    _require_semidefinite("added_mass", matrix)
+
+
+def require_linear_damping(matrix: Array) -> None:
+    """Refuse a linear damping, shape (6, 6), that could feed energy to the vehicle."""
+    _require_semidefinite("linear_damping", 0.5 * (matrix + matrix.T))
+
+
+def require_quadratic_damping(matrix: Array) -> None:
+    """Refuse a quadratic damping, shape (6, 6), that is not diagonal or has a negative entry."""
+    diagonal = np.diag(matrix)
+    if np.any(matrix != np.diag(diagonal)) or np.any(diagonal < 0.0):
+        raise InputError(f"quadratic_damping: diagonal {diagonal.tolist()}, must be diagonal and at least 0")
 
 
 def _require_semidefinite(name: str, matrix: Array) -> None:

@@ -1,192 +1,40 @@
-"""Vehicle files: one YAML file per cited parameter set, checked on reading."""
+"""Vehicle files: one YAML file per cited parameter set, checked on reading and written back."""
 
 from __future__ import annotations
 
+import functools
 import math
 from importlib import resources
 from pathlib import Path
-from typing import Annotated
+from typing import Any
 
 import numpy as np
 import yaml
-from pydantic import Field, ValidationError
+from pydantic import ValidationError
 
+from wakewise.arrays import Array
 from wakewise.errors import InputError
-from wakewise.geometry import Pose, matrix_from_quat, quat_from_euler
-from wakewise.settings import Settings
-from wakewise.vehicles.hydrodynamics import Hydrodynamics
-from wakewise.vehicles.thruster import Thruster
-from wakewise.vehicles.vehicle import Provenance, Vehicle
-
-R_BODY_CAMERA = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-"""Axes of a camera (OpenCV) that looks along the body's x axis with its image upright, expressed in B."""
-
-Three = Annotated[list[float], Field(min_length=3, max_length=3)]
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
-NotNegativeThree = Annotated[list[NotNegative], Field(min_length=3, max_length=3)]
-PositiveThree = Annotated[list[Positive], Field(min_length=3, max_length=3)]
-Text = Annotated[str, Field(min_length=1)]
+from wakewise.geometry import euler_from_quat, quat_from_matrix
+from wakewise.vehicles.draft import ThrusterDraft, VehicleDraft
+from wakewise.vehicles.vehicle import Vehicle
+from wakewise.vehicles.vehicle_file import R_BODY_CAMERA, VehicleFile
 
 
-class Group(Settings):
-    """Any group of numbers: where they come from, and whether they are an estimate."""
-
-    source: Text = Field(description="where the numbers come from")
-    estimate: bool = Field(default=False, description="true if nobody published or measured these numbers")
-
-
-class Body(Group):
-    """Size and mass of the vehicle."""
-
-    size_m: PositiveThree = Field(description="length, width, height of the box around it, centred on the origin")
-    mass_kg: Positive = Field(description="mass in air, flooded parts filled")
-
-
-class Inertia(Group):
-    """Moments and products of inertia about the centre of gravity."""
-
-    moments_kg_m2: PositiveThree = Field(description="Ixx, Iyy, Izz")
-    products_kg_m2: Three = Field(default=[0.0, 0.0, 0.0], description="elements xy, xz, yz of the matrix")
-
-
-class Buoyancy(Group):
-    """Displaced volume and the two centres."""
-
-    displaced_volume_m3: Positive
-    centre_of_gravity_m: Three
-    centre_of_buoyancy_m: Three
-
-
-class AddedMass(Group):
-    """Diagonal of the added mass: surge, sway, heave, roll, pitch, yaw."""
-
-    translation_kg: NotNegativeThree
-    rotation_kg_m2: NotNegativeThree
-
-
-class Damping(Group):
-    """Diagonals of the damping, as positive magnitudes."""
-
-    linear_N_s_m: NotNegativeThree
-    linear_N_m_s: NotNegativeThree
-    quadratic_N_s2_m2: NotNegativeThree
-    quadratic_N_m_s2: NotNegativeThree
-
-
-class ThrusterLimits(Group):
-    """What all thrusters of the vehicle can do."""
-
-    max_forward_N: Positive
-    max_reverse_N: NotNegative = Field(description="positive magnitude")
-
-
-class ThrusterDisk(Group):
-    """The propeller's disk."""
-
-    diameter_m: Positive
-
-
-class ThrusterLag(Group):
-    """How fast thrust follows its command."""
-
-    time_constant_s: NotNegative
-
-
-class Mount(Settings):
-    """One thruster's place."""
-
-    name: Text
-    position_m: Three = Field(description="disk centre from the body origin, FRD")
-    axis: Three = Field(description="direction of the force on the vehicle for positive thrust (no unit)")
-
-
-class Layout(Group):
-    """Where the thrusters are."""
-
-    mounts: Annotated[list[Mount], Field(min_length=1)]
-
-
-class CameraMount(Group):
-    """Where the camera sits and looks."""
-
-    position_m: Three = Field(description="centre of projection from the body origin, FRD")
-    roll_pitch_yaw_deg: Three = Field(description="turn of the camera; zeros look along the body's x axis, upright")
-
-
-class CameraLens(Group):
-    """What the camera sees."""
-
-    horizontal_fov_deg: Annotated[float, Field(gt=1.0, lt=170.0)] = Field(description="field of view in water")
-
-
-class VehicleFile(Settings):
-    """A vehicle file, whole."""
-
-    title: Text
-    source: Text
-    does_not_claim: Text
-    body: Body
-    inertia: Inertia
-    buoyancy: Buoyancy
-    added_mass: AddedMass
-    damping: Damping
-    thruster_limits: ThrusterLimits
-    thruster_disk: ThrusterDisk
-    thruster_lag: ThrusterLag
-    thruster_layout: Layout
-    camera_mount: CameraMount
-    camera_lens: CameraLens
-
-    def vehicle(self, name: str) -> Vehicle:
-        """Turn the file's numbers into the record that the rest of the program uses."""
-        xx, yy, zz = self.inertia.moments_kg_m2
-        xy, xz, yz = self.inertia.products_kg_m2
-        damping, added, limits = self.damping, self.added_mass, self.thruster_limits
-        turn = matrix_from_quat(quat_from_euler(*np.deg2rad(self.camera_mount.roll_pitch_yaw_deg)))
-        groups = [(field, getattr(self, field)) for field in type(self).model_fields]
-        return Vehicle(
-            name=name,
-            title=self.title,
-            source=self.source,
-            does_not_claim=self.does_not_claim,
-            size_m=np.array(self.body.size_m),
-            mass_kg=self.body.mass_kg,
-            inertia_kg_m2=np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]),
-            displaced_volume_m3=self.buoyancy.displaced_volume_m3,
-            p_BG_m=np.array(self.buoyancy.centre_of_gravity_m),
-            p_BB_m=np.array(self.buoyancy.centre_of_buoyancy_m),
-            hydrodynamics=Hydrodynamics.diagonal(
-                added_mass=np.array([*added.translation_kg, *added.rotation_kg_m2]),
-                linear_damping=np.array([*damping.linear_N_s_m, *damping.linear_N_m_s]),
-                quadratic_damping=np.array([*damping.quadratic_N_s2_m2, *damping.quadratic_N_m_s2]),
-            ),
-            thrusters=tuple(
-                Thruster(
-                    name=mount.name,
-                    p_BT_m=np.array(mount.position_m),
-                    axis_B=np.array(mount.axis),
-                    max_forward_N=limits.max_forward_N,
-                    max_reverse_N=limits.max_reverse_N,
-                    disk_area_m2=0.25 * math.pi * self.thruster_disk.diameter_m**2,
-                    time_constant_s=self.thruster_lag.time_constant_s,
-                )
-                for mount in self.thruster_layout.mounts
-            ),
-            X_BC=Pose.from_matrix(turn @ R_BODY_CAMERA, self.camera_mount.position_m),
-            camera_fov_rad=math.radians(self.camera_lens.horizontal_fov_deg),
-            provenance=tuple(
-                Provenance(group=field, source=group.source, estimate=group.estimate)
-                for field, group in groups
-                if isinstance(group, Group)
-            ),
-        )
-
-
-def vehicle_names() -> list[str]:
-    """Names of the vehicles that come with the package, sorted."""
+@functools.cache
+def draft_names() -> tuple[str, ...]:
+    """Names of all vehicles that come with the package, whole or not, sorted."""
     folder = resources.files("wakewise.vehicles") / "library_data"
-    return sorted(entry.name.removesuffix(".yaml") for entry in folder.iterdir() if entry.name.endswith(".yaml"))
+    return tuple(sorted(e.name.removesuffix(".yaml") for e in folder.iterdir() if e.name.endswith(".yaml")))
+
+
+@functools.cache
+def _flyable_names() -> tuple[str, ...]:
+    return tuple(name for name in draft_names() if not load_draft(name).missing)
+
+
+def vehicle_names(*, flyable_only: bool = True) -> list[str]:
+    """Names of the vehicles that come with the package, sorted; by default only those whose file holds all of one."""
+    return list(_flyable_names() if flyable_only else draft_names())
 
 
 def load_vehicle(name_or_path: str) -> Vehicle:
@@ -195,14 +43,29 @@ def load_vehicle(name_or_path: str) -> Vehicle:
     Raises
     ------
     InputError
-        If there is no such vehicle or file, or the file does not hold a usable vehicle; the message names the field.
+        If there is no such vehicle or file, the file does not hold a usable vehicle (the message names the field), or
+        it lacks something that flying needs (the message lists it).
     """
-    if name_or_path in vehicle_names():
+    draft = load_draft(name_or_path)
+    if draft.missing:
+        raise InputError(f"vehicle {name_or_path}: cannot fly, its file does not hold {', '.join(draft.missing)}")
+    return draft.vehicle()
+
+
+def load_draft(name_or_path: str) -> VehicleDraft:
+    """Read what a vehicle file says, whole or not; names and paths as for `load_vehicle`.
+
+    Raises
+    ------
+    InputError
+        If there is no such vehicle or file, or a value in it cannot be used; the message names the field.
+    """
+    if name_or_path in draft_names():
         text = (resources.files("wakewise.vehicles") / "library_data" / f"{name_or_path}.yaml").read_text("utf-8")
-        return _parse(text, f"{name_or_path}.yaml", name_or_path)
+        return parse_vehicle(text, f"{name_or_path}.yaml", name_or_path)
     path = Path(name_or_path)
     if path.suffix not in (".yaml", ".yml") and path.name == name_or_path:
-        names = ", ".join(vehicle_names())
+        names = ", ".join(draft_names())
         raise InputError(f"vehicle {name_or_path!r}: not in the library, allowed {names} or the path of a .yaml file")
     if not path.is_file():
         raise InputError(f"vehicle file {name_or_path}: no such file")
@@ -210,10 +73,19 @@ def load_vehicle(name_or_path: str) -> Vehicle:
         text = path.read_text("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"vehicle file {name_or_path}: not readable as UTF-8 text ({error})") from error
-    return _parse(text, name_or_path, path.stem)
+    return parse_vehicle(text, name_or_path, path.stem)
 
 
-def _parse(text: str, where: str, name: str) -> Vehicle:
+def parse_vehicle(text: str, where: str, name: str) -> VehicleDraft:
+    """Read the text of a vehicle file; `where` is what messages call it.
+
+    Raises
+    ------
+    InputError
+        If the text is not a vehicle file or a value in it cannot be used.
+    """
+    if text.lstrip().startswith("<"):
+        raise InputError(f"vehicle file {where}: is XML, not a vehicle file; see wakewise vehicle import")
     try:
         value = yaml.load(text, Loader=_StrictLoader)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
@@ -222,11 +94,136 @@ def _parse(text: str, where: str, name: str) -> Vehicle:
     if not isinstance(value, dict):
         raise InputError(f"vehicle file {where}: holds {type(value).__name__}, must be a mapping of groups")
     try:
-        return VehicleFile.model_validate(value).vehicle(name)
+        return VehicleFile.model_validate(value).draft(name)
     except ValidationError as error:
         raise InputError(f"vehicle file {where}: {_first_problem(error)}") from error
     except InputError as error:
         raise InputError(f"vehicle file {where}: {error}") from error
+
+
+def draft_yaml(draft: VehicleDraft) -> str:
+    """Write a draft as the text of a vehicle file that `load_draft` reads back as the same draft.
+
+    What the draft does not know is left out. A group's source is the draft's own where no provenance names the group.
+    """
+    value: dict[str, Any] = {"title": draft.title, "source": draft.source, "does_not_claim": draft.does_not_claim}
+    if draft.notes:
+        value["notes"] = list(draft.notes)
+    provenance = {p.group: p for p in draft.provenance}
+    for group, fields in _groups(draft).items():
+        stated = {name: field for name, field in fields.items() if field is not None}
+        if not stated:
+            continue
+        origin = provenance.get(group)
+        head: dict[str, Any] = {"source": draft.source if origin is None else origin.source}
+        if origin is not None and origin.estimate:
+            head["estimate"] = True
+        value[group] = head | stated
+    text = yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=116)
+    return "# Body frame FRD: x forward, y right, z down. Every field's name ends in its unit.\n" + text
+
+
+def _groups(draft: VehicleDraft) -> dict[str, dict[str, Any]]:
+    matrix, linear, quadratic = draft.added_mass, draft.linear_damping, draft.quadratic_damping
+    inertia, shipped, curve, camera = draft.inertia_kg_m2, draft.shipped_matrix, draft.curve, draft.X_BC
+    groups: dict[str, dict[str, Any]] = {
+        "body": {"size_m": _numbers(draft.size_m), "mass_kg": draft.mass_kg},
+        "inertia": {},
+        "buoyancy": {
+            "displaced_volume_m3": draft.displaced_volume_m3,
+            "centre_of_gravity_m": _numbers(draft.p_BG_m),
+            "centre_of_buoyancy_m": _numbers(draft.p_BB_m),
+        },
+        "added_mass": {},
+        "damping": {},
+        "thruster_limits": {},
+        "thruster_disk": {},
+        "thruster_lag": {},
+        "thruster_curve": {} if curve is None else {"table": curve.table, "supply_V": curve.supply_V},
+        "thruster_layout": {},
+        "shipped_matrix": {},
+        "camera_mount": {},
+        "camera_lens": {},
+    }
+    if inertia is not None:
+        groups["inertia"]["moments_kg_m2"] = _numbers(np.diag(inertia))
+        products = inertia[[0, 0, 1], [1, 2, 2]]
+        groups["inertia"]["products_kg_m2"] = _numbers(products) if products.any() else None
+    if matrix is not None:
+        groups["added_mass"] = {
+            "translation_kg": _block(matrix[:3, :3]),
+            "rotation_kg_m2": _block(matrix[3:, 3:]),
+            "coupling_kg_m": _coupling(matrix[:3, 3:]),
+        }
+    if linear is not None:
+        groups["damping"] |= {
+            "linear_N_s_m": _block(linear[:3, :3]),
+            "linear_N_m_s": _block(linear[3:, 3:]),
+            "linear_force_by_turning_N_s": _coupling(linear[:3, 3:]),
+            "linear_moment_by_moving_N_s": _coupling(linear[3:, :3]),
+        }
+    if quadratic is not None:
+        diagonal = np.diag(quadratic)
+        groups["damping"] |= {
+            "quadratic_N_s2_m2": _numbers(diagonal[:3]),
+            "quadratic_N_m_s2": _numbers(diagonal[3:]),
+        }
+    if draft.thrusters:
+        shared, mounts = _shared([_mount(t) for t in draft.thrusters])
+        groups |= shared
+        groups["thruster_layout"]["mounts"] = mounts
+    if shipped is not None:
+        groups["shipped_matrix"] = {"force_N_per_N": _numbers(shipped[:3]), "moment_N_m_per_N": _numbers(shipped[3:])}
+    if camera is not None:
+        angles = np.rad2deg(euler_from_quat(quat_from_matrix(camera.R @ R_BODY_CAMERA.T)))
+        groups["camera_mount"] = {"position_m": _numbers(camera.p_m), "roll_pitch_yaw_deg": _numbers(angles.round(12))}
+    if draft.camera_fov_rad is not None:
+        groups["camera_lens"]["horizontal_fov_deg"] = round(math.degrees(draft.camera_fov_rad), 12)
+    return groups
+
+
+def _shared(mounts: list[dict[str, Any]]) -> tuple[dict[str, dict[str, Any]], list[dict[str, Any]]]:
+    """Take what all thrusters have alike out of the mounts, into the groups that hold it for all."""
+    places = {
+        "thruster_limits": {"max_forward_N": "max_forward_N", "max_reverse_N": "max_reverse_N"},
+        "thruster_disk": {"disk_diameter_m": "diameter_m"},
+        "thruster_lag": {"time_constant_s": "time_constant_s"},
+    }
+    groups = {}
+    for group, fields in places.items():
+        if all(field in mount and mount[field] == mounts[0][field] for mount in mounts for field in fields):
+            groups[group] = {field_of_group: mounts[0][field] for field, field_of_group in fields.items()}
+            mounts = [{key: value for key, value in mount.items() if key not in fields} for mount in mounts]
+    return groups, mounts
+
+
+def _mount(thruster: ThrusterDraft) -> dict[str, Any]:
+    area = thruster.disk_area_m2
+    fields = {
+        "name": thruster.name,
+        "position_m": _numbers(thruster.p_BT_m),
+        "axis": _numbers(thruster.axis_B),
+        "max_forward_N": thruster.max_forward_N,
+        "max_reverse_N": thruster.max_reverse_N,
+        "disk_diameter_m": None if area is None else round(math.sqrt(4.0 * area / math.pi), 15),
+        "time_constant_s": thruster.time_constant_s,
+    }
+    return {name: value for name, value in fields.items() if value is not None}
+
+
+def _numbers(array: Array | None) -> Any:
+    # Adding zero turns -0.0 into 0.0.
+    return None if array is None else (np.asarray(array, dtype=np.float64) + 0.0).tolist()
+
+
+def _block(block: Array) -> Any:
+    """A diagonal where that says it all, else rows."""
+    diagonal = np.diag(block)
+    return _numbers(diagonal if np.array_equal(block, np.diag(diagonal)) and np.all(diagonal >= 0.0) else block)
+
+
+def _coupling(block: Array) -> Any:
+    return _numbers(block) if block.any() else None
 
 
 def _first_problem(error: ValidationError) -> str:
@@ -240,6 +237,21 @@ def _first_problem(error: ValidationError) -> str:
         return f"{field}: missing, it is required{more}"
     found = " ".join(repr(first["input"]).split())
     return f"{field}: found {found[:80]}, {first['msg'][0].lower()}{first['msg'][1:]}{more}"
+
+
+class _Dumper(yaml.SafeDumper):
+    """Lists of plain values on one line, mappings one field a line."""
+
+    def ignore_aliases(self, _data: Any) -> bool:
+        return True
+
+
+def _flow_list(dumper: _Dumper, value: list[Any]) -> yaml.Node:
+    flat = all(not isinstance(v, dict) for v in value) and not all(isinstance(v, list | str) for v in value)
+    return dumper.represent_sequence("tag:yaml.org,2002:seq", value, flow_style=flat)
+
+
+_Dumper.add_representer(list, _flow_list)
 
 
 class _StrictLoader(yaml.SafeLoader):

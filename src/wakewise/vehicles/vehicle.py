@@ -77,25 +77,13 @@ class Vehicle:
     def __post_init__(self) -> None:
         freeze(self, size_m=(3,), inertia_kg_m2=(3, 3), p_BG_m=(3,), p_BB_m=(3,))
         for field in ("mass_kg", "displaced_volume_m3", "camera_fov_rad"):
-            value = float(getattr(self, field))
-            if not math.isfinite(value) or value <= 0.0:
-                raise InputError(f"{field}: {value:g}, must be finite and more than 0")
-        if self.camera_fov_rad >= math.pi:
-            raise InputError(f"camera_fov_rad: {self.camera_fov_rad:g}, must be less than pi")
-        if np.any(self.size_m <= 0.0):
-            raise InputError(f"size_m: {self.size_m.tolist()}, every length must be more than 0")
-        inertia = self.inertia_kg_m2
-        lowest = float(np.linalg.eigvalsh(0.5 * (inertia + inertia.T))[0])
-        if lowest <= 0.0 or not np.allclose(inertia, inertia.T, rtol=0.0, atol=1e-9 * float(np.abs(inertia).max())):
-            raise InputError(
-                f"inertia_kg_m2: smallest eigenvalue {lowest:g}, the matrix must be symmetric and positive definite"
-            )
+            require_positive(field, getattr(self, field))
+        require_fov(self.camera_fov_rad)
+        require_size(self.size_m)
+        require_inertia(self.inertia_kg_m2)
         if not self.thrusters:
             raise InputError("thrusters: none, there must be at least one")
-        names = [t.name for t in self.thrusters]
-        twice = sorted({n for n in names if names.count(n) > 1})
-        if twice:
-            raise InputError(f"thrusters: {', '.join(twice)} named more than once, names must differ")
+        require_different_names([t.name for t in self.thrusters])
 
     @cached_property
     def allocation_matrix(self) -> Array:
@@ -143,6 +131,41 @@ class Vehicle:
         return _read_only(readable_null_space(self.allocation_matrix))
 
 
+def require_positive(field: str, value: float) -> None:
+    """Refuse a number that is not finite or not more than 0."""
+    if not math.isfinite(value) or value <= 0.0:
+        raise InputError(f"{field}: {value:g}, must be finite and more than 0")
+
+
+def require_fov(camera_fov_rad: float) -> None:
+    """Refuse a field of view that no lens with straight lines has."""
+    if not 0.0 < camera_fov_rad < math.pi:
+        raise InputError(f"camera_fov_rad: {camera_fov_rad:g}, must be more than 0 and less than pi")
+
+
+def require_size(size_m: Array) -> None:
+    """Refuse a box, shape (3,), without extent."""
+    if np.any(size_m <= 0.0):
+        raise InputError(f"size_m: {size_m.tolist()}, every length must be more than 0")
+
+
+def require_inertia(inertia_kg_m2: Array) -> None:
+    """Refuse an inertia, shape (3, 3), that is not symmetric and positive definite."""
+    lowest = float(np.linalg.eigvalsh(0.5 * (inertia_kg_m2 + inertia_kg_m2.T))[0])
+    tolerance = 1e-9 * float(np.abs(inertia_kg_m2).max())
+    if lowest <= 0.0 or not np.allclose(inertia_kg_m2, inertia_kg_m2.T, rtol=0.0, atol=tolerance):
+        raise InputError(
+            f"inertia_kg_m2: smallest eigenvalue {lowest:g}, the matrix must be symmetric and positive definite"
+        )
+
+
+def require_different_names(names: list[str]) -> None:
+    """Refuse thrusters that share a name."""
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise InputError(f"thrusters: {', '.join(twice)} named more than once, names must differ")
+
+
 def readable_null_space(matrix: Array, tolerance: float = 1e-9) -> Array:
     """Orthonormal basis of the null space of a matrix, shape (m, n), with as many exact zeros as reduction finds.
 
@@ -170,6 +193,8 @@ def readable_null_space(matrix: Array, tolerance: float = 1e-9) -> Array:
         others = np.arange(k) != done
         rows[others] -= np.outer(rows[others, column], rows[done])
         done += 1
+    # The sparsest first, since orthogonalising one vector against another fills it up.
+    rows = rows[np.argsort(np.sum(np.abs(rows) > 1e-9, axis=1), kind="stable")]
     basis = np.zeros((n, k))
     for i in range(k):
         vector = rows[i] - basis[:, :i] @ (basis[:, :i].T @ rows[i])
