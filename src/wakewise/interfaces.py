@@ -20,28 +20,39 @@ S = TypeVar("S")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BodyState:
-    """Where the vehicle is and how it moves.
+    """Where the vehicle is and how it moves, in truth or as an estimate.
 
     `nu_B` is the twist of B relative to the world (not to the water), linear then angular, expressed in B, shape (6,).
+    Of an estimate: `load_B`, shape (6,), is the wrench in B that the vehicle's model does not explain (trim, current,
+    tether), and `covariance`, shape (12, 12), that of the errors of position in W, of attitude (rotation vector in B)
+    and of `nu_B`; None where nobody computed it.
     """
 
     X_WB: Pose
     nu_B: Array = field(default_factory=lambda: np.zeros(6))
+    load_B: Array = field(default_factory=lambda: np.zeros(6))
+    covariance: Array | None = None
 
     def __post_init__(self) -> None:
-        freeze(self, nu_B=(6,))
+        freeze(self, nu_B=(6,), load_B=(6,))
+        if self.covariance is not None:
+            freeze(self, covariance=(12, 12))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Measurement:
     """What the sensors said at one instant. A sensor that was silent is None.
 
-    `X_WB` is a camera-based pose, `omega_B_rad_s` the gyro, shape (3,), `depth_m` the pressure sensor (positive down).
+    `X_WB` is a camera-based pose, `p_WB_m` a position from optical tracking, shape (3,), `omega_B_rad_s` the gyro and
+    `force_B_m_s2` the accelerometer (specific force: -g when at rest), both at the body origin, shape (3,), `depth_m`
+    the pressure sensor (positive down).
     """
 
     time_s: float
     X_WB: Pose | None = None
+    p_WB_m: Array | None = None
     omega_B_rad_s: Array | None = None
+    force_B_m_s2: Array | None = None
     depth_m: float | None = None
 
 

@@ -1,10 +1,11 @@
-"""Estimation: from camera poses, gyro and depth to where the vehicle is and how it moves.
+"""Estimation: from camera poses, tracking, an inertial unit and depth to where the vehicle is, how it moves, how sure.
 
-`PoseFilter` is a steady-state Kalman filter on the nominal vehicle's equations; `FilterSettings` states the noise that
-it assumes.
+`ErrorStateFilter` is an error-state Kalman filter on the nominal vehicle's equations; `FilterSettings` states the noise
+that it assumes. `dead_reckoned` is what is left without a camera: velocity and attitude, summed up.
 """
 
-from wakewise.estimation.pose_filter import FilterGains, FilterState, PoseFilter, filter_gains, steady_gain
+from wakewise.estimation.dead_reckoning import dead_reckoned, local_north_east_down
+from wakewise.estimation.error_state import ErrorStateFilter, FilterState
 from wakewise.estimation.settings import FilterSettings
 
-__all__ = ["FilterGains", "FilterSettings", "FilterState", "PoseFilter", "filter_gains", "steady_gain"]
+__all__ = ["ErrorStateFilter", "FilterSettings", "FilterState", "dead_reckoned", "local_north_east_down"]

@@ -1,7 +1,9 @@
-"""Compiled steps of the pose filter; see `pose_filter` for what they mean.
+"""Compiled steps of the error-state filter; see `error_state` for what they mean.
 
-The mean is one array: position in W (0:3), velocity in W (3:6), unmodelled acceleration in W (6:9), quaternion q_WB
-(9:13), body rate (13:16), gyro bias (16:19).
+`mean`, shape (25,): position in W (0:3), quaternion q_WB (3:7), twist in B (7:13), unmodelled force in W (13:16),
+unmodelled moment in B (16:19), gyro bias (19:22), accelerometer bias (22:25).
+`P`, shape (24, 24), is the covariance of the error: position in W (0:3), turn, a rotation vector in B (3:6), twist
+(6:12), force (12:15), moment (15:18), gyro bias (18:21), accelerometer bias (21:24).
 """
 
 from __future__ import annotations
@@ -10,6 +12,10 @@ import numpy as np
 from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.vehicles.runge_kutta import rk4_jacobian_kernel
+
+STATES, ERRORS, MOVING = 25, 24, 12
+"""Entries of `mean`, of its error, and of the part of the error that the equations of motion move."""
 
 
 @njit(cache=True)
@@ -53,70 +59,107 @@ def turn_between(q: Array, other: Array) -> Array:
 
 
 @njit(cache=True)
-def body_twist(mean: Array) -> Array:
-    """Twist relative to the world, expressed in B, shape (6,)."""
-    twist = np.empty(6)
-    twist[:3] = turn(mean[9:13], mean[3:6], -1.0)
-    twist[3:] = mean[13:16]
-    return twist
+def _inputs(mean: Array, wrench_B: Array, inputs: Array) -> Array:
+    """Fill what the equations of motion are given, and return the unmodelled force as seen from B, shape (3,)."""
+    load_B = turn(mean[3:7], mean[13:16], -1.0)
+    for i in range(3):
+        inputs[i] = wrench_B[i] + load_B[i]
+        inputs[3 + i] = wrench_B[3 + i] + mean[16 + i]
+        inputs[6 + i] = 0.0
+    return load_B
 
 
 @njit(cache=True)
-def predict(mean: Array, twist_rate_B: Array, dt_s: float, gyro: Array, gyro_seen: bool, gyro_gain: float) -> Array:
-    """Advance the mean in place by dt_s.
+def predict(packed: Array, mean: Array, P: Array, wrench_B: Array, dt_s: float, noise: Array) -> None:
+    """Advance mean and covariance in place by dt_s.
 
-    `twist_rate_B`, shape (6,), is the modelled rate of the body twist; `gyro` the mean of the gyro samples of the step.
-    Returns the acceleration in W, shape (3,).
+    `noise`, shape (6,), are spectral densities (amplitudes) of the errors of the modelled linear and angular
+    acceleration, and of the random walks of force, moment, gyro bias and accelerometer bias.
     """
-    q, rate = mean[9:13].copy(), mean[13:16].copy()
-    v_B = turn(q, mean[3:6], -1.0)
-    # The twist's rate is seen from the turning body: the world sees omega x v more.
-    a_B = np.array(
-        [
-            twist_rate_B[0] + rate[1] * v_B[2] - rate[2] * v_B[1],
-            twist_rate_B[1] + rate[2] * v_B[0] - rate[0] * v_B[2],
-            twist_rate_B[2] + rate[0] * v_B[1] - rate[1] * v_B[0],
-        ]
-    )
-    a_W = turn(q, a_B, 1.0)
-    for i in range(3):
-        a_W[i] += mean[6 + i]
-        a = a_W[i]
-        mean[i] += mean[3 + i] * dt_s + 0.5 * a * dt_s * dt_s
-        mean[3 + i] += a * dt_s
-        mean[13 + i] += twist_rate_B[3 + i] * dt_s
-        if gyro_seen:
-            mean[13 + i] += gyro_gain * (gyro[i] - mean[16 + i] - mean[13 + i])
-    mean[9:13] = turned_by(q, 0.5 * dt_s * (rate + mean[13:16]))
-    return a_W
+    inputs = np.empty(9)
+    load_B = _inputs(mean, wrench_B, inputs)
+    q = mean[3:7].copy()
+    A, B = np.empty((MOVING, MOVING)), np.empty((MOVING, 6))
+    rk4_jacobian_kernel(packed, mean[:13], inputs, dt_s, A, B)
+    # F = [[A + dB, E], [0, 1]]: E takes force (from W to B) and moment to the motion; a turn of the body turns the
+    # force that it sees by S(load_B).
+    F = np.zeros((MOVING, 18))
+    for i in range(MOVING):
+        for j in range(MOVING):
+            F[i, j] = A[i, j]
+        b0, b1, b2 = B[i, 0], B[i, 1], B[i, 2]
+        F[i, 3] += b1 * load_B[2] - b2 * load_B[1]
+        F[i, 4] += b2 * load_B[0] - b0 * load_B[2]
+        F[i, 5] += b0 * load_B[1] - b1 * load_B[0]
+        row = turn(q, B[i, :3].copy(), 1.0)
+        for j in range(3):
+            F[i, 12 + j] = row[j]
+            F[i, 15 + j] = B[i, 3 + j]
+    top = np.zeros((MOVING, ERRORS))
+    for i in range(MOVING):
+        for k in range(18):
+            f = F[i, k]
+            if f != 0.0:
+                for j in range(ERRORS):
+                    top[i, j] += f * P[k, j]
+    for i in range(MOVING):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(18):
+                total += top[i, k] * F[j, k]
+            P[i, j] = total
+            P[j, i] = total
+        for j in range(MOVING, ERRORS):
+            P[i, j] = top[i, j]
+            P[j, i] = top[i, j]
+    _add_noise(P, q, dt_s, noise)
 
 
 @njit(cache=True)
-def take_pose(
-    mean: Array, p_W: Array, q_WB: Array, age_s: float, move_gain: Array, turn_gain: Array, rate_gain: float, a_W: Array
-) -> None:
-    """Correct the mean in place by a pose that was true `age_s` ago.
+def _add_noise(P: Array, q: Array, dt_s: float, noise: Array) -> None:
+    linear, angular = noise[0] ** 2, noise[1] ** 2
+    for i in range(3):
+        P[i, i] += linear * dt_s**3 / 3.0
+        P[6 + i, 6 + i] += linear * dt_s
+        P[3 + i, 3 + i] += angular * dt_s**3 / 3.0
+        P[9 + i, 9 + i] += angular * dt_s
+        P[3 + i, 9 + i] += angular * dt_s**2 / 2.0
+        P[9 + i, 3 + i] += angular * dt_s**2 / 2.0
+        axis = np.zeros(3)
+        axis[i] = 1.0
+        column = turn(q, axis, 1.0)  # the body's axis i, as the world sees it
+        for j in range(3):
+            P[j, 6 + i] += column[j] * linear * dt_s**2 / 2.0
+            P[6 + i, j] += column[j] * linear * dt_s**2 / 2.0
+    for block in range(4):
+        for i in range(3):
+            k = 12 + 3 * block + i
+            P[k, k] += noise[2 + block] ** 2 * dt_s
 
-    `move_gain`, shape (3,): of position, velocity, unmodelled acceleration; `turn_gain`, shape (2,): of attitude and
-    gyro bias; `rate_gain` of the body rate (used while the gyro is silent); `a_W`, shape (3,), the acceleration since.
+
+@njit(cache=True)
+def correct(mean: Array, P: Array, H: Array, residual: Array, R: Array, gate: float) -> float:
+    """Kalman update in place by a measurement with rows H (m, 24), residual (m,) and covariance R (m, m).
+
+    Returns the squared Mahalanobis distance of the residual; where it exceeds `gate` nothing is changed.
     """
+    PH = P @ H.T
+    S = H @ PH + R
+    weighted = np.linalg.solve(S, residual)
+    distance = np.dot(residual, weighted)
+    if distance > gate:
+        return distance
+    change = PH @ weighted
+    P -= PH @ np.linalg.solve(S, np.ascontiguousarray(PH.T))
+    for i in range(ERRORS):
+        for j in range(i):
+            P[i, j] = 0.5 * (P[i, j] + P[j, i])
+            P[j, i] = P[i, j]
     for i in range(3):
-        error = p_W[i] - (mean[i] - mean[3 + i] * age_s + 0.5 * a_W[i] * age_s**2)
-        mean[i] += move_gain[0] * error
-        mean[3 + i] += move_gain[1] * error
-        mean[6 + i] += move_gain[2] * error
-    then = turned_by(mean[9:13], -age_s * mean[13:16])
-    tilt = turn_between(then, q_WB)
-    mean[9:13] = turned_by(mean[9:13], turn_gain[0] * tilt)
-    for i in range(3):
-        mean[13 + i] += rate_gain * tilt[i]
-        mean[16 + i] += turn_gain[1] * tilt[i]
-
-
-@njit(cache=True)
-def take_depth(mean: Array, depth_m: float, age_s: float, gain: Array, a_W: Array) -> None:
-    """Correct the mean in place by a depth that was true `age_s` ago; `gain` as `move_gain` of `take_pose`."""
-    error = depth_m - (mean[2] - mean[5] * age_s + 0.5 * a_W[2] * age_s**2)
-    mean[2] += gain[0] * error
-    mean[5] += gain[1] * error
-    mean[8] += gain[2] * error
+        mean[i] += change[i]
+    mean[3:7] = turned_by(mean[3:7], change[3:6])
+    for i in range(6):
+        mean[7 + i] += change[6 + i]
+    for i in range(12):
+        mean[13 + i] += change[12 + i]
+    return distance

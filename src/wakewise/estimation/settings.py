@@ -2,52 +2,72 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import Field
 
 from wakewise.settings import Settings
 
 
 class FilterSettings(Settings):
-    """Noise that the filter assumes; its gains follow from these numbers (steady-state Kalman filter).
+    """Noise that the filter assumes.
 
-    The defaults of the sensors are those of a camera pose (2 mm, 0.2 deg, 62 Hz), a low-cost gyro (JY901 class,
-    0.1 deg/s) and a pressure sensor (MS5837 class, 1 cm). The defaults of the model: commanded thrust of a few newtons
-    wrong by 10 % on 10 kg is 0.03 to 0.05 m/s2, lasting about 0.1 s: as white noise 0.05 sqrt(2 x 0.1) = 0.02
-    m/s2/sqrt(Hz); a trim or drag error of 1 N on 10 kg is 0.1 m/s2 and comes and goes within about 5 s: a random walk
-    of 0.1 / sqrt(5) = 0.045 m/s2/sqrt(s). Without a model the vehicle's own manoeuvres, 0.1 to 0.5 m/s2 for some tenths
-    of a second, are noise as well.
+    The defaults of the sensors are those of a camera pose (2 mm, 0.2 deg), of optical tracking (5 mm), a low-cost
+    inertial unit (JY901 class: 0.1 deg/s, 5 mg) and a pressure sensor (MS5837 class, 5 mm). The defaults of the model
+    are for station keeping with tenths of a newton per thruster: 5 % of 0.2 N on 10 kg is 1e-3 m/s2, lasting the 0.1 s
+    of the thruster's lag, as white noise 1e-3 sqrt(2 x 0.1) = 5e-4 m/s2/sqrt(Hz); with arms of 0.15 m on 0.1 kg m2
+    about 0.01 rad/s2/sqrt(Hz). Trim is constant, drag's error changes with speed by some 0.01 N within seconds. When
+    more happens than that, the filter notices and lets the noise grow (`error_state`).
     """
 
-    motion_model: Literal["vehicle", "constant-velocity"] = Field(
-        default="vehicle",
-        description="what moves the estimate between poses: the vehicle's equations, or its last velocity",
+    position_std_m: float = Field(default=0.002, description="noise of a pose's position, per axis", gt=0.0, le=1.0)
+    attitude_std_rad: float = Field(default=0.0035, description="noise of a pose's attitude, per axis", gt=0.0, le=1.0)
+    tracking_std_m: float = Field(default=0.005, description="noise of optical tracking, per axis", gt=0.0, le=1.0)
+    gyro_std_rad_s: float = Field(default=0.002, description="noise of a gyro sample, per axis", gt=0.0, le=1.0)
+    accelerometer_std_m_s2: float = Field(
+        default=0.05, description="noise of an accelerometer sample, per axis", gt=0.0, le=10.0
     )
-    pose_rate_hz: float = Field(default=62.0, description="poses per second (Hz)", gt=0.0, le=1000.0)
-    position_std_m: float = Field(default=0.002, description="noise of a pose's position, per axis (m)", gt=0.0, le=1.0)
-    attitude_std_rad: float = Field(
-        default=0.0035, description="noise of a pose's attitude, per axis (rad)", gt=0.0, le=1.0
-    )
-    gyro_rate_hz: float = Field(default=50.0, description="gyro samples per second (Hz)", gt=0.0, le=10000.0)
-    gyro_std_rad_s: float = Field(default=0.002, description="noise of a gyro sample, per axis (rad/s)", gt=0.0, le=1.0)
+    depth_std_m: float = Field(default=0.005, description="noise of a depth sample", gt=0.0, le=10.0)
+    gyro_bias_std_rad_s: float = Field(default=0.003, description="bias of the gyro at the start", gt=0.0, le=1.0)
     gyro_bias_walk_rad_s2: float = Field(
-        default=1e-4, description="random walk of the gyro's bias (rad/s/sqrt(s))", gt=0.0, le=0.1
+        default=1e-05, description="random walk of the gyro's bias (rad/s/sqrt(s))", gt=0.0, le=0.1
     )
-    depth_std_m: float = Field(default=0.01, description="noise of a depth sample (m)", gt=0.0, le=10.0)
+    accelerometer_bias_std_m_s2: float = Field(
+        default=0.05, description="bias of the accelerometer at the start", gt=0.0, le=10.0
+    )
+    accelerometer_bias_walk_m_s3: float = Field(
+        default=0.0001, description="random walk of the accelerometer's bias (m/s2/sqrt(s))", gt=0.0, le=1.0
+    )
     acceleration_noise_m_s2: float = Field(
-        default=0.02, description="white error of the modelled acceleration (m/s2/sqrt(Hz))", gt=0.0, le=10.0
-    )
-    disturbance_walk_m_s2: float = Field(
-        default=0.045, description="random walk of the unmodelled steady acceleration (m/s2/sqrt(s))", gt=0.0, le=10.0
-    )
-    manoeuvre_noise_m_s2: float = Field(
-        default=0.2,
-        description="white acceleration taken for manoeuvres without a model (m/s2/sqrt(Hz))",
-        gt=0.0,
-        le=100.0,
+        default=0.0005, description="white error of the modelled acceleration (m/s2/sqrt(Hz))", gt=0.0, le=10.0
     )
     turning_noise_rad_s2: float = Field(
-        default=0.2, description="white error of the modelled angular acceleration (rad/s2/sqrt(Hz))", gt=0.0, le=100.0
+        default=0.01, description="white error of the modelled angular acceleration (rad/s2/sqrt(Hz))", gt=0.0, le=100.0
     )
-    oldest_s: float = Field(default=0.25, description="measurements older than this are left out (s)", gt=0.0, le=2.0)
+    force_std_N: float = Field(default=1.0, description="unmodelled force at the start, per axis", gt=0.0, le=1000.0)
+    force_walk_N: float = Field(
+        default=0.004, description="random walk of the unmodelled force (N/sqrt(s))", gt=0.0, le=1000.0
+    )
+    moment_std_N_m: float = Field(
+        default=0.1, description="unmodelled moment at the start, per axis", gt=0.0, le=1000.0
+    )
+    moment_walk_N_m: float = Field(
+        default=0.001, description="random walk of the unmodelled moment (N m/sqrt(s))", gt=0.0, le=1000.0
+    )
+    start_std_m: float = Field(default=0.02, description="error of the first position, per axis", gt=0.0, le=10.0)
+    start_std_rad: float = Field(default=0.03, description="error of the first attitude, per axis", gt=0.0, le=1.0)
+    start_std_m_s: float = Field(default=0.02, description="error of the first velocity, per axis", gt=0.0, le=10.0)
+    start_std_rad_s: float = Field(default=0.02, description="error of the first body rate, per axis", gt=0.0, le=10.0)
+    settle_s: float = Field(
+        default=0.035,
+        description="how long measurements are waited for, so that late ones are taken in order",
+        ge=0.0,
+        le=1.0,
+    )
+    gate: float = Field(
+        default=1e-6,
+        description="chance at which a right measurement is taken for a wrong one and left out (0 takes all)",
+        ge=0.0,
+        le=0.1,
+    )
+    gate_patience: int = Field(
+        default=15, description="poses left out in a row after which the filter starts over", ge=1, le=10000
+    )

@@ -14,7 +14,7 @@ from wakewise.evaluation.surface import (
     sample_surface,
     thin,
 )
-from wakewise.evaluation.trajectory import TrajectoryError, trajectory_error
+from wakewise.evaluation.trajectory import TrajectoryError, paired_instants, read_tum, trajectory_error
 
 __all__ = [
     "Crop",
@@ -26,6 +26,8 @@ __all__ = [
     "count_views",
     "evaluate_surface",
     "flight_figures",
+    "paired_instants",
+    "read_tum",
     "refine_icp",
     "robust_similarity",
     "sample_surface",

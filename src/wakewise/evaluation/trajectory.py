@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from wakewise.arrays import Array
+from wakewise.arrays import Array, IntArray
 from wakewise.errors import InputError
 from wakewise.evaluation.alignment import umeyama
 
@@ -22,6 +23,45 @@ class TrajectoryError:
     max_mm: float
     scale: float
     pairs: int
+
+
+def read_tum(path: Path) -> tuple[Array, Array]:
+    """Times in s, shape (n,), and positions in m, shape (n, 3), of a file in the TUM format (t x y z qx qy qz qw).
+
+    Raises
+    ------
+    InputError
+        If there is no such file or a line does not hold eight numbers; the message names the line.
+    """
+    if not path.is_file():
+        raise InputError(f"trajectory {path}: no such file")
+    rows = []
+    for number, line in enumerate(path.read_text("utf-8", errors="replace").splitlines(), start=1):
+        words = line.split()
+        if not words or words[0].startswith("#"):
+            continue
+        try:
+            values = [float(word) for word in words]
+        except ValueError:
+            values = []
+        if len(values) != 8 or not np.all(np.isfinite(values)):
+            raise InputError(f"trajectory {path}, line {number}: needs eight numbers, t x y z qx qy qz qw")
+        rows.append(values)
+    if not rows:
+        raise InputError(f"trajectory {path}: holds no poses")
+    table = np.array(rows)
+    return table[:, 0], table[:, 1:4]
+
+
+def paired_instants(times_s: Array, other_s: Array, most_apart_s: float = 0.01) -> tuple[IntArray, IntArray]:
+    """Indices of instants of two clocks, each of `times_s` with the nearest of `other_s`, at most `most_apart_s` apart.
+
+    Both must ascend. An instant of `other_s` may serve twice, as in the usual tools.
+    """
+    after = np.clip(np.searchsorted(other_s, times_s), 1, len(other_s) - 1)
+    nearest = np.where(times_s - other_s[after - 1] <= other_s[after] - times_s, after - 1, after)
+    near = np.abs(other_s[nearest] - times_s) <= most_apart_s
+    return np.flatnonzero(near), nearest[near]
 
 
 def trajectory_error(

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.control import make_controller
-from wakewise.estimation import PoseFilter
+from wakewise.estimation import ErrorStateFilter
 from wakewise.geometry import Pose, quat_from_rotvec, quat_multiply
 from wakewise.imaging import PinholeCamera, Scene
 from wakewise.interfaces import BodyState, Controller, Estimator, ScalarGrid
@@ -150,7 +150,7 @@ def build_flight(scenario: Scenario, mission: Mission) -> Flight:
         true_vehicle=true_vehicle,
         pilot=RoutePilot(route=mission.route, X_BC=believed.X_BC, exposure_s=scenario.imaging.exposure_s),
         controller=make_controller(scenario.method, believed, mission.region, wake_model(control.wake_model), control),
-        estimator=PoseFilter(believed, scenario.estimation),
+        estimator=ErrorStateFilter(believed, scenario.estimation),
         tank=tank,
         witness=TankWitness(tank=tank),
         start=wished,

@@ -1,0 +1,203 @@
+"""The filter alone: what it makes of sensors that are noisy, late, silent or broken, and how well it knows itself."""
+
+import numpy as np
+from scipy.stats import chi2
+
+from wakewise.estimation import ErrorStateFilter, FilterSettings
+from wakewise.geometry import Pose, matrix_from_quat, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
+from wakewise.interfaces import BodyState, Measurement
+from wakewise.vehicles import compile_body, load_vehicle, step_rk4, thruster_lag
+
+VEHICLE = load_vehicle("paper")
+BODY = compile_body(VEHICLE)
+DT = 0.02
+
+
+def record(
+    *,
+    seconds,
+    latency_s=0.03,
+    offset_m=0.0,
+    gyro_bias=0.0,
+    noise=1.0,
+    silent=(np.inf, np.inf),
+    settings=None,
+    seed=0,
+    load_W_N=None,
+    outlier_every=0,
+):
+    """Fly the nominal vehicle on thrusts that wander, filter its sensors; returns errors, NEES of the pose and state.
+
+    Errors per step: position, velocity, attitude, rate (each three). `load_W_N(t)` pulls at the vehicle unknown to
+    the filter; every n-th pose is half a metre off where `outlier_every` says so.
+    """
+    rng = np.random.default_rng(seed)
+    filter_ = ErrorStateFilter(VEHICLE, settings)
+    p, q, nu = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0, 0, 0]), np.zeros(6)
+    start = p + offset_m * np.array([1.0, -1.0, 1.0]) / np.sqrt(3.0)
+    state = filter_.init(BodyState(X_WB=Pose(start, q)))
+    thrusts, command, queue, errors, nees, pose_due, poses = np.zeros(8), np.zeros(8), [], [], [], 1.0 / 62.0, 0
+    for k in range(round(seconds / DT)):
+        if k % 25 == 0:
+            command = rng.normal(size=8) * 0.2
+        now, v_before = (k + 1) * DT, matrix_from_quat(q) @ nu[:3]
+        for sub in range(4):
+            thrusts = thruster_lag(thrusts, command, VEHICLE.time_constants_s, DT / 4)
+            wrench = VEHICLE.allocation_matrix @ thrusts
+            if load_W_N is not None:
+                wrench[:3] += matrix_from_quat(q).T @ load_W_N(k * DT)
+            p, q, nu = step_rk4(BODY, p, q, nu, wrench, np.zeros(3), DT / 4)
+            t = k * DT + (sub + 1) * DT / 4
+            if t >= pose_due - 1e-9:
+                pose_due, poses = pose_due + 1.0 / 62.0, poses + 1
+                turned = quat_multiply(q, quat_from_rotvec(noise * 0.0035 * rng.normal(size=3)))
+                seen = p + noise * 0.002 * rng.normal(size=3)
+                if outlier_every and poses % outlier_every == 0:
+                    seen = seen + np.array([0.5, 0.0, 0.0])
+                if not silent[0] <= t < silent[1]:
+                    queue.append((t + latency_s, Measurement(time_s=t, X_WB=Pose(seen, turned))))
+        arrived = tuple(m for due, m in queue if due <= now + 1e-9)
+        queue = [(due, m) for due, m in queue if due > now + 1e-9]
+        R = matrix_from_quat(q)
+        gyro = nu[3:] + gyro_bias + noise * 0.002 * rng.normal(size=3)
+        force = R.T @ ((R @ nu[:3] - v_before) / DT - [0.0, 0.0, 9.80665]) + noise * 0.05 * rng.normal(size=3)
+        depth = float(p[2] + noise * 0.005 * rng.normal())
+        arrived += (Measurement(time_s=now, omega_B_rad_s=gyro, force_B_m_s2=force, depth_m=depth),)
+        state, estimate = filter_.step(state, DT, arrived, command)
+        tilt = rotvec_from_quat(quat_multiply(quat_conjugate(estimate.X_WB.q), q))
+        error = np.r_[p - estimate.X_WB.p_m, nu[:3] - estimate.nu_B[:3], tilt, nu[3:] - estimate.nu_B[3:]]
+        errors.append(error)
+        pose_error = np.r_[error[:3], tilt]
+        nees.append(pose_error @ np.linalg.solve(estimate.covariance[:6, :6], pose_error))
+    return np.array(errors), np.array(nees), state
+
+
+def rms(errors):
+    return float(np.sqrt(np.mean(np.sum(errors**2, axis=1))))
+
+
+def test_noise_is_averaged_away():
+    """Raw poses of 3.5 mm and 0.35 deg leave less than 1.5 mm, 0.1 deg, and velocity is known to millimetres."""
+    errors, _, state = record(seconds=12.0)
+    late = errors[250:]
+    assert rms(late[:, :3]) < 0.0015
+    assert rms(late[:, 3:6]) < 0.003
+    assert rms(late[:, 6:9]) < np.radians(0.1)
+    assert rms(late[:, 9:]) < 0.006
+    assert state.refused <= 2
+    assert state.late == 0
+
+
+def test_the_filter_knows_how_wrong_it_is():
+    """Mean NEES of the pose over independent flights lies within the 95 % bounds of its chi-square distribution."""
+    at = np.array([record(seconds=6.0, seed=seed)[1][[200, 299]] for seed in range(12)])
+    low, high = chi2.ppf([0.025, 0.975], 6 * at.size) / at.size
+    assert low < at.mean() < high
+
+
+def test_exact_sensors_and_model_leave_next_to_no_error():
+    """Without noise what is left is far below the noise that the filter assumes."""
+    errors, _, _ = record(seconds=6.0, noise=0.0)
+    assert rms(errors[100:, :3]) < 3e-4
+    assert rms(errors[100:, 6:9]) < 5e-4
+
+
+def test_a_start_five_centimetres_off_is_forgotten():
+    """Within a second the first guess does not matter any more."""
+    errors, _, _ = record(seconds=3.0, offset_m=0.05)
+    assert np.linalg.norm(errors[0, :3]) > 0.02
+    assert rms(errors[50:, :3]) < 0.003
+
+
+def test_a_gyro_bias_is_found():
+    """0.01 rad/s of bias, three times what is expected, ends up in the bias and not in attitude or rate."""
+    errors, _, state = record(seconds=15.0, gyro_bias=0.01)
+    np.testing.assert_allclose(state.gyro_bias_rad_s, 0.01, atol=0.0015)
+    assert rms(errors[-250:, 6:9]) < np.radians(0.1)
+    assert rms(errors[-250:, 9:]) < 0.006
+
+
+def test_ten_seconds_without_poses_are_bridged_and_owned_up_to():
+    """From 5 to 15 s no pose arrives: the estimate stays within three of its own sigmas, and then returns."""
+    errors, nees, state = record(seconds=17.0, silent=(5.0, 15.0))
+    assert np.linalg.norm(errors[250:750, :3], axis=1).max() < 0.25
+    assert nees[745] < chi2.ppf(0.999, 6)
+    assert rms(errors[800:, :3]) < 0.003
+    assert state.position_std_m < 0.003
+
+
+def test_uncertainty_grows_while_poses_are_missing():
+    """After five seconds without a pose the filter claims ten times the error that it has with poses."""
+    _, _, with_poses = record(seconds=5.0)
+    _, _, without = record(seconds=10.0, silent=(5.0, 20.0))
+    assert without.position_std_m > 10.0 * with_poses.position_std_m
+
+
+def test_latency_is_taken_back():
+    """Poses 90 ms old, three times the usual, are late for the default wait and harmless for a longer one."""
+    fresh, _, _ = record(seconds=8.0, latency_s=0.0)
+    waited, _, state = record(seconds=8.0, latency_s=0.09, settings=FilterSettings(settle_s=0.095))
+    _, _, hurried = record(seconds=2.0, latency_s=0.09)
+    assert state.late == 0
+    assert hurried.late > 80
+    assert rms(waited[200:, :3]) < 2.0 * rms(fresh[200:, :3])
+
+
+def test_wrong_poses_are_left_out():
+    """Every tenth pose half a metre off changes next to nothing, and each is counted."""
+    errors, _, state = record(seconds=8.0, outlier_every=10)
+    assert rms(errors[200:, :3]) < 0.002
+    assert 45 <= state.refused <= 55
+
+
+def test_a_sudden_load_is_noticed_and_found():
+    """3 N from nowhere at 4 s: a few centimetres for a moment, then a load estimate of 3 N, and calm again."""
+
+    def pull(t):
+        return np.array([3.0, 0.0, 0.0]) if t >= 4.0 else np.zeros(3)
+
+    errors, _, state = record(seconds=12.0, load_W_N=pull)
+    assert np.linalg.norm(errors[200:, :3], axis=1).max() < 0.06
+    assert rms(errors[400:, :3]) < 0.003
+    np.testing.assert_allclose(state.unmodelled_force_W_N, [3.0, 0.0, 0.0], atol=0.35)
+
+
+def test_waves_are_followed():
+    """A load that swings by 1 N at 0.3 Hz, far beyond the assumed noise, costs millimetres and no refused poses."""
+    errors, _, state = record(seconds=12.0, load_W_N=lambda t: np.array([np.sin(0.6 * np.pi * t), 0.0, 0.0]))
+    assert rms(errors[200:, :3]) < 0.004
+    assert state.refused < 20
+
+
+def test_what_is_broken_or_too_old_is_left_out():
+    """NaN in gyro, depth, force or thrusts, and a pose from long ago, change nothing: same estimate as silence."""
+    filter_ = ErrorStateFilter(VEHICLE)
+    start = filter_.init(BodyState(X_WB=Pose(np.array([0.0, 0.0, 1.0]))))
+    lost, nothing = np.full(3, np.nan), float("nan")
+    old = Measurement(time_s=-5.0, X_WB=Pose(np.array([9.0, 9.0, 9.0])))
+    nonsense = Measurement(time_s=0.02, omega_B_rad_s=lost, force_B_m_s2=lost, p_WB_m=lost, depth_m=nothing)
+    first, silent = filter_.step(start, DT, (), np.zeros(8))
+    second, noisy = filter_.step(start, DT, (old, nonsense), np.full(8, np.nan))
+    np.testing.assert_array_equal(silent.X_WB.p_m, noisy.X_WB.p_m)
+    np.testing.assert_array_equal(first.mean, second.mean)
+    assert second.late == 1
+    assert np.isfinite(second.mean).all()
+
+
+def test_order_of_arrival_does_not_matter():
+    """The same measurements handed over early or late, within the wait, leave the same settled state."""
+    filter_ = ErrorStateFilter(VEHICLE)
+    rng = np.random.default_rng(3)
+    samples = [
+        Measurement(time_s=0.02 * (k + 1), X_WB=Pose(0.002 * rng.normal(size=3)), depth_m=float(0.005 * rng.normal()))
+        for k in range(20)
+    ]
+    settled = []
+    for lag in (0, 1):
+        state = filter_.init(BodyState(X_WB=Pose(np.zeros(3))))
+        for k in range(30):
+            batch = tuple(samples[k - lag : k - lag + 1]) if k >= lag else ()
+            state, _ = filter_.step(state, DT, batch, np.full(8, 0.1))
+        settled.append(state)
+    np.testing.assert_allclose(settled[0].mean, settled[1].mean, atol=1e-12)
+    assert settled[0].taken == settled[1].taken == 40
