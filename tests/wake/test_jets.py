@@ -5,7 +5,7 @@ import pytest
 from scipy.special import erf
 
 from wakewise.errors import InputError
-from wakewise.wake import PaperJet, RoundJet, wake_model
+from wakewise.wake import GaussianJet, PaperJet, RoundJet, wake_model
 
 AREA = np.pi * 0.03**2
 D = 0.06
@@ -172,16 +172,78 @@ def test_the_speed_is_continuous_downstream(model):
     assert np.abs(np.diff(u)).max() < 0.03 * u.max()
 
 
-def test_names_give_models_and_a_wrong_name_is_told_the_right_ones():
-    """`paper` and `jet` exist; any other name is refused with the list."""
-    assert isinstance(wake_model("paper"), PaperJet)
-    assert isinstance(wake_model("jet"), RoundJet)
-    assert wake_model("jet").name == "jet"
-    with pytest.raises(InputError, match="jet, paper"):
-        wake_model("swirl")
-
-
 def test_a_round_jet_of_no_physical_width_is_refused():
     """The message names field, value and range."""
     with pytest.raises(InputError, match=r"half_width_slope 2, allowed 0\.05 to 0\.4"):
         RoundJet(half_width_slope=2.0)
+
+
+def gaussian_twin(x, r, thrust, diameter, K, x0, b0, half_slope):
+    """The jet with virtual origin written from its description."""
+    if x <= 0:
+        return 0.0
+    b = b0 * diameter + half_slope / np.sqrt(np.log(2)) * x
+    return K * np.sqrt(thrust / RHO) / (x + x0 * diameter) * np.exp(-((r / b) ** 2))
+
+
+def test_the_fitted_jet_is_its_description():
+    """Kernel and description agree wherever more than 1e-8 of the centreline speed is left."""
+    rng = np.random.default_rng(2)
+    x, r = rng.uniform(-0.05, 1.0, 400), rng.uniform(0, 0.3, 400)
+    K, x0, b0, slope = 4.1, 2.5, 0.6, 0.15
+    jet = GaussianJet(decay=K, virtual_origin_diameters=x0, start_width_diameters=b0, half_width_slope=slope)
+    slow = [gaussian_twin(a, b, 3.0, D, K, x0, b0, slope) for a, b in zip(x, r, strict=True)]
+    np.testing.assert_allclose(speed_of(jet, x, r, 3.0), slow, rtol=1e-12, atol=2e-8)
+
+
+def test_the_speed_along_and_across_a_jet_is_the_speed_at_points():
+    """`speed` of distances along and across equals the velocity at points laid out so; either sign of thrust."""
+    rng = np.random.default_rng(3)
+    x, r = rng.uniform(-0.1, 0.8, 50), rng.uniform(0, 0.3, 50)
+    for name in ("paper", "fitted", "linear", "jet", "jet-fitted"):
+        model = wake_model(name)
+        by_points = speed_of(model, x, r, 2.0)
+        np.testing.assert_allclose(model.speed(x, r, -2.0, AREA), by_points, rtol=1e-10, atol=1e-12)
+
+
+def test_the_default_fitted_jet_carries_the_thrust():
+    """Its numbers are those of a Gaussian of a propeller's width with momentum T / rho at every distance."""
+    jet = wake_model("jet-fitted")
+    np.testing.assert_allclose(jet.momentum_ratio([0.0, 1.0, 5.0, 50.0]), 1.0, rtol=1e-3)
+    r = np.linspace(0, 1.0, 20001)
+    flux = np.trapezoid(2 * np.pi * r * speed_of(jet, 0.3, r) ** 2, r)
+    assert flux == pytest.approx(1 / RHO, rel=1e-3)
+
+
+@pytest.mark.parametrize("diameters", [0.5, 3, 6, 10, 40])
+def test_the_propellers_jet_is_wider_and_carries_the_thrust(diameters):
+    """Swirl makes the jet about twice as wide (exp(-22.2 (r/x)^2)); its momentum flux is still T / rho."""
+    jet = RoundJet.of_propeller()
+    assert jet.half_width_slope / RoundJet().half_width_slope == pytest.approx(2, rel=0.1)
+    assert np.exp(-22.2) == pytest.approx(np.exp(-1 / jet.width_slope**2))
+    r = np.linspace(0, 0.1 + 2 * diameters * D, 40001)
+    u = speed_of(jet, diameters * D, r)
+    assert np.trapezoid(2 * np.pi * r * u**2, r) == pytest.approx(1 / RHO, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((0.2, -0.1, 1.0, AREA), "across_m -0.1, a radius must not be negative"),
+        ((0.2, 0.1, 1.0, 0.0), "area_m2 0, a disk's area must be more than 0"),
+        ((0.2, 0.1, np.nan, AREA), "thrust_N holds NaN"),
+        ((np.inf, 0.1, 1.0, AREA), "along_m holds NaN or infinity"),
+    ],
+)
+def test_a_speed_at_no_place_is_refused(arguments, message):
+    """Negative radius, a disk without area and NaN are named."""
+    with pytest.raises(InputError, match=message):
+        RoundJet().speed(*arguments)
+
+
+def test_a_jet_from_nowhere_is_refused():
+    """A virtual origin in the disk would make the speed there infinite."""
+    with pytest.raises(InputError, match=r"virtual_origin_diameters 0, allowed 0\.01 to 100"):
+        GaussianJet(decay=6.9, virtual_origin_diameters=0.0, start_width_diameters=0.7, half_width_slope=0.1)
+    with pytest.raises(InputError, match="decay nan"):
+        GaussianJet(decay=np.nan, virtual_origin_diameters=1.0, start_width_diameters=0.7, half_width_slope=0.1)

@@ -30,7 +30,7 @@ def dynamic_positioning(
     return TrackingController(
         name="dp",
         tracker=make_tracker(vehicle, settings),
-        view=WakeView.of(vehicle, region, wake),
+        view=WakeView.of(vehicle, region, wake, settings.wake.sum),
         allocate=allocate,
         hold_s=settings.hold_s,
     )

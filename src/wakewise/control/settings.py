@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import Field
 
 from wakewise.settings import Settings
+from wakewise.wake import WakeSettings
 
 
 class ControlSettings(Settings):
@@ -53,7 +52,7 @@ class ControlSettings(Settings):
         gt=0.0,
         le=10.0,
     )
-    wake_model: Literal["jet", "paper"] = Field(default="jet", description="jet model that the controller believes in")
+    wake: WakeSettings = Field(default=WakeSettings(), description="the wake model that the controller believes in")
     w_disturbance: float = Field(
         default=1.0, description="weight of the mean square water speed at the target (per (m/s)^2)", ge=0.0
     )

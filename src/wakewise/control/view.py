@@ -13,7 +13,7 @@ from wakewise.geometry import Pose
 from wakewise.interfaces import WakeModel
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
-from wakewise.wake import gram
+from wakewise.wake import Superposition, gram
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -26,6 +26,7 @@ class WakeView:
     positions_B_m: Array
     axes_B: Array
     areas_m2: Array
+    superposition: Superposition = "coherent"
 
     def __post_init__(self) -> None:
         n, m = len(self.points_W_m), len(self.positions_B_m)
@@ -34,7 +35,9 @@ class WakeView:
             raise InputError("region: weights must not be negative, and at least one must be more than 0")
 
     @classmethod
-    def of(cls, vehicle: Vehicle, region: Region, wake: WakeModel) -> WakeView:
+    def of(
+        cls, vehicle: Vehicle, region: Region, wake: WakeModel, superposition: Superposition = "coherent"
+    ) -> WakeView:
         """View of a region from a vehicle."""
         return cls(
             wake=wake,
@@ -43,6 +46,7 @@ class WakeView:
             positions_B_m=vehicle.thruster_positions_B_m,
             axes_B=vehicle.thruster_axes_B,
             areas_m2=vehicle.disk_areas_m2,
+            superposition=superposition,
         )
 
     @property
@@ -53,7 +57,9 @@ class WakeView:
     def gram(self, X_WB: Pose) -> Array:
         """Matrix G of D = s' G s, shape (2 n, 2 n), with the jets where a pose puts them."""
         origins_W, axes_W = _placed(X_WB.p_m, X_WB.q, self.positions_B_m, self.axes_B)
-        return gram(self.wake, self.points_W_m, self.weights, origins_W, axes_W, self.areas_m2)
+        return gram(
+            self.wake, self.points_W_m, self.weights, origins_W, axes_W, self.areas_m2, superposition=self.superposition
+        )
 
 
 @njit(cache=True)

@@ -20,7 +20,7 @@ def wake_aware(vehicle: Vehicle, region: Region, wake: WakeModel, settings: Cont
     D is divided by the sum of the region's weights, so that the cost does not depend on how many points sample it.
     """
     layout = vehicle_layout(vehicle)
-    view = WakeView.of(vehicle, region, wake)
+    view = WakeView.of(vehicle, region, wake, settings.wake.sum)
     weights = Weights(
         disturbance=settings.w_disturbance / view.total_weight, effort=settings.w_effort, previous=settings.w_previous
     )

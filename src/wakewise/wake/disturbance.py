@@ -1,18 +1,30 @@
 """The disturbance D of a target: the weighted sum of squared water speeds at the points of its region.
 
-D = sum_j w_j |sum_i v_i(p_j)|^2 with v_i proportional to sqrt(|T_i|), so D = s' G s with s = (sqrt(T+), sqrt(T-)): the
-matrix G depends on where the thrusters are and not on how hard they push.
+Coherent, as in the paper: velocities of jets that meet add up, D = sum_j w_j |sum_i v_i(p_j)|^2. With v_i proportional
+to sqrt(|T_i|) that is D = s' G s, s = (sqrt(T+), sqrt(T-)): the matrix G depends on where the thrusters are and not on
+how hard they push.
+
+Incoherent: squares add up, D = sum_j w_j sum_i |v_i(p_j)|^2, which keeps only the diagonal of G. It is linear in the
+split thrusts (T+, T-) >= 0, hence convex, and no optimiser can make jets cancel that in water would only spread
+sideways.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
 from wakewise.arrays import Array
+from wakewise.errors import InputError
 from wakewise.interfaces import WakeModel
+from wakewise.wake.checks import explain, same_sizes
+from wakewise.wake.floor import FloorJet
+from wakewise.wake.floor_sums import floor_gram_sum
+from wakewise.wake.gradients import Superposition
 from wakewise.wake.jets import AxialJet
+from wakewise.wake.sums import gram_sum
+
+_ORIGIN, _LEVEL = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
 
 
 def gram(
@@ -22,6 +34,7 @@ def gram(
     origins_W: Array,
     axes_W: Array,
     areas_m2: Array,
+    superposition: Superposition = "coherent",
 ) -> Array:
     """Matrix G of D = s' G s at given thruster places, symmetric and positive semidefinite.
 
@@ -33,21 +46,42 @@ def gram(
     origins_W, axes_W : ndarray, shape (m, 3)
         Centres of the thrusters' disks and unit *force* axes (for T > 0), in the world.
     areas_m2 : ndarray, shape (m,)
+    superposition : "coherent" or "incoherent"
+        How jets that meet add up; incoherent leaves the diagonal alone.
 
     Returns
     -------
     ndarray, shape (2 m, 2 m), in (m/s)^2/N
         Row i is thruster i with T > 0 (jet along -axis), row m + i the same thruster with T < 0 (jet along +axis).
+
+    Raises
+    ------
+    InputError
+        If shapes do not belong together, something is not finite, a weight is negative or an area not positive.
     """
-    directions = np.concatenate([-axes_W, axes_W])
+    same_sizes(region_points_W, weights, origins_W, axes_W, areas_m2)
+    place = (region_points_W, weights, origins_W, axes_W, areas_m2)
     if isinstance(model, AxialJet):
-        return np.asarray(
-            _weighted_products(model.split_speed(region_points_W, origins_W, axes_W, areas_m2), weights, directions)
+        G, check = gram_sum(*place, *model.law)
+    elif isinstance(model, FloorJet):
+        in_world = (region_points_W, weights, _ORIGIN, _LEVEL, origins_W, axes_W, areas_m2)
+        G, _, check = floor_gram_sum(*in_world, *model.jet.law, model.numbers, False)
+    else:
+        velocity = model.unit_velocity(
+            region_points_W,
+            np.concatenate([origins_W, origins_W]),
+            np.concatenate([-axes_W, axes_W]),
+            np.concatenate([areas_m2, areas_m2]),
         )
-    velocity = model.unit_velocity(
-        region_points_W, np.concatenate([origins_W, origins_W]), directions, np.concatenate([areas_m2, areas_m2])
-    )
-    return np.asarray(np.einsum("n,inx,jnx->ij", weights, velocity, velocity))
+        G, check = np.asarray(np.einsum("n,inx,jnx->ij", weights, velocity, velocity)), 0.0
+    if check != 0.0:
+        raise explain(*place)
+    return incoherent(G) if superposition == "incoherent" else G
+
+
+def incoherent(gram: Array) -> Array:
+    """Matrix of the incoherent sum, shape (2 m, 2 m): the diagonal of a coherent G; D = diag(G) . (T+, T-)."""
+    return np.diag(np.diag(gram))
 
 
 def split_roots(thrusts_N: ArrayLike) -> Array:
@@ -59,6 +93,8 @@ def split_roots(thrusts_N: ArrayLike) -> Array:
 def disturbance(gram: Array, thrusts_N: ArrayLike) -> float:
     """D = s' G s in (m/s)^2, of G, shape (2 m, 2 m), and thrusts, shape (m,)."""
     s = split_roots(thrusts_N)
+    if s.shape != gram.shape[:1]:
+        raise InputError(f"thrusts_N: {len(s) // 2} thrusts, allowed {len(gram) // 2}, one per thruster of the matrix")
     return float(s @ gram @ s)
 
 
@@ -70,39 +106,13 @@ def point_disturbance(
     axes_W: Array,
     areas_m2: Array,
     thrusts_N: ArrayLike,
+    superposition: Superposition = "coherent",
 ) -> float:
     """D in (m/s)^2, point by point as the definition reads; slow, and the check on `gram`. Arguments as there."""
+    same_sizes(region_points_W, weights, origins_W, axes_W, areas_m2)
     thrusts = np.asarray(thrusts_N, dtype=np.float64)
     jets = -np.sign(thrusts)[:, None] * axes_W
-    velocity = model.unit_velocity(region_points_W, origins_W, jets, areas_m2)
-    total = np.sum(np.sqrt(np.abs(thrusts))[:, None, None] * velocity, axis=0)
-    return float(np.sum(weights * np.sum(total**2, axis=1)))
-
-
-@njit(cache=True)
-def _weighted_products(speed, weights, directions):  # type: ignore[no-untyped-def]
-    """G_ik = (d_i . d_k) sum_j w_j speed_ji speed_jk, skipping the jets that miss a point (most of them do)."""
-    n, k = speed.shape
-    G = np.zeros((k, k))
-    hit = np.empty(k, np.int64)
-    for j in range(n):
-        hits = 0
-        for i in range(k):
-            if speed[j, i] != 0.0:
-                hit[hits] = i
-                hits += 1
-        for a in range(hits):
-            i = hit[a]
-            ws = weights[j] * speed[j, i]
-            for c in range(a + 1):
-                G[i, hit[c]] += ws * speed[j, hit[c]]
-    for i in range(k):
-        for c in range(i + 1):
-            dot = (
-                directions[i, 0] * directions[c, 0]
-                + directions[i, 1] * directions[c, 1]
-                + directions[i, 2] * directions[c, 2]
-            )
-            G[i, c] *= dot
-            G[c, i] = G[i, c]
-    return G
+    velocity = np.sqrt(np.abs(thrusts))[:, None, None] * model.unit_velocity(region_points_W, origins_W, jets, areas_m2)
+    if superposition == "coherent":
+        velocity = np.sum(velocity, axis=0, keepdims=True)
+    return float(np.sum(weights * np.sum(velocity**2, axis=(0, 2))))

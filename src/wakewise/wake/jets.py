@@ -1,4 +1,4 @@
-"""Two beliefs about a thruster's jet: the paper's cone as printed, and a turbulent round jet that conserves momentum.
+"""Turbulent round jets: one that conserves momentum, and one whose four numbers are free to be fitted.
 
 Both give the speed along the jet's own direction. Speed grows with the square root of thrust, so a model is a speed per
 square root of newton. The jet leaves opposite to the force on the vehicle: T > 0 along -axis, T < 0 along +axis.
@@ -7,18 +7,26 @@ square root of newton. The jet leaves opposite to the force on the vehicle: T > 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numpy.typing import ArrayLike
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
-from wakewise.interfaces import WakeModel
+from wakewise.wake import kernels
 
 FRESH_WATER_KG_M3 = 998.0
 """Fresh water at 20-21 deg C, the density of the paper (CRC Handbook of Chemistry and Physics: 998.2 at 20 deg C)."""
+
+
+class Law(NamedTuple):
+    """What the compiled kernels need to know of a jet: which kernel, and its numbers (see `wakewise.wake.kernels`)."""
+
+    kind: int
+    parameters: Array
 
 
 class AxialJet(ABC):
@@ -29,7 +37,42 @@ class AxialJet(ABC):
     def name(self) -> str:
         """Name used in scenario files and tables."""
 
+    @property
     @abstractmethod
+    def law(self) -> Law:
+        """Kernel and numbers."""
+
+    def speed(self, along_m: ArrayLike, across_m: ArrayLike, thrust_N: ArrayLike, area_m2: ArrayLike) -> Array:
+        """Speed in m/s of single jets, one per element; the arguments broadcast against each other.
+
+        Parameters
+        ----------
+        along_m, across_m : array_like
+            Distance from the disk's centre along the jet (negative: upstream, where the water is still), and off its
+            axis. The second must not be negative.
+        thrust_N : array_like
+            Its sign does not matter: the jet points where `along_m` counts.
+        area_m2 : array_like
+            Disk area, more than 0.
+
+        Raises
+        ------
+        InputError
+            For a negative distance off the axis, a disk without area, or NaN.
+        """
+        given = (np.asarray(a, dtype=np.float64) for a in (along_m, across_m, thrust_N, area_m2))
+        along, across, thrust, area = (np.array(a) for a in np.broadcast_arrays(*given))
+        for what, value in (("along_m", along), ("across_m", across), ("thrust_N", thrust), ("area_m2", area)):
+            if not np.all(np.isfinite(value)):
+                raise InputError(f"wake model {self.name}: {what} holds NaN or infinity, every element must be finite")
+        if np.any(across < 0.0):
+            raise InputError(f"wake model {self.name}: across_m {np.min(across):g}, a radius must not be negative")
+        if np.any(area <= 0.0):
+            raise InputError(f"wake model {self.name}: area_m2 {np.min(area):g}, a disk's area must be more than 0")
+        unit = np.empty(along.size)
+        kernels.fill_speed(along.ravel(), across.ravel(), area.ravel(), *self.law, unit)
+        return np.asarray(np.sqrt(np.abs(thrust)) * unit.reshape(along.shape))
+
     def split_speed(self, points_W_m: Array, origins_W_m: Array, axes_W: Array, areas_m2: Array) -> Array:
         """Speed per square root of newton at every point, for either sign of every thrust.
 
@@ -45,38 +88,31 @@ class AxialJet(ABC):
         ndarray, shape (n, 2 m), in m/s/sqrt(N)
             Column i: thruster i with T > 0, whose jet goes along -axis. Column m + i: T < 0, along +axis.
         """
+        speed = np.zeros((len(points_W_m), 2 * len(origins_W_m)))
+        kernels.fill_split_speed(points_W_m, origins_W_m, axes_W, areas_m2, *self.law, speed)
+        return speed
 
     def unit_velocity(self, points_W_m: Array, origins_W_m: Array, directions_W: Array, area_m2: Array) -> Array:
         """Velocity per square root of newton, shape (m, n, 3): see `wakewise.interfaces.WakeModel`."""
-        force_axes = -np.asarray(directions_W, dtype=np.float64)
-        speed = self.split_speed(points_W_m, origins_W_m, force_axes, area_m2)[:, : len(force_axes)]
-        return np.asarray(speed.T[:, :, None] * np.asarray(directions_W, dtype=np.float64)[:, None, :])
+        directions = np.asarray(directions_W, dtype=np.float64)
+        speed = self.split_speed(points_W_m, origins_W_m, -directions, area_m2)[:, : len(directions)]
+        return np.asarray(speed.T[:, :, None] * directions[:, None, :])
 
 
-@dataclass(frozen=True)
-class PaperJet(AxialJet):
-    """The paper's proxy exactly as printed; its constants are not fields, so that nothing can change them.
+def check_ranges(record: object, what: str, **ranges: tuple[float, float]) -> None:
+    """Refuse a dataclass whose number lies outside its range, or is NaN.
 
-    v = sqrt(T / (2 pi rho A)) (r_ref^2 / r^2) n cos^4(theta) for theta <= 45 deg, else 0; r is the distance from the
-    disk's centre and theta the angle off the jet's direction n. As printed it is several times too fast near the disk;
-    that is left as it is. At the disk's centre itself, where theta has no value, the speed is taken as 0.
+    Raises
+    ------
+    InputError
+        Naming the model, the field, the value and what is allowed.
     """
-
-    reference_distance_m: ClassVar[float] = 1.0
-    water_density_kg_m3: ClassVar[float] = 998.0
-    half_angle_rad: ClassVar[float] = np.pi / 4
-
-    @property
-    def name(self) -> str:
-        """Name used in scenario files and tables."""
-        return "paper"
-
-    def split_speed(self, points_W_m: Array, origins_W_m: Array, axes_W: Array, areas_m2: Array) -> Array:
-        """Speed per square root of newton, shape (n, 2 m): see `AxialJet`."""
-        speed = np.zeros((len(points_W_m), 2 * len(origins_W_m)))
-        gain = self.reference_distance_m**2 / np.sqrt(2 * np.pi * self.water_density_kg_m3 * areas_m2)
-        _fill_paper(points_W_m, origins_W_m, axes_W, gain, speed)
-        return speed
+    for field in fields(record):  # type: ignore[arg-type]
+        if field.name in ranges:
+            low, high = ranges[field.name]
+            value = getattr(record, field.name)
+            if not low <= value <= high:
+                raise InputError(f"{what}: {field.name} {value:g}, allowed {low:g} to {high:g}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +130,8 @@ class RoundJet(AxialJet):
     it is the Gaussian self-similar jet with U_c = 6.9 sqrt(T / rho) / x. The power 6 of the passage between the two is
     a choice of smoothing, not a measured constant: it leaves 99 % of the exit speed at 4 D and 90 % at 6 D, and meets
     the decay law within 1 % at 10 D. The water is still upstream of the disk; the slow inflow towards the jet's sides
-    is left out, and so are swirl, walls and the time a jet needs to arrive.
+    is left out, and so are walls (see `wakewise.wake.floor`) and the time a jet needs to arrive
+    (`wakewise.wake.travel`).
 
     Parameters
     ----------
@@ -102,20 +139,23 @@ class RoundJet(AxialJet):
     half_width_slope : float
         Radius of half the centreline speed over distance. 0.096 is N. R. Panchapakesan and J. L. Lumley, J. Fluid Mech.
         246 (1993) 197, doi 10.1017/S0022112093000096; H. J. Hussein, S. P. Capp and W. K. George, J. Fluid Mech. 258
-        (1994) 31, doi 10.1017/S002211209400323X, have 0.094 to 0.102. A propeller's swirl widens the jet to about 0.18.
+        (1994) 31, doi 10.1017/S002211209400323X, have 0.094 to 0.102. For a propeller's jet see `of_propeller`.
     """
 
     water_density_kg_m3: float = FRESH_WATER_KG_M3
     half_width_slope: float = 0.096
 
     def __post_init__(self) -> None:
-        for field, low, high in (
-            ("water_density_kg_m3", 900.0, 1100.0),
-            ("half_width_slope", 0.05, 0.4),
-        ):
-            value = getattr(self, field)
-            if not low <= value <= high:
-                raise InputError(f"round jet: {field} {value:g}, allowed {low:g} to {high:g}")
+        check_ranges(self, "round jet", water_density_kg_m3=(900.0, 1100.0), half_width_slope=(0.05, 0.4))
+
+    @classmethod
+    def of_propeller(cls) -> RoundJet:
+        """The jet of a free propeller, which swirl makes about twice as wide: profile exp(-22.2 (r/x)^2).
+
+        M. Fuehrer and K. Roemisch, 24th International Navigation Congress (PIANC), Leningrad 1977. The momentum flux
+        along the axis is still taken as T / rho at every distance, which swirl's low pressure makes true only far off.
+        """
+        return cls(half_width_slope=float(np.sqrt(np.log(2.0) / 22.2)))
 
     @property
     def name(self) -> str:
@@ -127,70 +167,79 @@ class RoundJet(AxialJet):
         """Slope s of the 1/e width: the half width over sqrt(ln 2)."""
         return float(self.half_width_slope / np.sqrt(np.log(2.0)))
 
-    def split_speed(self, points_W_m: Array, origins_W_m: Array, axes_W: Array, areas_m2: Array) -> Array:
-        """Speed per square root of newton, shape (n, 2 m): see `AxialJet`."""
-        speed = np.zeros((len(points_W_m), 2 * len(origins_W_m)))
-        exit_speed = 1.0 / np.sqrt(self.water_density_kg_m3 * areas_m2)
-        radius = np.sqrt(areas_m2 / np.pi)
-        _fill_round(points_W_m, origins_W_m, axes_W, exit_speed, radius, self.width_slope, speed)
-        return speed
+    @property
+    def decay(self) -> float:
+        """K of U_c = K sqrt(T / rho) / x far away: sqrt(2 / pi) / s, from the momentum of a Gaussian profile."""
+        return float(np.sqrt(2.0 / np.pi) / self.width_slope)
+
+    @cached_property
+    def law(self) -> Law:
+        """Kernel and numbers."""
+        numbers = kernels.jet_parameters(self.decay, 0.0, 0.0, self.width_slope, True, self.water_density_kg_m3)
+        return Law(kernels.ROUND_JET, numbers)
 
 
-def wake_model(name: str) -> WakeModel:
-    """Wake model of that name.
+@dataclass(frozen=True, kw_only=True)
+class GaussianJet(AxialJet):
+    """A jet with a virtual origin and a Gaussian profile from the disk on; meant to be fitted to a measured flow.
 
-    Raises
-    ------
-    InputError
-        If there is no such model.
+        U = K sqrt(T / rho) / (x + x0) exp(-r^2 / b^2),   b = b0 + s x,   s = half_width_slope / sqrt(ln 2)
+
+    Lengths at the disk are in disk diameters D, so that a fit made with one disk can be carried to another. Momentum is
+    not conserved by construction: `momentum_ratio` tells what the numbers carry.
+
+    Parameters
+    ----------
+    decay : float
+        K; a round jet has 6.5 to 7.0 (Hussein et al. 1994), one widened by swirl about half of it.
+    virtual_origin_diameters, start_width_diameters : float
+        x0 / D and b0 / D.
+    half_width_slope : float
+        Growth of the radius of half the centreline speed.
     """
-    models: dict[str, WakeModel] = {model.name: model for model in (PaperJet(), RoundJet())}
-    if name not in models:
-        raise InputError(f"wake model '{name}': unknown, allowed: {', '.join(sorted(models))}")
-    return models[name]
 
+    decay: float
+    virtual_origin_diameters: float
+    start_width_diameters: float
+    half_width_slope: float
+    water_density_kg_m3: float = FRESH_WATER_KG_M3
 
-# A point lies downstream of one of a thruster's two possible jets and upstream of the other, so one pass over points
-# and thrusters fills both columns: the sign of the coordinate along the force axis says which.
+    def __post_init__(self) -> None:
+        check_ranges(
+            self,
+            "jet with virtual origin",
+            decay=(0.01, 100.0),
+            virtual_origin_diameters=(0.01, 100.0),
+            start_width_diameters=(0.0, 10.0),
+            half_width_slope=(0.001, 1.0),
+            water_density_kg_m3=(900.0, 1100.0),
+        )
 
+    @property
+    def name(self) -> str:
+        """Name used in scenario files and tables."""
+        return "jet-fitted"
 
-@njit(cache=True)
-def _fill_paper(points, origins, axes, gain, speed):  # type: ignore[no-untyped-def]
-    m = origins.shape[0]
-    for j in range(points.shape[0]):
-        for i in range(m):
-            x = points[j, 0] - origins[i, 0]
-            y = points[j, 1] - origins[i, 1]
-            z = points[j, 2] - origins[i, 2]
-            r2 = x * x + y * y + z * z
-            along = x * axes[i, 0] + y * axes[i, 1] + z * axes[i, 2]
-            along2 = along * along
-            # cos^2(theta) >= 1/2 is theta <= 45 deg.
-            if r2 > 0.0 and along2 >= 0.5 * r2:
-                cos2 = along2 / r2
-                speed[j, i if along < 0.0 else m + i] = gain[i] / r2 * cos2 * cos2
+    @property
+    def width_slope(self) -> float:
+        """Slope s of the 1/e width: the half width over sqrt(ln 2)."""
+        return float(self.half_width_slope / np.sqrt(np.log(2.0)))
 
+    def momentum_ratio(self, distance_diameters: ArrayLike) -> Array:
+        """Momentum flux through a plane across the jet over T / rho, at distances in disk diameters."""
+        x = np.asarray(distance_diameters, dtype=np.float64)
+        width = self.start_width_diameters + self.width_slope * x
+        return np.asarray(0.5 * np.pi * (self.decay * width / (x + self.virtual_origin_diameters)) ** 2)
 
-@njit(cache=True)
-def _fill_round(points, origins, axes, exit_speed, radius, slope, speed):  # type: ignore[no-untyped-def]
-    m = origins.shape[0]
-    for j in range(points.shape[0]):
-        for i in range(m):
-            x = points[j, 0] - origins[i, 0]
-            y = points[j, 1] - origins[i, 1]
-            z = points[j, 2] - origins[i, 2]
-            along = x * axes[i, 0] + y * axes[i, 1] + z * axes[i, 2]
-            distance = abs(along)
-            b = slope * distance
-            r2 = x * x + y * y + z * z - along * along
-            # Beyond R + 4.3 b less than 1e-8 of the centreline speed is left: call it nothing.
-            reach = radius[i] + 4.3 * b
-            if distance > 0.0 and r2 < reach * reach:
-                R2, b2 = radius[i] * radius[i], b * b
-                xi2 = 0.5 * b2 / R2
-                slowing2 = np.cbrt(1.0 + xi2 * xi2 * xi2)
-                # pi/8 - 1/2 < 0, yet the root is real: b^2 <= 2 R^2 slowing^2 always.
-                a = np.sqrt(R2 * slowing2 + (np.pi / 8.0 - 0.5) * b2) - np.sqrt(np.pi / 8.0) * b
-                outside = np.sqrt(max(r2, 0.0)) - a
-                fade = np.exp(-outside * outside / b2) if outside > 0.0 else 1.0
-                speed[j, i if along < 0.0 else m + i] = exit_speed[i] / np.sqrt(slowing2) * fade
+    @cached_property
+    def law(self) -> Law:
+        """Kernel and numbers."""
+        numbers = kernels.jet_parameters(
+            self.decay,
+            self.virtual_origin_diameters,
+            self.start_width_diameters,
+            self.width_slope,
+            False,
+            self.water_density_kg_m3,
+        )
+        return Law(kernels.ROUND_JET, numbers)

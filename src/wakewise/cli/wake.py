@@ -1,0 +1,174 @@
+"""`wakewise wake`: calibrate a wake model to data, and hold every model against every flow."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from wakewise.cli.console import Bars, print_json, print_table, shown
+from wakewise.cli.options import Json
+
+app = typer.Typer(
+    help="What a jet does to the water: calibrate a model, see how good each is.",
+    no_args_is_help=False,
+    rich_markup_mode=None,
+)
+
+Data = Annotated[
+    Path,
+    typer.Argument(
+        help="CSV file with columns x_m, r_m (or y_m, z_m), thrust_N, u_m_s, optionally v_m_s, w_m_s, "
+        "disk_diameter_m, in the jet's frame (x along the jet from the disk's middle); or a folder of image pairs *A, "
+        "*B with a piv.yaml."
+    ),
+]
+Model = Annotated[str, typer.Option("--model", help="fitted, jet, jet-fitted or paper-calibrated.")]
+Diameter = Annotated[
+    float | None,
+    typer.Option("--disk-diameter-m", help="Diameter of the disk, if the CSV has no such column.", show_default=False),
+]
+Held = Annotated[
+    list[float] | None,
+    typer.Option("--test-thrust", metavar="N", help="Hold this thrust out for the test; may be repeated. Else drawn."),
+]
+Seed = Annotated[int, typer.Option("--seed", help="Seed of the split and of the resamples.")]
+Resamples = Annotated[int, typer.Option("--bootstrap", min=0, max=10000, help="Resamples for the 95 % intervals.")]
+FitOut = Annotated[
+    Path | None, typer.Option("--out", help="Write the model here, for a scenario to take.", show_default=False)
+]
+
+
+@app.command("fit")
+def fit(
+    data: Data,
+    model: Model = "fitted",
+    disk_diameter_m: Diameter = None,
+    test_thrust: Held = None,
+    seed: Seed = 0,
+    bootstrap: Resamples = 200,
+    out: FitOut = None,
+    json: Json = False,
+) -> None:
+    """Calibrate a wake model: parameters with uncertainty, fitted on some thrusts and positions, tested on others."""
+    import numpy as np
+
+    from wakewise.wake.calibration import calibrate, split_samples
+    from wakewise.wake.families import family
+    from wakewise.wake.fit_file import fit_figures, write_fit
+    from wakewise.wake.samples import read_samples
+
+    chosen = family(model)
+    if data.is_dir():
+        from wakewise.experiments.piv import samples_of_folder
+
+        samples = samples_of_folder(data)
+    else:
+        samples = read_samples(data, disk_diameter_m)
+    rng = np.random.default_rng(seed)
+    split = split_samples(samples, rng, test_thrusts_N=tuple(test_thrust or ()))
+    found = calibrate(chosen, samples, rng, split=split, bootstrap=bootstrap)
+    if out is not None:
+        write_fit(out, found, data.name, samples.disk_diameter_m)
+    result = fit_figures(found) | {"points": len(samples), "disk_diameter_m": samples.disk_diameter_m}
+    if json:
+        print_json(result | {"out": None if out is None else str(out)})
+        return
+    _show_fit(result)
+    if out is not None:
+        typer.echo(f"written: {out}")
+
+
+def _show_fit(result: dict[str, Any]) -> None:
+    from rich.table import Table
+
+    table = Table(title=f"{result['model']}, {result['points']} points")
+    for column in ("parameter", "value", "standard error", "95 % of resamples"):
+        table.add_column(column, justify="left" if column == "parameter" else "right")
+    for name, figure in result["parameters"].items():
+        span = "—" if figure["low"] is None else f"{shown(figure['low'])} to {shown(figure['high'])}"
+        error = "held" if figure["held"] else shown(figure["standard_error"])
+        table.add_row(name, shown(figure["value"]), error, span)
+    print_table(table)
+    table = Table()
+    for column in ("", "R2 in A (core)", "R2 in B (wake)", "bias beyond 0.4 m, %", "points"):
+        table.add_column(column, justify="left" if not column else "right")
+    for part in ("train", "test"):
+        scores = result[part]
+        row = (shown(scores[key]) for key in ("r2_core", "r2_wake", "bias_far_pct", "points"))
+        table.add_row(part, *row)
+    print_table(table)
+    typer.echo(f"split: {result['split']}")
+    for warning in result["warnings"]:
+        typer.echo(f"warning: {warning}")
+
+
+ReportOut = Annotated[
+    Path | None, typer.Option("--out", help="Folder for wake.html and wake.json.", show_default=False)
+]
+Reference = Annotated[
+    Path, typer.Option("--data", help="Folder of reference data (the real jets).", envvar="WAKEWISE_DATA")
+]
+Quick = Annotated[bool, typer.Option("--quick", help="Coarser samples, no PIV.")]
+ThroughPiv = Annotated[
+    bool, typer.Option("--through-piv", help="Also see the lattice's swirling jet and the parcels through virtual PIV.")
+]
+
+
+@app.command("validate")
+def validate(
+    out: ReportOut = None,
+    data: Reference = Path("../shared/data"),
+    quick: Quick = False,
+    through_piv: ThroughPiv = False,
+    seed: Seed = 0,
+    json: Json = False,
+) -> None:
+    """Hold every wake model against every flow, on held-out thrusts, beside the paper's 0.99 and 0.82."""
+    from wakewise.experiments.wake_validation import ValidationOptions, figures
+    from wakewise.experiments.wake_validation import validate as run
+
+    with Bars().stage("validate") as progress:
+        result = run(
+            ValidationOptions(
+                quick=quick,
+                data=data if data.is_dir() else None,
+                through_piv=through_piv,
+                seed=seed,
+                progress=progress,
+            )
+        )
+    values = figures(result)
+    if out is not None:
+        from wakewise.files import write_json
+        from wakewise.reports.wake import write_wake_report
+
+        write_json(out / "wake.json", values)
+        write_wake_report(result, values, out)
+    if json:
+        print_json(values)
+        return
+    _show_validation(values)
+    if out is not None:
+        typer.echo(f"report: {out / 'wake.html'}")
+
+
+def _show_validation(values: dict[str, Any]) -> None:
+    from rich.table import Table
+
+    for key, words in values["definitions"].items():
+        table = Table(title=f"{key}: {words}", title_justify="left")
+        flows = list(next(iter(values["models"].values())))
+        table.add_column("model")
+        for flow in flows:
+            table.add_column(flow, justify="right")
+        for model, by_flow in values["models"].items():
+            table.add_row(model, *(shown(by_flow[flow][key]) for flow in flows))
+        print_table(table)
+    paper = values["paper"]
+    typer.echo(f"the paper claims {paper['r2_core']} and {paper['r2_wake']} for its proxy")
+    convergence = values["grid_convergence_pct"]
+    typer.echo(f"lattice, two grids, centreline speed at 0.3 m: {shown(convergence)} % apart")
+    for key, reason in values["why"].items():
+        typer.echo(f"not computed: {key}: {reason}")

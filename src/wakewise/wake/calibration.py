@@ -1,0 +1,272 @@
+"""Least-squares calibration of a wake model: parameters with uncertainty, fitted on one part of the data only.
+
+What is minimised is the sum of squared errors of the axial speed over the square root of thrust, so that strong and
+weak thrusts count alike. Scores are those of the other part.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from wakewise.arrays import Array, BoolArray, IntArray
+from wakewise.errors import InputError
+from wakewise.wake.families import Family
+from wakewise.wake.samples import JetRegion, JetSamples
+from wakewise.wake.scores import Scores, score
+
+AXIS_ANGLE_RAD = math.radians(2.0)
+"""If no point lies farther off the axis, nothing can be said about angles."""
+_ROWS_PER_PARAMETER = 3
+_CELL_M = 0.01
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Calibration:
+    """Result of `calibrate`.
+
+    `values`, `standard_errors`, `lows` and `highs`, shape (p,): estimate, standard error from the Jacobian, and 95 %
+    interval of the bootstrap; NaN for a parameter held at its start (`held`) or at a bound of what is allowed.
+    """
+
+    family: Family
+    values: Array
+    standard_errors: Array
+    lows: Array
+    highs: Array
+    held: tuple[str, ...]
+    warnings: tuple[str, ...]
+    train: Scores
+    test: Scores
+    train_thrusts_N: tuple[float, ...]
+    test_thrusts_N: tuple[float, ...]
+    split: str
+    residual_rms_m_s: float
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Parameter values by name."""
+        return {p.name: float(v) for p, v in zip(self.family.parameters, self.values, strict=True)}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Split:
+    """Rows to fit on and rows to test on, both shape (n,), and in words how they were chosen."""
+
+    train: BoolArray
+    test: BoolArray
+    words: str
+
+
+def split_samples(
+    samples: JetSamples, rng: np.random.Generator, *, test_thrusts_N: tuple[float, ...] = (), share: float = 0.3
+) -> Split:
+    """Hold out thrusts and positions together: a test row has a thrust and a place that the fit has not seen.
+
+    Positions are held out in cells of 1 cm, `share` of them, so that no test point has a neighbour in the training set
+    closer than chance. Without `test_thrusts_N` a third of the thrusts is drawn, but never the weakest or strongest
+    where there are four or more. With one thrust only positions are held out.
+    """
+    thrusts = samples.thrusts_N
+    if len(test_thrusts_N) == 0 and len(thrusts) > 1:
+        inner = thrusts[1:-1] if len(thrusts) >= 4 else thrusts
+        test_thrusts_N = tuple(float(t) for t in rng.choice(inner, max(1, len(thrusts) // 3), replace=False))
+    held_thrust = np.isin(samples.thrust_N, test_thrusts_N)
+    if test_thrusts_N and (held_thrust.all() or not held_thrust.any()):
+        raise InputError(f"{samples.title}: thrusts held out {test_thrusts_N}, must be some of {thrusts} and not all")
+    cells = np.stack([np.floor(samples.x_m / _CELL_M), np.floor(samples.r_m / _CELL_M)])
+    _, cell = np.unique(cells, axis=1, return_inverse=True)
+    cell = cell.ravel()
+    count = int(cell.max()) + 1
+    if count < 4:
+        raise InputError(f"{samples.title}: points in {count} places only, needs 4 or more apart by {_CELL_M:g} m")
+    chosen = rng.permutation(count) < max(1, round(share * count))
+    held_place = chosen[cell]
+    words = f"{share:.0%} of the positions (cells of {100 * _CELL_M:g} cm, drawn at random) held out"
+    if len(thrusts) == 1:
+        return Split(train=~held_place, test=held_place, words=words + "; one thrust, the same in both parts")
+    named = ", ".join(f"{t:g}" for t in sorted(test_thrusts_N))
+    return Split(
+        train=~held_place & ~held_thrust,
+        test=held_place & held_thrust,
+        words=f"thrusts {named} N and {words}; tested where both were held out",
+    )
+
+
+def calibrate(
+    family: Family,
+    samples: JetSamples,
+    rng: np.random.Generator,
+    *,
+    split: Split | None = None,
+    region: JetRegion | None = None,
+    bootstrap: int = 100,
+) -> Calibration:
+    """Fit the free parameters of a model on training rows and score it on the others.
+
+    Parameters
+    ----------
+    family : Family
+    samples : JetSamples
+    rng : numpy Generator
+        Draws the split (if none is given) and the bootstrap.
+    split : Split, optional
+    region : JetRegion, optional
+        Fit only on points in it; scores always use all rows.
+    bootstrap : int
+        Resamples of thrusts and of cells of 1 cm (whole cells, since neighbouring points err together); 0 for none.
+
+    Raises
+    ------
+    InputError
+        If rows are too few or the model has no free parameters.
+    """
+    if not family.parameters:
+        raise InputError(f"wake model '{family.name}': has no free parameters, it cannot be fitted")
+    parts = split or split_samples(samples, rng)
+    fit_rows = parts.train & region.holds(samples) if region else parts.train
+    train = samples.take(fit_rows)
+    warnings = list(samples.warnings)
+    free, held = _identifiable(family, train, warnings)
+    needed = max(10, _ROWS_PER_PARAMETER * int(free.sum()))
+    if len(train) < needed:
+        raise InputError(
+            f"{samples.title}: {len(train)} rows to fit {int(free.sum())} parameters, needs {needed} or more "
+            f"({len(samples)} rows in all, the rest are held out)"
+        )
+    if len(samples.thrusts_N) == 1:
+        warnings.append(
+            f"one thrust only ({samples.thrusts_N[0]:g} N): the law that speed grows with the square root of thrust "
+            "is assumed, not tested"
+        )
+    values, jacobian, residual = _solve(family, train, family.start, free)
+    errors = _standard_errors(jacobian, residual, free)
+    lows, highs = _bootstrap(train, family, values, jacobian, residual, free, rng, bootstrap)
+    for k, parameter in enumerate(family.parameters):
+        span = parameter.high - parameter.low
+        if free[k] and min(values[k] - parameter.low, parameter.high - values[k]) < 1e-4 * span:
+            warnings.append(f"{parameter.name} stopped at the end of what is allowed ({round(values[k], 9):.4g})")
+            errors[k] = lows[k] = highs[k] = np.nan
+        elif free[k] and not errors[k] < max(abs(values[k]), 1e-3 * span):
+            warnings.append(f"{parameter.name} is not determined by these data (standard error above its value)")
+    return Calibration(
+        family=family,
+        values=values,
+        standard_errors=errors,
+        lows=lows,
+        highs=highs,
+        held=held,
+        warnings=tuple(warnings),
+        train=score(family.model(values), samples.take(parts.train)),
+        test=score(family.model(values), samples.take(parts.test)),
+        train_thrusts_N=tuple(float(t) for t in train.thrusts_N),
+        test_thrusts_N=tuple(float(t) for t in np.unique(samples.thrust_N[parts.test])),
+        split=parts.words,
+        residual_rms_m_s=float(np.sqrt(np.mean(residual**2 * train.thrust_N))),
+    )
+
+
+def _identifiable(family: Family, train: JetSamples, warnings: list[str]) -> tuple[BoolArray, tuple[str, ...]]:
+    """Which parameters the data can tell, shape (p,); the others are held at their start, which is said."""
+    free = np.ones(len(family.parameters), dtype=np.bool_)
+    angle = float(train.angle_rad.max()) if len(train) else 0.0
+    distance = train.distance_m
+    reach = float(distance.max() / distance.min()) if len(train) else 1.0
+    reasons = {
+        "angle": (angle < AXIS_ANGLE_RAD, f"no point is farther than {math.degrees(angle):.1f} deg off the axis"),
+        "reach": (
+            reach < 1.2,
+            f"all points are about as far from the disk ({distance.mean():.2g} m)" if len(train) else "",
+        ),
+    }
+    for shapes, (unknown, reason) in reasons.items():
+        names = [parameter.name for parameter in family.parameters if parameter.shapes == shapes]
+        if unknown and names:
+            free &= np.array([parameter.shapes != shapes for parameter in family.parameters])
+            warnings.append(f"{', '.join(names)} held at the start value: {reason}")
+        elif unknown:
+            warnings.append(f"{reason}: what '{family.name}' says there follows from its form alone")
+    if not free.any():
+        raise InputError(f"{train.title}: none of the parameters of '{family.name}' can be told from these points")
+    return free, tuple(p.name for p, f in zip(family.parameters, free, strict=True) if not f)
+
+
+def _solve(family: Family, train: JetSamples, start: Array, free: BoolArray) -> tuple[Array, Array, Array]:
+    """Best values (p,), Jacobian (n, free) and residuals (n,) in m/s/sqrt(N)."""
+    low = np.array([p.low for p in family.parameters])[free]
+    high = np.array([p.high for p in family.parameters])[free]
+    measured = train.speed_m_s / np.sqrt(train.thrust_N)
+    values = np.array(start)
+
+    def residual(part: Array) -> Array:
+        values[free] = part
+        return np.asarray(_unit_speed(family, values, train) - measured)
+
+    inside = np.clip(start[free], low + 1e-6 * (high - low), high - 1e-6 * (high - low))
+    found = least_squares(residual, inside, bounds=(low, high), x_scale=np.maximum(np.abs(inside), 1e-3 * (high - low)))
+    values[free] = found.x
+    return values, np.asarray(found.jac), np.asarray(found.fun)
+
+
+def _unit_speed(family: Family, values: Array, samples: JetSamples) -> Array:
+    return family.model(values).speed(samples.x_m, samples.r_m, 1.0, samples.disk_area_m2)
+
+
+def _standard_errors(jacobian: Array, residual: Array, free: BoolArray) -> Array:
+    """Square roots of the diagonal of s^2 (J'J)^-1, shape (p,); infinite where the data do not tell."""
+    errors = np.full(len(free), np.nan)
+    n, p = jacobian.shape
+    scale = np.linalg.norm(jacobian, axis=0)
+    scale[scale == 0.0] = 1.0
+    u, s, vt = np.linalg.svd(jacobian / scale, full_matrices=False)
+    del u
+    variance = float(residual @ residual) / max(n - p, 1)
+    inverse = np.where(s > 1e-8 * s[0], 1.0 / np.maximum(s, 1e-300) ** 2, np.inf) if s[0] > 0 else np.full(p, np.inf)
+    with np.errstate(invalid="ignore"):
+        spread = np.nansum(np.where(vt.T**2 < 1e-12, 0.0, vt.T**2 * inverse), axis=1)
+    errors[free] = np.sqrt(variance * spread) / scale
+    return errors
+
+
+def _bootstrap(
+    train: JetSamples,
+    family: Family,
+    values: Array,
+    jacobian: Array,
+    residual: Array,
+    free: BoolArray,
+    rng: np.random.Generator,
+    resamples: int,
+) -> tuple[Array, Array]:
+    """95 % interval of each free parameter, shapes (p,), from resampled thrusts and cells; NaN without resamples.
+
+    Each resample takes one Gauss-Newton step from the solution, which for small changes is where a new fit would end.
+    """
+    low, high = np.full(len(free), np.nan), np.full(len(free), np.nan)
+    if resamples < 2:
+        return low, high
+    cells = np.stack([np.floor(train.x_m / _CELL_M), np.floor(train.r_m / _CELL_M)])
+    cell = np.unique(cells, axis=1, return_inverse=True)[1].ravel()
+    thrust = np.unique(train.thrust_N, return_inverse=True)[1].ravel()
+    scale = np.linalg.norm(jacobian, axis=0)
+    scale[scale == 0.0] = 1.0
+    J = jacobian / scale
+    found = np.empty((resamples, int(free.sum())))
+    for k in range(resamples):
+        times = _drawn(cell, rng)
+        if thrust.max() >= 2:  # with fewer thrusts a draw may leave out all but one
+            times *= _drawn(thrust, rng)
+        step = np.linalg.lstsq((J * times[:, None]).T @ J, -J.T @ (times * residual), rcond=1e-10)[0]
+        found[k] = values[free] + step / scale
+    bounds = np.array([(p.low, p.high) for p in family.parameters])[free]
+    low[free], high[free] = np.percentile(np.clip(found, bounds[:, 0], bounds[:, 1]), [2.5, 97.5], axis=0)
+    return low, high
+
+
+def _drawn(group: IntArray, rng: np.random.Generator) -> Array:
+    """How often each row counts when its groups, shape (n,), are drawn with replacement."""
+    n = int(group.max()) + 1
+    return np.asarray(rng.multinomial(n, np.full(n, 1.0 / n))[group], dtype=np.float64)

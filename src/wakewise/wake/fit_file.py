@@ -1,0 +1,96 @@
+"""Calibrated wake models as files: settings that a scenario takes, with their uncertainty as comments."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from pydantic import ValidationError
+
+from wakewise.errors import InputError
+from wakewise.files import write_text
+from wakewise.wake.calibration import Calibration
+from wakewise.wake.models import WakeSettings
+
+
+def fit_yaml(fit: Calibration, source: str, disk_diameter_m: float) -> str:
+    """YAML text with the fields of `WakeSettings` where a scenario has them, and the quality of the fit as comments."""
+    scores = ((f"R2 in region {name}, test", value) for name, value in _tested(fit))
+    lines = [
+        f"# Wake model calibrated on {source}, disk diameter {disk_diameter_m:g} m.",
+        f"# Split: {fit.split}.",
+        *(f"# {name}: {'not known' if value is None else f'{value:.3f}'}" for name, value in scores),
+        *(f"# Note: {warning}." for warning in fit.warnings),
+        "# A scenario as it stands: wakewise scan THIS_FILE; or put these lines into one of your own.",
+        "control:",
+        "  wake:",
+        f"    model: {fit.family.name}",
+    ]
+    for k, (name, value) in enumerate(fit.parameters.items()):
+        error, low, high = fit.standard_errors[k], fit.lows[k], fit.highs[k]
+        words = "held" if name in fit.held else "" if not np.isfinite(error) else f"+- {error:.2g}"
+        words += f", 95 % of resamples {low:.4g} to {high:.4g}" if np.isfinite(low) else ""
+        lines.append(f"    {name}: {value:.6g}" + (f"  # {words}" if words else ""))
+    return "\n".join(lines) + "\n"
+
+
+def write_fit(path: Path, fit: Calibration, source: str, disk_diameter_m: float) -> None:
+    """Write a calibrated model whole or not at all."""
+    write_text(path, fit_yaml(fit, source, disk_diameter_m))
+
+
+def read_wake_settings(path: Path) -> WakeSettings:
+    """Settings of a wake model from a file of `wakewise wake fit`, with or without the heads `control:` and `wake:`.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or a field is wrong.
+    """
+    try:
+        tree: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as fault:
+        raise InputError(f"{path}: cannot be read as YAML ({fault.__class__.__name__})") from None
+    for head in ("control", "wake"):
+        if isinstance(tree, dict) and set(tree) == {head}:
+            tree = tree[head]
+    try:
+        return WakeSettings.model_validate(tree)
+    except ValidationError as fault:
+        first = fault.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in first["loc"]) or "wake"
+        raise InputError(f"{path}: {where}: {first['msg'].removeprefix('Value error, ')}") from None
+
+
+def fit_figures(fit: Calibration) -> dict[str, Any]:
+    """A calibration as plain values, ready for JSON; what is not known is None."""
+
+    def known(value: float) -> float | None:
+        return float(value) if np.isfinite(value) else None
+
+    return {
+        "model": fit.family.name,
+        "parameters": {
+            name: {
+                "value": value,
+                "standard_error": known(fit.standard_errors[k]),
+                "low": known(fit.lows[k]),
+                "high": known(fit.highs[k]),
+                "held": name in fit.held,
+            }
+            for k, (name, value) in enumerate(fit.parameters.items())
+        },
+        "train": fit.train.plain(),
+        "test": fit.test.plain(),
+        "train_thrusts_N": list(fit.train_thrusts_N),
+        "test_thrusts_N": list(fit.test_thrusts_N),
+        "split": fit.split,
+        "residual_rms_m_s": fit.residual_rms_m_s,
+        "warnings": list(fit.warnings),
+    }
+
+
+def _tested(fit: Calibration) -> tuple[tuple[str, float | None], ...]:
+    return ("A (|theta| < 15 deg, 0.1-0.3 m)", fit.test.r2_core), ("B (|theta| < 30 deg, 0.1-0.5 m)", fit.test.r2_wake)

@@ -1,0 +1,209 @@
+"""Compiled speeds of single jets: few kernels, of which every wake model is a set of parameters.
+
+A jet is axisymmetric. At a point with offset e from the disk's centre, x = e . d along the jet's unit direction d and
+r2 = e . e, its speed per square root of newton is f(x, r2), zero unless x > 0. The gradient is alpha d + beta e, so
+that the pair (alpha, beta) is all that any derivative with respect to position or attitude needs.
+
+Parameters travel as `(kind, parameters)`, see `cone_parameters` and `jet_parameters`; `own_constants` adds what depends
+on each thruster's disk. Units SI throughout.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from wakewise.arrays import Array
+
+PRINTED_CONE, POWER_CONE, ROUND_JET = 0, 1, 2
+"""Kinds of kernel: the paper's cone without powers to take, the cone with any powers, and the turbulent round jet."""
+
+TAIL_WIDTHS = 4.3
+"""A Gaussian profile is cut where less than 1e-8 of its middle is left, exp(-4.3^2): beyond is called nothing."""
+
+
+def cone_parameters(
+    gain: float,
+    reference_distance_m: float,
+    decay_power: float,
+    cosine_power: float,
+    soft_radius_m: float,
+    half_angle_rad: float,
+    edge_width_rad: float,
+    water_density_kg_m3: float,
+) -> Array:
+    """Numbers of a cone kernel: v = G sqrt(1/(2 pi rho A)) (r_ref^2 / (r^2 + r_s^2))^(p/2) cos^m(theta) s(theta).
+
+    s is 1 inside, 0 outside, and between half an edge width before and after the half angle the cubic 3 t^2 - 2 t^3,
+    with t linear in cos(theta): a continuous first derivative. Width 0 is the sharp edge, which counts as inside.
+    """
+    return np.array(
+        [
+            gain * reference_distance_m**decay_power / np.sqrt(2.0 * np.pi * water_density_kg_m3),
+            decay_power,
+            cosine_power,
+            soft_radius_m**2,
+            np.cos(half_angle_rad + 0.5 * edge_width_rad),
+            np.cos(half_angle_rad - 0.5 * edge_width_rad),
+            # cos^2 of 45 deg is 1/2 exactly; rounding of the cosine must not shift the printed edge.
+            0.5
+            if half_angle_rad == np.pi / 4 and edge_width_rad == 0.0
+            else np.cos(half_angle_rad + 0.5 * edge_width_rad) ** 2,
+        ]
+    )
+
+
+def jet_parameters(
+    decay: float,
+    virtual_origin_diameters: float,
+    start_width_diameters: float,
+    width_slope: float,
+    core: bool,
+    water_density_kg_m3: float,
+) -> Array:
+    """Numbers of the round jet kernel.
+
+    Centreline U = K sqrt(M) / ((x + x0)^6 + L^6)^(1/6) and width b = b0 + s x (1/e), M = T / rho. With `core` the exit
+    speed limits U (L = K sqrt(A)) and the profile has a flat core whose radius a makes the momentum flux
+    pi U^2 (a^2 + sqrt(pi/2) a b + b^2/2) equal to M; without, L = a = 0.
+    """
+    return np.array(
+        [
+            decay / np.sqrt(water_density_kg_m3),
+            1.0 / (np.pi * water_density_kg_m3),
+            virtual_origin_diameters,
+            start_width_diameters,
+            width_slope,
+            1.0 if core else 0.0,
+            decay,
+        ]
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def own_constants(kind, parameters, areas):  # type: ignore[no-untyped-def]
+    """What each disk adds, shape (m, 6): three constants of the kernel and three of its reach.
+
+    Cones: speed at 1 m, two unused. Jets: x0, b0, L^6 in m, m, m^6. A jet reaches only points with
+    r2 <= reach0 + reach1 x + reach2 x^2, a test without roots that comes before everything else.
+    """
+    own = np.zeros((areas.shape[0], 6))
+    for i in range(areas.shape[0]):
+        if kind == ROUND_JET:
+            diameter = np.sqrt(4.0 * areas[i] / np.pi)
+            own[i, 0] = parameters[2] * diameter
+            own[i, 1] = parameters[3] * diameter
+            own[i, 2] = parameters[5] * parameters[6] ** 6 * areas[i] ** 3
+            # A conserved momentum keeps the core no wider than the disk.
+            start = parameters[5] * 0.5 * diameter + TAIL_WIDTHS * own[i, 1]
+            slope = TAIL_WIDTHS * parameters[4]
+            own[i, 3], own[i, 4], own[i, 5] = start * start, 2.0 * start * slope, 1.0 + slope * slope
+        else:
+            own[i, 0] = parameters[0] / np.sqrt(areas[i])
+            own[i, 5] = 1.0 / parameters[6]
+    return own
+
+
+@njit(cache=True, error_model="numpy")
+def speed_and_slope(kind, numbers, c0, c1, c2, x, r2):  # type: ignore[no-untyped-def]
+    """(f, alpha, beta) at a point within reach, x > 0 along the jet and squared distance r2 from the disk's centre."""
+    if kind == ROUND_JET:
+        return _jet(numbers, c0, c1, c2, x, r2)
+    if kind == PRINTED_CONE:
+        # f = c x^4 / r^6, so grad f = 4 f / x d - 6 f / r^2 e.
+        inverse = 1.0 / r2
+        cos2 = x * x * inverse
+        f = c0 * inverse * cos2 * cos2
+        return f, 4.0 * f / x, -6.0 * f * inverse
+    return _cone(numbers, c0, x, r2)
+
+
+@njit(cache=True, error_model="numpy")
+def _cone(numbers, c0, x, r2):  # type: ignore[no-untyped-def]
+    p, m, low, high = numbers[1], numbers[2], numbers[4], numbers[5]
+    inverse = 1.0 / r2
+    soft = r2 + numbers[3]
+    plain = c0 * np.exp(0.5 * (m * np.log(x * x * inverse) - p * np.log(soft)))
+    inverse_r = np.sqrt(inverse)
+    cosine = x * inverse_r
+    edge, edge_slope = 1.0, 0.0
+    if low < high and cosine < high:
+        t = max((cosine - low) / (high - low), 0.0)
+        edge = t * t * (3.0 - 2.0 * t)
+        edge_slope = 6.0 * t * (1.0 - t) / (high - low)
+    f = plain * edge
+    # grad cos = d / r - cos e / r^2
+    by_cosine = f * m / cosine + plain * edge_slope
+    return f, by_cosine * inverse_r, -f * p / soft - by_cosine * cosine * inverse
+
+
+@njit(cache=True, error_model="numpy")
+def _jet(numbers, x0, b0, limit6, x, r2):  # type: ignore[no-untyped-def]
+    slope = numbers[4]
+    b = b0 + slope * x
+    across2 = max(r2 - x * x, 0.0)
+    from_origin = x + x0
+    if numbers[5] == 0.0:
+        # No core: a Gaussian from the disk on. One division serves both.
+        inverse = 1.0 / (b * from_origin)
+        by_b, by_origin = inverse * from_origin, inverse * b
+        out2 = across2 * by_b * by_b
+        f = numbers[0] * by_origin * np.exp(-out2)
+        beta = -2.0 * f * by_b * by_b
+        return f, f * (2.0 * out2 * slope * by_b - by_origin) - beta * x, beta
+    square = from_origin * from_origin
+    sixth = square * square * square
+    total = sixth + limit6
+    centre = numbers[0] / np.sqrt(np.cbrt(total))
+    shrink = -sixth / (total * from_origin)
+    # pi/8 - 1/2 < 0; with the decay that conserves momentum the root is real at every distance.
+    carried = numbers[1] / (centre * centre)
+    root = np.sqrt(max(carried + (np.pi / 8.0 - 0.5) * b * b, 0.0))
+    a = max(root - np.sqrt(np.pi / 8.0) * b, 0.0)
+    across = np.sqrt(across2)
+    outside = across - a
+    if outside <= 0.0:
+        return centre, centre * shrink, 0.0
+    a_slope = (-carried * shrink + (np.pi / 8.0 - 0.5) * b * slope) / root - np.sqrt(np.pi / 8.0) * slope
+    out = outside / b
+    f = centre * np.exp(-out * out)
+    by_x = f * (shrink + 2.0 * out * (a_slope + out * slope) / b)
+    beta = -2.0 * f * out / (b * across)
+    return f, by_x - beta * x, beta
+
+
+@njit(cache=True, error_model="numpy")
+def as_tuple(p):  # type: ignore[no-untyped-def]
+    """The kernel's numbers as values rather than an array, which lets the compiler keep them at hand."""
+    return (p[0], p[1], p[2], p[3], p[4], p[5], p[6])
+
+
+@njit(cache=True, error_model="numpy")
+def fill_split_speed(points, origins, axes, areas, kind, parameters, speed):  # type: ignore[no-untyped-def]
+    """Speeds at points, shape (n, 3), for either sign of m thrusts, into `speed`, zeros of shape (n, 2 m).
+
+    A point lies downstream of one of a thruster's two possible jets and upstream of the other, so one pass fills both
+    columns: the sign of the coordinate along the force axis says which.
+    """
+    m = origins.shape[0]
+    own, numbers = own_constants(kind, parameters, areas), as_tuple(parameters)
+    for j in range(points.shape[0]):
+        for i in range(m):
+            ex, ey, ez = points[j, 0] - origins[i, 0], points[j, 1] - origins[i, 1], points[j, 2] - origins[i, 2]
+            along = ex * axes[i, 0] + ey * axes[i, 1] + ez * axes[i, 2]
+            x, r2 = abs(along), ex * ex + ey * ey + ez * ez
+            if x > 0.0 and r2 <= own[i, 3] + own[i, 4] * x + own[i, 5] * x * x:
+                f, _, _ = speed_and_slope(kind, numbers, own[i, 0], own[i, 1], own[i, 2], x, r2)
+                speed[j, i if along < 0.0 else m + i] = f
+
+
+@njit(cache=True, error_model="numpy")
+def fill_speed(along, across, areas, kind, parameters, speed):  # type: ignore[no-untyped-def]
+    """Speed per square root of newton at `along` and `across` the axis of single jets, all arrays of shape (n,)."""
+    own, numbers = own_constants(kind, parameters, areas), as_tuple(parameters)
+    for j in range(along.shape[0]):
+        x = along[j]
+        r2 = x * x + across[j] * across[j]
+        speed[j] = 0.0
+        if x > 0.0 and r2 <= own[j, 3] + own[j, 4] * x + own[j, 5] * x * x:
+            speed[j], _, _ = speed_and_slope(kind, numbers, own[j, 0], own[j, 1], own[j, 2], x, r2)

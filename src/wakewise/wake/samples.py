@@ -1,0 +1,228 @@
+"""Measured speeds of one thruster's jet: points, thrusts and axial speeds, and the regions they are judged in.
+
+Jet frame J: origin at the middle of the disk, x along the jet (downstream), so that theta is the angle off the jet's
+direction and the distance is from the disk's middle, as in the paper.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from wakewise.arrays import Array, BoolArray, freeze
+from wakewise.errors import InputError
+
+COLUMNS: dict[str, str] = {
+    "x_m": "along the jet from the disk's middle",
+    "r_m": "distance from the jet's axis; or y_m and z_m",
+    "y_m": "across the jet",
+    "z_m": "across the jet",
+    "thrust_N": "magnitude of the thrust that made the jet",
+    "u_m_s": "speed along the jet",
+    "v_m_s": "optional, velocity along y (or along r)",
+    "w_m_s": "optional, velocity along z (or around the axis)",
+    "disk_diameter_m": "optional, the same on every row",
+}
+"""Columns of a data file and what they hold."""
+_REQUIRED = ("x_m", "thrust_N", "u_m_s")
+_LIMIT_M, _LIMIT_M_S, _LIMIT_N = 100.0, 100.0, 1e6
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class JetSamples:
+    """Where, how hard and how fast; all arrays of shape (n,).
+
+    `x_m` and `r_m` are cylindrical coordinates in the jet frame, `thrust_N` magnitudes, `speed_m_s` the axial component
+    of the velocity and `across_m_s` the size of the rest of it (0 where it was not measured).
+    """
+
+    x_m: Array
+    r_m: Array
+    thrust_N: Array
+    speed_m_s: Array
+    across_m_s: Array
+    disk_diameter_m: float
+    title: str = "samples"
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        freeze(self, x_m=(None,), r_m=(None,), thrust_N=(None,), speed_m_s=(None,), across_m_s=(None,))
+        sizes = {len(getattr(self, name)) for name in ("x_m", "r_m", "thrust_N", "speed_m_s", "across_m_s")}
+        if len(sizes) > 1:
+            raise InputError(f"{self.title}: columns of {sorted(sizes)} rows, all must have the same")
+        if not self.disk_diameter_m > 0.0:
+            raise InputError(f"{self.title}: disk_diameter_m {self.disk_diameter_m:g}, must be greater than 0")
+        if np.any(self.r_m < 0.0):
+            raise InputError(f"{self.title}: negative radius {self.r_m.min():g} m, must not be below 0")
+        if np.any(self.thrust_N <= 0.0):
+            raise InputError(f"{self.title}: thrust_N {self.thrust_N.min():g}, must be greater than 0 (a magnitude)")
+
+    def __len__(self) -> int:
+        return len(self.x_m)
+
+    @property
+    def disk_area_m2(self) -> float:
+        """Area of the disk."""
+        return 0.25 * math.pi * self.disk_diameter_m**2
+
+    @property
+    def distance_m(self) -> Array:
+        """Distance from the disk's middle, shape (n,)."""
+        return np.hypot(self.x_m, self.r_m)
+
+    @property
+    def angle_rad(self) -> Array:
+        """Angle off the jet's direction, shape (n,)."""
+        return np.arctan2(self.r_m, self.x_m)
+
+    @property
+    def thrusts_N(self) -> Array:
+        """The different thrusts, ascending."""
+        return np.unique(self.thrust_N)
+
+    def take(self, chosen: BoolArray) -> JetSamples:
+        """The rows where `chosen`, shape (n,), is True."""
+        return JetSamples(
+            x_m=self.x_m[chosen],
+            r_m=self.r_m[chosen],
+            thrust_N=self.thrust_N[chosen],
+            speed_m_s=self.speed_m_s[chosen],
+            across_m_s=self.across_m_s[chosen],
+            disk_diameter_m=self.disk_diameter_m,
+            title=self.title,
+            warnings=self.warnings,
+        )
+
+
+def joined(parts: Sequence[JetSamples]) -> JetSamples:
+    """Rows of several sets about the same disk, in order."""
+    first = parts[0]
+    fields = ("x_m", "r_m", "thrust_N", "speed_m_s", "across_m_s")
+    arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in fields}
+    return JetSamples(**arrays, disk_diameter_m=first.disk_diameter_m, title=first.title, warnings=first.warnings)
+
+
+@dataclass(frozen=True, kw_only=True)
+class JetRegion:
+    """Part of a jet: nearer to the axis than an angle, between two distances from the disk's middle."""
+
+    name: str
+    angle_rad: float
+    nearest_m: float
+    farthest_m: float
+
+    def holds(self, samples: JetSamples) -> BoolArray:
+        """Which rows lie in it, shape (n,)."""
+        distance = samples.distance_m
+        return np.asarray(
+            (samples.angle_rad < self.angle_rad) & (distance >= self.nearest_m) & (distance <= self.farthest_m)
+        )
+
+
+CORE = JetRegion(name="A", angle_rad=math.radians(15.0), nearest_m=0.1, farthest_m=0.3)
+WAKE = JetRegion(name="B", angle_rad=math.radians(30.0), nearest_m=0.1, farthest_m=0.5)
+FAR = JetRegion(name="far", angle_rad=math.radians(15.0), nearest_m=0.4, farthest_m=math.inf)
+"""The paper's regions: r below 0.3 m (from 0.1 m, where its measurements begin), 0.1-0.5 m, and beyond 0.4 m."""
+
+
+def read_samples(path: Path, disk_diameter_m: float | None = None) -> JetSamples:
+    """Samples of a CSV file with the columns of `COLUMNS`; lines that start with # are comments.
+
+    Parameters
+    ----------
+    path : Path
+    disk_diameter_m : float, optional
+        Needed if the file has no column of that name.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, a needed column is not there or is unknown, or a row holds something that is not a
+        finite number, a negative radius or a thrust that is not positive; the message names the line.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as fault:
+        raise InputError(f"{path}: cannot be read ({fault.__class__.__name__})") from None
+    lines = [(n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
+    if len(lines) < 2:
+        raise InputError(f"{path}: no rows, needs a line of column names and one line per point")
+    names = [name.strip() for name in next(csv.reader([lines[0][1]]))]
+    _check_columns(path, names)
+    table = np.array([_row(path, n, next(csv.reader([line])), names) for n, line in lines[1:]])
+    numbers = np.array([n for n, _ in lines[1:]])
+    column = {name: table[:, i] for i, name in enumerate(names)}
+    return _samples(path, column, numbers, disk_diameter_m)
+
+
+def _check_columns(path: Path, names: list[str]) -> None:
+    wanted = ", ".join(_REQUIRED) + " and r_m (or y_m, z_m)"
+    unknown = [name for name in names if name not in COLUMNS]
+    if unknown:
+        raise InputError(f"{path}: unknown column '{unknown[0]}', allowed {', '.join(COLUMNS)}")
+    if len(set(names)) < len(names):
+        raise InputError(f"{path}: a column is there twice, each must be there once")
+    missing = [name for name in _REQUIRED if name not in names]
+    if missing:
+        raise InputError(f"{path}: column {missing[0]} is missing, needed are {wanted}")
+    if ("r_m" in names) == ("y_m" in names and "z_m" in names) or ("y_m" in names) != ("z_m" in names):
+        raise InputError(f"{path}: place across the jet unclear, needed is either r_m or both y_m and z_m")
+
+
+def _row(path: Path, line: int, cells: list[str], names: list[str]) -> list[float]:
+    if len(cells) != len(names):
+        raise InputError(f"{path} line {line}: {len(cells)} values, needs {len(names)}")
+    values = []
+    for name, cell in zip(names, cells, strict=True):
+        try:
+            value = float(cell)
+        except ValueError:
+            raise InputError(f"{path} line {line}: {name} is '{cell.strip()[:20]}', must be a number") from None
+        limit = _LIMIT_N if name == "thrust_N" else _LIMIT_M_S if name.endswith("_m_s") else _LIMIT_M
+        if not abs(value) <= limit:
+            raise InputError(
+                f"{path} line {line}: {name} is {value:g}, must be a number between -{limit:g} and {limit:g}"
+            )
+        values.append(value)
+    return values
+
+
+def _samples(path: Path, column: Mapping[str, Array], numbers: Array, diameter_m: float | None) -> JetSamples:
+    for name, low in (("r_m", "not be negative"), ("thrust_N", "be greater than 0 (a magnitude)")):
+        bad = (column[name] < 0 if name == "r_m" else column[name] <= 0) if name in column else np.zeros(1, np.bool_)
+        if bad.any():
+            k = int(np.argmax(bad))
+            raise InputError(f"{path} line {numbers[k]}: {name} is {column[name][k]:g}, must {low}")
+    if "disk_diameter_m" in column:
+        found = np.unique(column["disk_diameter_m"])
+        if len(found) > 1:
+            raise InputError(f"{path}: disk_diameter_m takes {len(found)} values, must be the same on every row")
+        if diameter_m is not None and abs(found[0] - diameter_m) > 1e-9:
+            raise InputError(f"{path}: disk_diameter_m is {found[0]:g} in the file and {diameter_m:g} in the option")
+        diameter_m = float(found[0])
+    if diameter_m is None:
+        raise InputError(f"{path}: the disk's diameter is not known, give a column or the option --disk-diameter-m")
+    radius = column["r_m"] if "r_m" in column else np.hypot(column["y_m"], column["z_m"])
+    zero = np.zeros_like(radius)
+    downstream = column["x_m"] > 0.0
+    warnings = []
+    if not downstream.all():
+        warnings.append(
+            f"{int((~downstream).sum())} points upstream of the disk (x_m <= 0) left out: no model holds there"
+        )
+    samples = JetSamples(
+        x_m=column["x_m"],
+        r_m=radius,
+        thrust_N=column["thrust_N"],
+        speed_m_s=column["u_m_s"],
+        across_m_s=np.hypot(column.get("v_m_s", zero), column.get("w_m_s", zero)),
+        disk_diameter_m=diameter_m,
+        title=path.name,
+        warnings=tuple(warnings),
+    )
+    return samples.take(downstream)

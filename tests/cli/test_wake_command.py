@@ -1,0 +1,92 @@
+"""`wakewise wake fit` and `wake validate`: figures on standard output, one line for bad input."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+
+from wakewise.cli.main import run
+from wakewise.wake.models import WakeSettings, wake_model
+
+
+@pytest.fixture
+def data(tmp_path):
+    """A CSV of 300 points at three thrusts, made by a known jet with a little noise."""
+    rng = np.random.default_rng(0)
+    distance, angle = rng.uniform(0.1, 0.5, 300), rng.uniform(0.0, 0.5, 300)
+    thrust = np.repeat([1.0, 2.0, 4.0], 100)
+    x, r = distance * np.cos(angle), distance * np.sin(angle)
+    model = wake_model(WakeSettings(model="fitted", gain=0.5, decay_power=1.0, cosine_power=40.0, soft_radius_m=0.05))
+    speed = model.speed(x, r, thrust, 0.25 * np.pi * 0.06**2) + 0.005 * rng.standard_normal(300)
+    path = tmp_path / "jet.csv"
+    rows = [f"{a},{b},{t},{u}" for a, b, t, u in zip(x, r, thrust, speed, strict=True)]
+    path.write_text("x_m,r_m,thrust_N,u_m_s\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    return path
+
+
+def test_fit_prints_parameters_with_uncertainty_and_writes_a_model(data, tmp_path, capsys):
+    """One JSON object with value, error and interval of each number; the file is settings of that model."""
+    out = tmp_path / "wake.yaml"
+    code = run(
+        ["wake", "fit", str(data), "--disk-diameter-m", "0.06", "--out", str(out), "--bootstrap", "20", "--json"]
+    )
+    assert code == 0
+    result = json.loads(capsys.readouterr().out)
+    power = result["parameters"]["cosine_power"]
+    assert abs(power["value"] - 40.0) < 4.0 * power["standard_error"]
+    assert power["low"] < power["value"] < power["high"]
+    assert result["test"]["r2_wake"] > 0.95
+    assert not set(result["train_thrusts_N"]) & set(result["test_thrusts_N"])
+    written = yaml.safe_load(out.read_text(encoding="utf-8"))["control"]["wake"]
+    assert WakeSettings.model_validate(written).cosine_power == pytest.approx(power["value"], rel=1e-4)
+
+
+def test_fit_shows_a_table_to_people(data, capsys):
+    """Without --json there are a table, the split and every warning in words."""
+    assert run(["wake", "fit", str(data), "--disk-diameter-m", "0.06", "--model", "jet", "--bootstrap", "0"]) == 0
+    text = capsys.readouterr().out
+    assert "half_width_slope" in text
+    assert "held out" in text
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ([], "diameter is not known"),
+        (["--disk-diameter-m", "0"], "disk_diameter_m 0"),
+        (["--disk-diameter-m", "0.06", "--model", "paper"], "no free parameters"),
+        (["--disk-diameter-m", "0.06", "--test-thrust", "3"], "held out"),
+    ],
+)
+def test_bad_input_is_one_line_and_code_two(data, capsys, options, words):
+    """What is wrong and what is allowed, on standard error."""
+    assert run(["wake", "fit", str(data), *options]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert words in said.err
+    assert said.err.count("\n") == 1
+
+
+def test_rows_with_nan_are_named(data, capsys):
+    """NaN is refused with its line; nothing is fitted silently."""
+    data.write_text(data.read_text(encoding="utf-8") + "0.1,0.0,1.0,nan\n", encoding="utf-8")
+    assert run(["wake", "fit", str(data), "--disk-diameter-m", "0.06"]) == 2
+    assert "line 302: u_m_s is nan" in capsys.readouterr().err
+
+
+def test_validate_prints_the_demanded_keys_and_writes_a_page(tmp_path, capsys):
+    """models, grid_convergence_pct and paper are there; the page needs no network."""
+    out = tmp_path / "report"
+    assert run(["wake", "validate", "--quick", "--data", str(tmp_path / "none"), "--out", str(out), "--json"]) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert values["paper"] == {"r2_core": 0.99, "r2_wake": 0.82}
+    assert "grid_convergence_pct" in values
+    assert set(values["models"]["fitted"]["parcels"]) >= {"r2_core", "r2_wake", "bias_far_pct"}
+    page = (out / "wake.html").read_text(encoding="utf-8")
+    assert "Where the printed formula fails" in page
+    assert "http://" not in page
+    assert "https://" not in page
+    assert json.loads((out / "wake.json").read_text(encoding="utf-8")) == values
