@@ -1,21 +1,35 @@
-"""What must stay undisturbed: meshes from files, procedural corals, a target on the bed, and the region round it."""
+"""What must stay undisturbed: meshes from files, procedural corals, a target on the bed, the region round it.
+
+Delicate features are found from the mesh or marked by a person, and may count more in the region than the rest.
+"""
 
 from wakewise.targets.corals import coral, coral_kinds
+from wakewise.targets.delicate import Delicacy, delicacy
 from wakewise.targets.distance import MeshDistance
+from wakewise.targets.marks import Marks, read_marks, read_vertex_scores
 from wakewise.targets.mesh import Mesh, load_mesh, read_mesh, write_mesh
-from wakewise.targets.region import Region, sample_region
+from wakewise.targets.region import Measure, Region, region_measure, sample_region
+from wakewise.targets.sampling import sampling_error_pct
 from wakewise.targets.target import Target, place_on_bed
 
 __all__ = [
+    "Delicacy",
+    "Marks",
+    "Measure",
     "Mesh",
     "MeshDistance",
     "Region",
     "Target",
     "coral",
     "coral_kinds",
+    "delicacy",
     "load_mesh",
     "place_on_bed",
+    "read_marks",
     "read_mesh",
+    "read_vertex_scores",
+    "region_measure",
     "sample_region",
+    "sampling_error_pct",
     "write_mesh",
 ]

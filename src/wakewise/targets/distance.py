@@ -91,6 +91,49 @@ def _closest(
     return out
 
 
+@njit(cache=True)
+def _halved(centres: Array) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+    """Tree over points: halve each node across its longest side until it is a leaf.
+
+    Gives the order of the points, and for each node its first child (-1 for a leaf; the other child follows it), the
+    first of its points in that order, and their number.
+    """
+    order = np.arange(len(centres))
+    nodes = max(1, 4 * len(centres) // _LEAF + 1)
+    left, first, count = np.full(nodes, -1), np.zeros(nodes, np.int64), np.zeros(nodes, np.int64)
+    count[0] = len(centres)
+    made, node = 1, 0
+    while node < made:
+        start, stop = first[node], first[node] + count[node]
+        if stop - start > _LEAF:
+            axis, widest = 0, -1.0
+            for k in range(3):
+                side = centres[order[start:stop], k]
+                if side.max() - side.min() > widest:
+                    axis, widest = k, side.max() - side.min()
+            order[start:stop] = order[start:stop][np.argsort(centres[order[start:stop], axis], kind="mergesort")]
+            middle = (start + stop) // 2
+            left[node] = made
+            first[made], count[made] = start, middle - start
+            first[made + 1], count[made + 1] = middle, stop - middle
+            made += 2
+        node += 1
+    return order, left[:made], first[:made], count[:made]
+
+
+@njit(cache=True)
+def _boxes(corners: Array, first: IntArray, count: IntArray) -> tuple[Array, Array]:
+    """Lowest and highest corner of the box round the triangles of every node, shapes (nodes, 3)."""
+    low, high = np.full((len(first), 3), np.inf), np.full((len(first), 3), -np.inf)
+    for node in range(len(first)):
+        for t in range(first[node], first[node] + count[node]):
+            for v in range(3):
+                for k in range(3):
+                    low[node, k] = min(low[node, k], corners[t, v, k])
+                    high[node, k] = max(high[node, k], corners[t, v, k])
+    return low, high
+
+
 class MeshDistance:
     """Exact unsigned distance to a triangle mesh, for many points.
 
@@ -103,40 +146,10 @@ class MeshDistance:
     def __init__(self, vertices_m: Array, faces: IntArray) -> None:
         if len(faces) == 0:
             raise InputError("mesh: no faces, needs at least one")
-        corners = np.asarray(vertices_m, dtype=np.float64)[np.asarray(faces)]
-        centres = corners.mean(axis=1)
-        order = np.arange(len(corners))
-        low, high, left, first, count = [], [], [], [], []
-
-        def add(start: int, stop: int) -> None:
-            box = corners[order[start:stop]].reshape(-1, 3)
-            low.append(box.min(axis=0))
-            high.append(box.max(axis=0))
-            left.append(-1)
-            first.append(start)
-            count.append(stop - start)
-
-        add(0, len(order))
-        node = 0
-        while node < len(left):
-            start, stop = first[node], first[node] + count[node]
-            if stop - start > _LEAF:
-                rows = order[start:stop]
-                axis = int(np.argmax(np.ptp(centres[rows], axis=0)))
-                middle = (stop - start) // 2
-                order[start:stop] = rows[np.argpartition(centres[rows, axis], middle, kind="introselect")]
-                left[node] = len(left)
-                add(start, start + middle)
-                add(start + middle, stop)
-            node += 1
-        self._tree = (
-            np.ascontiguousarray(corners[order]),
-            np.array(low),
-            np.array(high),
-            np.array(left, dtype=np.int64),
-            np.array(first, dtype=np.int64),
-            np.array(count, dtype=np.int64),
-        )
+        corners = np.ascontiguousarray(np.asarray(vertices_m, dtype=np.float64)[np.asarray(faces)])
+        order, left, first, count = _halved(corners.mean(axis=1))
+        corners = np.ascontiguousarray(corners[order])
+        self._tree = (corners, *_boxes(corners, first, count), left, first, count)
 
     def __call__(self, points_m: Array) -> Array:
         """Distance in m of points, shape (n, 3), to the nearest triangle; shape (n,)."""
