@@ -11,11 +11,12 @@ from wakewise.wake import WakeSettings
 class ControlSettings(Settings):
     """Rate, gains and weights of the controllers.
 
-    Gains. The paper's PID has 150 N/m, 80 N s/m and 20 N/(m s). They are wishes: each axis is slowed until its loop
-    keeps its margins (`stability.stable_gain_scale`), and moments get the same bandwidth as forces. The estimator
-    counts as a delay: 0.12 s for forces is what the pose filter and its 30 ms of latency cost (a delay of 0.1 s leaves
-    the whole loop, filter included, just short of 40 deg on one of the two vehicles); attitude and rate come from a
-    gyro and are at most two samples late.
+    Gains. The paper's PID has 150 N/m, 80 N s/m and 20 N/(m s). They are wishes for its vehicle: others get the same
+    bandwidth by their mass, moments by their inertia, and each axis is slowed until its loop keeps its margins
+    (`stability.stable_gain_scale`). The estimator counts as a delay: 0.08 s for forces, the 35 ms that the filter lives
+    behind the present and as much for what it smooths; the whole loop, filter included, then withstands twice the gain
+    and 30 deg of delay in flight on two vehicles (tests of `estimation`). Attitude and rate come from a gyro and are at
+    most two samples late. Steady loads are fed forward from the estimator; the integral is for what it misses.
 
     Weights. The first term of the cost is the weighted mean square of the water's speed at the target's points, in
     (m/s)^2, with weight `w_disturbance`. The other two are set beside it by argument, not by trial:
@@ -35,7 +36,7 @@ class ControlSettings(Settings):
     kd_N_s_m: float = Field(default=80.0, description="wished derivative gain of forces (N s/m)", ge=0.0, le=2000.0)
     ki_N_m_s: float = Field(default=20.0, description="wished integral gain of forces (N/(m s))", ge=0.0, le=500.0)
     estimator_lag_s: float = Field(
-        default=0.12, description="delay of position and velocity that the margins must allow for (s)", ge=0.0, le=0.5
+        default=0.08, description="delay of position and velocity that the margins must allow for (s)", ge=0.0, le=0.5
     )
     gyro_lag_s: float = Field(
         default=0.04, description="delay of attitude and rate that the margins must allow for (s)", ge=0.0, le=0.5

@@ -166,8 +166,17 @@ def loop_margins(A: Array, b: Array, c: Array) -> Margins:
     )
 
 
+REFERENCE_MASS_KG = 11.3
+"""Mass with added mass, mean over surge, sway and heave, of the vehicle that the paper's gains are for."""
+
+
 def wished_gains(axes: tuple[Axis, ...], forces: Gains) -> tuple[Gains, ...]:
-    """Gains of all six axes: forces as given, moments times (I + I_a)/(m + m_a) of the same axis: same bandwidth."""
+    """Gains of all six axes, with the bandwidth of the given ones on the paper's vehicle.
+
+    Forces are scaled by the vehicle's mean mass over that one's, moments further by (I + I_a)/(m + m_a) of the axis.
+    """
+    size = sum(axis.mass for axis in axes[:3]) / (3.0 * REFERENCE_MASS_KG)
+    forces = Gains(kp=forces.kp * size, kd=forces.kd * size, ki=forces.ki * size)
     turning = [axes[3 + i].mass / axes[i].mass for i in range(3)]
     return (forces,) * 3 + tuple(Gains(kp=forces.kp * r, kd=forces.kd * r, ki=forces.ki * r) for r in turning)
 

@@ -16,10 +16,14 @@ from wakewise.vehicles import RigidBody, Vehicle, compile_body, coriolis_wrench,
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TrackerState:
-    """Integral part: force in the *world* (currents and trim do not turn with the vehicle), moment in the body."""
+    """Integral part: force in the *world* (currents and trim do not turn with the vehicle), moment in the body.
+
+    `goal_nu`, shape (6,), is the goal's twist of the step before, None before the first.
+    """
 
     force_W_N: Array
     moment_B_Nm: Array
+    goal_nu: Array | None = None
 
     def __post_init__(self) -> None:
         freeze(self, force_W_N=(3,), moment_B_Nm=(3,))
@@ -55,9 +59,10 @@ class Tracker:
 
         Errors are those of Goal over estimate in the body frame: position, rotation vector, and twist (the goal's
         twist is turned from its own body frame into B). Feed-forward, from the nominal vehicle: what holds it at the
-        goal's attitude, the drag at the goal's twist in still water, and the Coriolis and centripetal wrench that
-        bends its path. While the last allocation could not make all of its wrench (`saturated`), the integral does
-        not grow.
+        goal's attitude, the drag at the goal's twist in still water, the Coriolis and centripetal wrench that bends
+        its path, and the inertia of the goal's own change of twist since the last step. What the estimator says pulls
+        at the vehicle is held against (`BodyState.load_B`). While the last allocation could not make all of its
+        wrench (`saturated`), the integral does not grow.
         """
         feed = -restoring_wrench(self.body, goal.X_WB.q)
         wrench = np.empty(6)
@@ -85,7 +90,13 @@ class Tracker:
             moment_B,
         )
         wrench -= damping_wrench(self.body, twist_B) + coriolis_wrench(self.body, twist_B)
-        return TrackerState(force_W_N=force_W, moment_B_Nm=moment_B), wrench
+        wrench -= np.clip(estimate.load_B, -self.integral_limit, self.integral_limit)
+        if state.goal_nu is not None and dt_s > 0.0:
+            push = self.body.mass_matrix @ (goal.nu_B - state.goal_nu) / dt_s
+            # A goal that jumps has no acceleration worth following.
+            if np.all(np.abs(push) <= self.integral_limit):
+                wrench += push
+        return TrackerState(force_W_N=force_W, moment_B_Nm=moment_B, goal_nu=goal.nu_B), wrench
 
 
 def make_tracker(vehicle: Vehicle, settings: ControlSettings) -> Tracker:
