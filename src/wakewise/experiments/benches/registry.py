@@ -11,8 +11,10 @@ from wakewise.experiments.benches.timing import BenchOptions
 BENCHES = {
     "allocator": "exact allocation against SciPy's SLSQP and the pseudo-inverse",
     "disturbance": "the Gram matrix of D against the sum over points",
+    "estimator": "the filter in the default tank: error, consistency, ten seconds without a camera",
     "dynamics": "one step of the vehicle, with and without Jacobians",
     "imaging": "one photograph",
+    "lattice": "the lattice-Boltzmann solver: cell updates per core, and its distance from the twin",
     "tank": "the world of a trial against the clock",
 }
 """Name of each bench and what it measures; the module of that name in this folder holds it."""

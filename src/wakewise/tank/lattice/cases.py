@@ -1,0 +1,215 @@
+"""What the lattice computes: small declarative records of jets in a box, in the jet's own units.
+
+Lengths are in exit diameters D and speeds in U0 = sqrt(T / (rho A)), the exit speed of a ducted jet of area A, so that
+one run holds for all thrusts and diameters: speeds grow with sqrt(T). That leaves out the Reynolds number
+U0 D / nu, 36,000 for 1 N on 60 mm: turbulent jets far above some 10,000 no longer depend on it (Dimotakis 2000,
+doi:10.1017/S0022112099007946), and the runs use 10,000; thrusts under a tenth of a newton are not covered.
+
+The duct is not drawn cell by cell. An open actuator disk of twice the exit area sends out the same slipstream by
+momentum theory: it contracts to half the disk's area and reaches sqrt(2 T / (rho 2 A)) = U0. So the body force of each
+jet acts on a disk of diameter sqrt(2) D, its thrust is known exactly, and one diameter downstream the flow is that of
+the ducted exit. Nearer to the disk than that the flow is the open disk's, wider and slower.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, replace
+
+from wakewise.errors import InputError
+
+SOLVER = "d3q19-regularised-2"
+"""Version of solver and disk; part of every hash, so raise it when a change of the code changes the flow."""
+
+T200_TORQUE = 0.15
+"""Torque over thrust and diameter, Q / (T D), of a small ducted propeller.
+
+Blue Robotics' table of the T200 (September 2019, 12 and 16 V, 76 mm) gives electrical power / (2 pi n) = 0.19 to 0.26
+T D forwards, 0.20 to 0.22 at 4 to 8 N; of this a brushless motor with its controller turns some 70 % into shaft torque
+(assumed). Ducted screws of the Ka series lie lower, near 0.09, so take the swirl here as that of a strong case.
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiskJet:
+    """One actuator disk.
+
+    Parameters
+    ----------
+    position_D : tuple of three
+        Centre of the disk, the origin being the disk of the case's first jet.
+    along : int
+        +1 or -1: the jet blows along plus or minus x.
+    strength : float
+        Momentum flux over that of a jet with exit speed U0: thrust over the unit thrust.
+    torque : float
+        Q / (T D), turning the water about +x; 0 for a jet without swirl.
+    start, stop : float
+        When it pushes, in D / U0.
+    """
+
+    position_D: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    along: int = 1
+    strength: float = 1.0
+    torque: float = 0.0
+    start: float = 0.0
+    stop: float = float("inf")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """Jets in a box of still water with open faces, and perhaps a floor that the first jet strikes.
+
+    Parameters
+    ----------
+    name : str
+    jets : tuple of DiskJet
+    low_D, high_D : tuple of three
+        Corners of the box; every side must be a whole number of cells.
+    floor : bool
+        Whether the face at high x is a solid floor (half-way bounce-back); the others are open.
+    sponge_D : float
+        Thickness of the sponge before the open face at high x, in which viscosity grows; before the other open
+        faces, where water comes in slowly, it is one diameter.
+    cells_per_D : int
+    develop, average : float
+        Time before and during averaging, in D / U0.
+    reynolds : float
+        U0 D / nu.
+    smagorinsky : float
+        Smagorinsky's constant with the cell as filter width.
+    lattice_speed : float
+        U0 in cells per step; small against the lattice's speed of sound, 0.577.
+    unsteadiness : float
+        Rms of the disk's load over its mean, in patches of about D / 4 that live D / (2 U0): blades do not push
+        evenly, and a disk that did would send a laminar core.
+    seed : int
+    """
+
+    name: str
+    jets: tuple[DiskJet, ...]
+    low_D: tuple[float, float, float]
+    high_D: tuple[float, float, float]
+    floor: bool = False
+    sponge_D: float = 1.5
+    cells_per_D: int = 10
+    develop: float = 40.0
+    average: float = 80.0
+    reynolds: float = 1.0e4
+    smagorinsky: float = 0.12
+    lattice_speed: float = 0.15
+    unsteadiness: float = 0.15
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.cells_per_D < 4:
+            raise InputError(f"lattice case {self.name!r}: {self.cells_per_D} cells per diameter, allowed 4 or more")
+        if not self.jets:
+            raise InputError(f"lattice case {self.name!r}: no jets, allowed one or more")
+        for jet in self.jets:
+            if jet.along not in (-1, 1):
+                raise InputError(f"lattice case {self.name!r}: jet along {jet.along}, allowed +1 or -1")
+        for low, high in zip(self.low_D, self.high_D, strict=True):
+            cells = (high - low) * self.cells_per_D
+            if cells < 12 or abs(cells - round(cells)) > 1e-6:
+                raise InputError(
+                    f"lattice case {self.name!r}: a side of {cells:g} cells, allowed whole numbers from 12"
+                )
+
+    @property
+    def cells(self) -> tuple[int, int, int]:
+        """Cells along x, y and z."""
+        n = [round((b - a) * self.cells_per_D) for a, b in zip(self.low_D, self.high_D, strict=True)]
+        return n[0], n[1], n[2]
+
+    def resolved(self, cells_per_D: int) -> Case:
+        """The same case on another grid."""
+        return replace(self, cells_per_D=cells_per_D)
+
+
+def case_hash(case: Case) -> str:
+    """Digest of everything that decides the flow: the case and the version of the solver."""
+    text = json.dumps({"solver": SOLVER, **asdict(case)}, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+_Corner = tuple[float, float, float]
+_FREE_BOX: tuple[_Corner, _Corner] = ((-3.0, -5.5, -5.5), (11.0, 5.5, 5.5))
+
+
+def _cases() -> dict[str, Case]:
+    swirling = DiskJet(torque=T200_TORQUE)
+    plain = DiskJet()
+    return {
+        case.name: case
+        for case in (
+            Case(name="free", jets=(plain,), low_D=_FREE_BOX[0], high_D=_FREE_BOX[1]),
+            Case(name="swirl", jets=(swirling,), low_D=_FREE_BOX[0], high_D=_FREE_BOX[1]),
+            Case(
+                name="long",
+                jets=(plain,),
+                low_D=(-3.0, -5.5, -5.5),
+                high_D=(17.0, 5.5, 5.5),
+                cells_per_D=7,
+                develop=70.0,
+                average=150.0,
+            ),
+            Case(
+                name="floor",
+                jets=(plain,),
+                low_D=(-3.0, -6.0, -6.0),
+                high_D=(5.0, 6.0, 6.0),
+                floor=True,
+                cells_per_D=7,
+                develop=60.0,
+            ),
+            Case(
+                name="stop",
+                jets=(replace(plain, stop=40.0),),
+                average=10.0,
+                cells_per_D=6,
+                low_D=_FREE_BOX[0],
+                high_D=_FREE_BOX[1],
+            ),
+            Case(
+                name="twin",
+                jets=(replace(plain, position_D=(0.0, -2 / 3, 0.0)), replace(plain, position_D=(0.0, 2 / 3, 0.0))),
+                cells_per_D=6,
+                low_D=(-3.0, -5.0, -4.0),
+                high_D=(15.0, 5.0, 4.0),
+            ),
+            Case(
+                name="head-on",
+                jets=(plain, replace(plain, position_D=(10.0, 0.0, 0.0), along=-1)),
+                low_D=(-3.0, -6.0, -6.0),
+                high_D=(13.0, 6.0, 6.0),
+                sponge_D=1.0,
+                cells_per_D=6,
+            ),
+            Case(
+                name="four",
+                jets=(replace(plain, strength=4.0),),
+                cells_per_D=6,
+                low_D=_FREE_BOX[0],
+                high_D=_FREE_BOX[1],
+            ),
+        )
+    }
+
+
+CASES = _cases()
+"""Cases by name. `twin`: 8 cm apart for D = 60 mm; `head-on`: 0.6 m apart; `four`: four times the thrust."""
+
+
+def find_case(name: str) -> Case:
+    """Look a case up.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name.
+    """
+    if name not in CASES:
+        raise InputError(f"lattice case {name!r}: no such case, allowed {', '.join(CASES)}")
+    return CASES[name]
