@@ -38,6 +38,8 @@ def test_overrides_lie_over_files_and_files_over_presets(tmp_path: Path) -> None
         ({"nonsense.deep.field": 1}, ["nonsense", "no such field"]),
         ({"mission.standoff_m": -0.5}, ["mission.standoff_m", "-0.5", "greater than 0"]),
         ({"mission.views": [20]}, ["mission", "one count per orbit"]),
+        ({"tank.failures": [{"thruster": 1, "att_s": 3}]}, ["tank.failures.0.att_s", "at_s"]),
+        ({"tank.water": "mud"}, ["tank.water", "caco3-50mg"]),
         ({"method": "magic"}, ["method", "magic", "dp", "wake-aware"]),
         ({"seed": float("nan")}, ["seed"]),
         ({"mission": 3}, ["mission"]),

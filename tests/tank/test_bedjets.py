@@ -9,6 +9,7 @@ from scipy.special import erf, i0, i1
 from wakewise.tank.bedjets import (
     _LOG_WIDTH,
     _REACH,
+    HIGHEST,
     WALL_JET_SPEED,
     WALL_JET_SPREAD,
     Rings,
@@ -54,6 +55,7 @@ def _twin(points, rings, bed_z_m):
         R, A = rings.radius_m[k] * w**0.25, strength[k] * np.sqrt(w)
         t, delta = np.log(r / R), WALL_JET_SPREAD * rings.radius_m[k] * w**0.25
         g = np.where(np.abs(t) < _REACH, np.exp(-(t**2) / (2 * _LOG_WIDTH**2)), 0.0)
+        g = np.where(h < HIGHEST * R, g, 0.0)
         layer = delta * np.sqrt(np.pi / 2) * erf(h / (np.sqrt(2) * delta))
         dF = (np.exp(-(h**2) / (2 * delta**2)) - layer / R) * np.exp(-h / R)
         u[:, :2] += d * (A * g * dF / r**2)[:, None]
@@ -62,9 +64,9 @@ def _twin(points, rings, bed_z_m):
 
 
 def test_the_fast_sum_is_the_formula_as_written():
-    """Kernel and twin agree to rounding."""
+    """Kernel and twin agree to the tails of Gaussian and erf that the kernel leaves out."""
     points = np.random.default_rng(0).uniform([-0.6, -0.6, 1.2], [0.6, 0.6, 1.5], (300, 3))
-    assert ring_velocity(points, _rings(), BED_Z_M) == pytest.approx(_twin(points, _rings(), BED_Z_M), abs=1e-12)
+    assert ring_velocity(points, _rings(), BED_Z_M) == pytest.approx(_twin(points, _rings(), BED_Z_M), abs=3e-5)
 
 
 def test_a_steady_upright_jet_spreads_as_measured():

@@ -12,6 +12,8 @@ from wakewise.tank.grains import (
     beam_attenuation_per_m,
     erosion_rate_kg_m2_s,
     friction_velocity_m_s,
+    grain_number,
+    pickup_rate_kg_m2_s,
     settling_speed_m_s,
     speed_at_stress_m_s,
     threshold_stress_Pa,
@@ -65,3 +67,14 @@ def test_grains_that_cannot_sink_are_refused(grain, density):
     """A grain of no size, or lighter than water, is bad input."""
     with pytest.raises(InputError, match="grain"):
         settling_speed_m_s(grain, density, 1000.0)
+
+
+def test_van_rijns_pickup_is_his_formula_and_is_capped():
+    """At twice the threshold it is 0.00033 rho_s ((s-1) g d)^0.5 D*^0.3; far above, it grows as stress to the half."""
+    d, rho_s, rho = 3e-4, 2710.0, 1000.0
+    threshold = threshold_stress_Pa(d, rho_s, rho)
+    by_hand = 0.00033 * rho_s * (1.71 * 9.80665 * d) ** 0.5 * grain_number(d, rho_s, rho) ** 0.3
+    assert pickup_rate_kg_m2_s(2 * threshold, threshold, d, rho_s, rho) == pytest.approx(by_hand, rel=1e-9)
+    assert pickup_rate_kg_m2_s(0.9 * threshold, threshold, d, rho_s, rho) == 0.0
+    high = pickup_rate_kg_m2_s(np.array([100.0, 400.0]), threshold, d, rho_s, rho)
+    assert high[1] / high[0] == pytest.approx(2.0, rel=0.01)

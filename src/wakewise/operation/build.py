@@ -6,13 +6,14 @@ perturbed vehicle parameters and its own water; the controller gets the nominal 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from wakewise.control import make_controller
+from wakewise.errors import InputError
 from wakewise.estimation import ErrorStateFilter
 from wakewise.geometry import Pose, quat_from_rotvec, quat_multiply
 from wakewise.imaging import PinholeCamera, Scene
@@ -20,8 +21,8 @@ from wakewise.interfaces import BodyState, Controller, Estimator, ScalarGrid
 from wakewise.missions import Route, RoutePilot, TankBounds, check_clearance, plan_route
 from wakewise.operation.loop import Truth, WaterTruth
 from wakewise.operation.scenario import Scenario, TargetSettings
-from wakewise.tank import Tank
-from wakewise.targets import Region, Target, coral, coral_kinds, load_mesh, place_on_bed, sample_region
+from wakewise.tank import Holding, Tank, build_ambient, holding
+from wakewise.targets import Region, Target, coral, coral_kinds, delicacy, load_mesh, place_on_bed, sample_region
 from wakewise.vehicles import Vehicle, load_vehicle, perturbed
 from wakewise.wake import wake_model
 
@@ -45,13 +46,14 @@ class Seeds:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mission:
-    """What is known before the flight: vehicle as believed, target, its water, the route."""
+    """What is known before the flight: vehicle as believed, target, its water, the route, the current to hold in."""
 
     vehicle: Vehicle
     target: Target
     region: Region
     route: Route
     clearance_m: float
+    holding: Holding | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -81,13 +83,7 @@ class TankWitness:
 
     def water(self) -> WaterTruth:
         """Water at the target now."""
-        measure = self.tank.measure()
-        return WaterTruth(
-            target_speed_mean_m_s=measure.target_speed_mean_m_s,
-            target_speed_p95_m_s=measure.target_speed_p95_m_s,
-            bed_speed_p95_m_s=measure.bed_speed_p95_m_s,
-            turbidity_per_m=measure.turbidity_per_m,
-        )
+        return WaterTruth(**asdict(self.tank.measure()))
 
     def silt(self) -> ScalarGrid:
         """Silt around the target now."""
@@ -108,7 +104,7 @@ def build_mission(scenario: Scenario) -> Mission:
     Raises
     ------
     InputError
-        Unknown vehicle or target, or an orbit that would touch something.
+        Unknown vehicle or target, an orbit that would touch something, or a current faster than the vehicle can hold.
     """
     length, width, depth = scenario.tank.size_m
     vehicle = load_vehicle(scenario.vehicle)
@@ -120,8 +116,48 @@ def build_mission(scenario: Scenario) -> Mission:
     clearance_m = check_clearance(
         route, vehicle.X_BC, vehicle.size_m, bounds, target.mesh.vertices_m, scenario.mission.clearance_m
     )
-    region = sample_region(target, scenario.target.points, Seeds.of(scenario.seed).region)
-    return Mission(vehicle=vehicle, target=target, region=region, route=route, clearance_m=clearance_m)
+    gain = scenario.target.delicate_gain
+    region = sample_region(
+        target,
+        scenario.target.points,
+        Seeds.of(scenario.seed).region,
+        delicacy(target.mesh) if gain > 0.0 else None,
+        gain,
+    )
+    return Mission(
+        vehicle=vehicle,
+        target=target,
+        region=region,
+        route=route,
+        clearance_m=clearance_m,
+        holding=check_current(scenario, vehicle, route),
+    )
+
+
+def check_current(scenario: Scenario, vehicle: Vehicle, route: Route, looks: int = 200) -> Holding | None:
+    """Hold the water that passes the vehicle along its route against what its thrusters can give.
+
+    Raises
+    ------
+    InputError
+        If it cannot stay on the route, with the figures, or the current's series is shorter than the flight.
+    """
+    tank = scenario.tank
+    ambient = build_ambient(tank, np.random.default_rng(scenario.seed))
+    if ambient.end_s < route.duration_s:
+        raise InputError(
+            f"tank.current_file: {ambient.end_s:.0f} s of series are left, the flight takes {route.duration_s:.0f} s"
+        )
+    passing = []
+    for time_s in np.linspace(0.0, route.duration_s, looks):
+        wished = route.body(float(time_s), vehicle.X_BC)
+        current = ambient.velocity(wished.X_WB.p_m[None], float(time_s))[0]
+        passing.append(current @ wished.X_WB.R - wished.nu_B[:3])
+    trim_N = tank.trim_range_N if tank.trim_N is None else tank.trim_N
+    found = holding(vehicle, np.array(passing), tank.density_kg_m3, trim_N)
+    if found is not None and found.share < 1.0:
+        raise InputError(f"tank: {vehicle.name} cannot hold its route, {found.said()}")
+    return found
 
 
 def build_flight(scenario: Scenario, mission: Mission) -> Flight:
@@ -144,12 +180,14 @@ def build_flight(scenario: Scenario, mission: Mission) -> Flight:
     wished = mission.route.body(0.0, believed.X_BC)
     start = BodyState(X_WB=_misplaced(wished.X_WB, seeds.start))
     tank = Tank(true_vehicle, mission.target, tank_settings, start, seeds.tank)
-    control = scenario.control
+    control, depth_m = scenario.control, tank_settings.size_m[2]
     return Flight(
         mission=mission,
         true_vehicle=true_vehicle,
         pilot=RoutePilot(route=mission.route, X_BC=believed.X_BC, exposure_s=scenario.imaging.exposure_s),
-        controller=make_controller(scenario.method, believed, mission.region, wake_model(control.wake_model), control),
+        controller=make_controller(
+            scenario.method, believed, mission.region, wake_model(control.wake, depth_m), control
+        ),
         estimator=ErrorStateFilter(believed, scenario.estimation),
         tank=tank,
         witness=TankWitness(tank=tank),

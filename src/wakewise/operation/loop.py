@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,12 +16,20 @@ from wakewise.interfaces import BodyState, Command, Controller, Estimator, Goal,
 
 @dataclass(frozen=True, kw_only=True)
 class WaterTruth:
-    """What the water did, in the figures that a trial is judged by; speeds are the excess over the unthrusted flow."""
+    """What the water did, in the figures that a trial is judged by; speeds are the excess over the unthrusted flow.
+
+    Pressures, shear and the speed of tracers are of the whole water; NaN where a witness does not know them.
+    """
 
     target_speed_mean_m_s: float
     target_speed_p95_m_s: float
     bed_speed_p95_m_s: float
     turbidity_per_m: float
+    target_pressure_mean_Pa: float = math.nan
+    target_pressure_p95_Pa: float = math.nan
+    bed_shear_p95_Pa: float = math.nan
+    tracer_speed_mean_m_s: float = math.nan
+    ray_optical_depth: float = math.nan
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

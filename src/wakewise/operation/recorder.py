@@ -6,7 +6,7 @@ timings.parquet. Column names carry units; frames and meanings are in docs/conve
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,7 @@ from wakewise.operation.loop import Step, WaterTruth, Witness
 
 _STATE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "u_m_s", "v_m_s", "w_m_s", "p_rad_s", "q_rad_s", "r_rad_s")
 _WRENCH = ("wrench_X_N", "wrench_Y_N", "wrench_Z_N", "wrench_K_Nm", "wrench_M_Nm", "wrench_N_Nm")
-_WATER = ("target_speed_mean_m_s", "target_speed_p95_m_s", "bed_speed_p95_m_s", "turbidity_per_m")
+_WATER = tuple(figure.name for figure in fields(WaterTruth))
 
 
 def step_columns(thrusters: int) -> list[str]:

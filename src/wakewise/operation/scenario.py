@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import yaml
 from pydantic import BaseModel, Field, ValidationError, field_validator
@@ -31,6 +31,9 @@ class TargetSettings(Settings):
     size_m: float | None = Field(None, gt=0.0, le=3.0, description="scale the largest extent of a mesh file to this")
     seed: int = Field(0, ge=0, description="which individual of a procedural coral")
     points: int = Field(300, ge=20, le=10000, description="sample points that stand for the target's water in D")
+    delicate_gain: float = Field(
+        0.0, ge=0.0, le=100.0, description="points on thin or sharp places weigh 1 + this; 0 is the paper's weighting"
+    )
 
 
 class Scenario(Settings):
@@ -104,8 +107,10 @@ def describe_fault(fault: ValidationError, model: type[BaseModel]) -> str:
         *parents, unknown = [str(part) for part in first["loc"]]
         owner: Any = model
         for part in parents:
-            annotation = owner.model_fields[part].annotation
-            owner = annotation if isinstance(annotation, type) and issubclass(annotation, BaseModel) else owner
+            if part in owner.model_fields:  # or the place in a list, whose items the list's type names
+                annotation = owner.model_fields[part].annotation
+                inner = [a for a in (annotation, *get_args(annotation)) if isinstance(a, type)]
+                owner = next((a for a in inner if issubclass(a, BaseModel)), owner)
         allowed = list(owner.model_fields)
         close = difflib.get_close_matches(unknown, allowed, 1)
         hint = f"did you mean {close[0]}?" if close else f"allowed are {', '.join(allowed)}"

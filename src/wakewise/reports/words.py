@@ -11,8 +11,8 @@ THIN_SPACE = "\u202f"
 
 # Endings of keys, longest first where one contains another.
 _UNITS = (
-    ("_m_s", "m/s"), ("_per_m", "1/m"), ("_per_s", "1/s"), ("_mm", "mm"), ("_pct", "%"), ("_deg", "deg"), ("_kJ", "kJ"),
-    ("_px", "px"), ("_MB", "MB"), ("_N", "N"), ("_ms", "ms"), ("_m", "m"), ("_s", "s"),
+    ("_m_s", "m/s"), ("_per_m", "1/m"), ("_per_s", "1/s"), ("_mm", "mm"), ("_Pa", "Pa"), ("_pct", "%"), ("_deg", "deg"),
+    ("_kJ", "kJ"), ("_px", "px"), ("_MB", "MB"), ("_N", "N"), ("_ms", "ms"), ("_m", "m"), ("_s", "s"),
 )  # fmt: skip
 
 GROUPS: dict[str, tuple[str, ...]] = {
@@ -23,7 +23,10 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "The photographs": (
         "images", "registered", "features", "inlier", "reprojection", "cameras", "points", "sharpness", "sparse",
     ),
-    "The water": ("target_speed", "exposure_speed", "bed_speed", "turbidity", "disturbance"),
+    "The water": (
+        "target_speed", "exposure_speed", "bed_speed", "turbidity", "disturbance", "target_pressure",
+        "exposure_pressure", "exposure_optical", "bed_shear", "tracer", "ray_optical",
+    ),
     "The flight": (
         "method", "seed", "duration", "position", "path", "estimate", "velocity", "roll", "energy", "sign",
         "collisions", "legs",

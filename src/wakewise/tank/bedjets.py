@@ -1,4 +1,4 @@
-"""Radial wall jets on the bed: where a free jet goes after it has struck the floor.
+"""Radial wall jets on the bed and the other faces: where a free jet goes after it has struck one.
 
 A free jet that strikes a floor turns within about 0.14 of its height and runs out along the floor in a thin layer with
 u_max = 1.16 sqrt(M) / r and a half thickness of 0.09 r, r from the strike point, M = thrust / density (Beltaos and
@@ -17,9 +17,8 @@ horizontal momentum is the jet's own; in that sector R becomes R w^(1/4) and A b
 
 from __future__ import annotations
 
-import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -27,6 +26,7 @@ from scipy.special import i0
 
 from wakewise.arrays import Array, IntArray
 from wakewise.tank.chunks import over_points
+from wakewise.tank.faces import Face, Room
 
 WALL_JET_SPEED = 1.16  # u_max r / sqrt(M), Rajaratnam 1976
 WALL_JET_SPREAD = 0.093  # delta over R for which the layer below, entrainment included, is half as fast at 0.09 R
@@ -34,6 +34,8 @@ STRIKE_HEIGHT = 1.75  # of the parcel's sigma: 0.14 H, where the bed's pressure 
 _LAYER_CONVECTION = 1 / math.sqrt(2)  # mean of u weighted with u over a Gaussian layer, as a share of u_max
 _LOG_WIDTH = 0.3  # L: neighbouring rings overlap; it sets how sharp a front is, not how fast
 _REACH = 3.3 * _LOG_WIDTH  # beyond it g is below 5e-3
+HIGHEST = 4.0  # radii above the bed: what a ring moves there is below 0.2 % of its crest
+_FARTHEST = 2.1 * math.exp(_REACH)  # radii: as far as the steepest lean allowed, w^(1/4) = 2.1, throws a ring
 # Rings of one jet closer than this share of L become one: then none are more than 2 L apart, where a row of Gaussians
 # still sums to a constant within 1.4 % (Poisson summation, 2 exp(-2 pi^2 / 4)).
 _RING_MERGE = 1.0
@@ -121,22 +123,74 @@ def rings_from_strikes(position_m: Array, impulse_m4_s: Array, sigma_m: Array, s
     return Rings(position_m[:, :2].copy(), STRIKE_HEIGHT * sigma_m, size, heading, lean(share), stream.copy())
 
 
-def ring_velocity(points_W_m: Array, rings: Rings, bed_z_m: float) -> Array:
-    """Velocity of the rings, shape (n, 3), at points, shape (n, 3); zero if there are none."""
+def ring_velocity(points_W_m: Array, rings: Rings, bed_z_m: float, least_m: float = 0.0) -> Array:
+    """Velocity of the rings, shape (n, 3), at points, shape (n, 3); zero if there are none.
+
+    `least_m` is the least thickness delta of a layer, whose momentum stays; see `packed_rings`.
+    """
+    return packed_velocity(points_W_m, packed_rings(rings, least_m), bed_z_m)
+
+
+def packed_rings(rings: Rings, least_m: float = 0.0, per_height: float = 0.0) -> Array:
+    """One row per ring, as the kernel reads it, for several calls of `packed_velocity`, shape (n, 13).
+
+    A layer has the thickness hypot(0.093 R, least_m). Where that is more than the law's, it is slower by the square
+    root of the ratio, so that it carries the same momentum. `per_height` is one over
+    the distance to the opposite face, where F ends with a factor 1 - h per_height; 0 for none.
+    """
+    strength = ring_strength(rings)
+    weight = 1 / i0(rings.kappa)
+    # Where a ring can be felt at all, whatever the azimuth: w lies between exp(-kappa)/I0 and exp(kappa)/I0.
+    inner = rings.radius_m * (weight * np.exp(-rings.kappa)) ** 0.25 * math.exp(-_REACH)
+    outer = rings.radius_m * (weight * np.exp(rings.kappa)) ** 0.25 * math.exp(_REACH)
+    highest = HIGHEST * outer * math.exp(-_REACH)
+    least, ends = np.full(rings.count, least_m), np.full(rings.count, per_height)
+    return np.column_stack(
+        [
+            rings.centre_m,
+            rings.radius_m,
+            strength,
+            rings.heading,
+            rings.kappa,
+            weight,
+            inner**2,
+            outer**2,
+            highest,
+            least,
+            ends,
+        ]
+    )
+
+
+def packed_velocity(points_W_m: Array, packed: Array, bed_z_m: float) -> Array:
+    """Velocity of packed rings, shape (n, 3), at points, shape (n, 3)."""
     out = np.zeros((len(points_W_m), 3))
-    if rings.count and len(points_W_m):
+    if len(packed) and len(points_W_m):
         points = np.ascontiguousarray(points_W_m, dtype=np.float64)
-        strength = ring_strength(rings)
-        weight = 1 / i0(rings.kappa)
-        # Where a ring can be felt at all, whatever the azimuth: w lies between exp(-kappa)/I0 and exp(kappa)/I0.
-        inner = rings.radius_m * (weight * np.exp(-rings.kappa)) ** 0.25 * math.exp(-_REACH)
-        outer = rings.radius_m * (weight * np.exp(rings.kappa)) ** 0.25 * math.exp(_REACH)
-        packed = np.column_stack(
-            [rings.centre_m, rings.radius_m, strength, rings.heading, rings.kappa, weight, inner**2, outer**2]
-        )
-        cost = 10 * len(points) * rings.count  # a ring takes as long as ten parcels
+        cost = 10 * len(points) * len(packed)  # a ring takes as long as ten parcels
         over_points(lambda some, result: _sum_rings(some, packed, bed_z_m, result), points, out, cost)
     return out
+
+
+def with_ring_images(rings: Rings, face: Face, room: Room) -> Rings:
+    """Rings on a face, and their images in the faces that it meets and they can reach."""
+    depth = np.full(rings.count, face.depth_m)
+    for other in room.faces:
+        if other.axis == face.axis:
+            continue
+        centre = face.world(np.column_stack([rings.centre_m, depth]))
+        near = other.gap_m(centre) < _FARTHEST * rings.radius_m
+        if not near.any():
+            continue
+        some = rings.take(near)
+        heading = face.world(np.column_stack([some.heading, np.zeros(some.count)]))
+        image = replace(
+            some,
+            centre_m=face.local(other.mirrored(centre[near], shift=True))[:, :2],
+            heading=face.local(other.mirrored(heading, shift=False))[:, :2],
+        )
+        rings, depth = rings.joined(image), np.concatenate([depth, depth[near]])
+    return rings
 
 
 def ring_strength(rings: Rings) -> Array:
@@ -156,11 +210,16 @@ def layer_speed(rings: Rings) -> Array:
     return speed
 
 
-def grown(rings: Rings, current_W_m_s: Array, dt_s: float) -> tuple[Rings, Array]:
-    """Rings after dt_s, and the layer speed they had, shape (n,). Exact in dt for a speed that falls as 1/R."""
-    speed = layer_speed(rings)
+def grown(rings: Rings, current_m_s: Array, dt_s: float, least_m: float = 0.0) -> tuple[Rings, Array]:
+    """Rings after dt_s, and the layer speed they had, shape (n,). Exact in dt for a speed that falls as 1/R.
+
+    The current carries the centres: velocity in the face's frame, shape (3,) or (n, 3). `least_m` as in
+    `ring_velocity`.
+    """
+    thin = WALL_JET_SPREAD * rings.radius_m
+    speed = layer_speed(rings) * np.sqrt(thin / np.hypot(thin, least_m))
     radius = np.sqrt(rings.radius_m**2 + 2 * rings.radius_m * _LAYER_CONVECTION * speed * dt_s)
-    centre = rings.centre_m + current_W_m_s[:2] * dt_s
+    centre = rings.centre_m + current_m_s[..., :2] * dt_s
     return Rings(centre, radius, rings.impulse_m4_s, rings.heading, rings.kappa, rings.stream), speed
 
 
@@ -172,15 +231,34 @@ def coarsened(rings: Rings) -> Rings:
     keep = np.ones(rings.count, dtype=np.bool_)
     centre, radius, impulse = rings.centre_m.copy(), rings.radius_m.copy(), rings.impulse_m4_s.copy()
     heading, kappa = rings.heading.copy(), rings.kappa.copy()
+    _merge_rings(order, centre, radius, impulse, heading, kappa, rings.stream, keep)
+    if keep.all():
+        return rings
+    return Rings(centre, radius, impulse, heading, kappa, rings.stream).take(keep)
+
+
+@njit(cache=True)
+def _merge_rings(
+    order: IntArray,
+    centre: Array,
+    radius: Array,
+    impulse: Array,
+    heading: Array,
+    kappa: Array,
+    stream: IntArray,
+    keep: np.ndarray,
+) -> None:
     joined_last = False
-    for a, b in itertools.pairwise(order):
+    for n in range(1, order.shape[0]):
+        a, b = order[n - 1], order[n]
         close = (
             not joined_last
-            and rings.stream[a] == rings.stream[b]
+            and stream[a] == stream[b]
             and abs(math.log(radius[a] / radius[b])) < _RING_MERGE * _LOG_WIDTH
-            and np.hypot(*(centre[a] - centre[b])) < _RING_MERGE * _LOG_WIDTH * radius[a]
+            and math.hypot(centre[a, 0] - centre[b, 0], centre[a, 1] - centre[b, 1])
+            < _RING_MERGE * _LOG_WIDTH * radius[a]
         )
-        joined_last = bool(close)
+        joined_last = close
         if not close:
             continue
         share = impulse[a] / (impulse[a] + impulse[b])
@@ -188,11 +266,10 @@ def coarsened(rings: Rings) -> Rings:
         centre[b] = share * centre[a] + (1 - share) * centre[b]
         radius[b] = share * radius[a] + (1 - share) * radius[b]
         turned = share * heading[a] + (1 - share) * heading[b]
-        heading[b] = turned / max(float(np.hypot(*turned)), 1e-12)
+        heading[b] = turned / max(math.hypot(turned[0], turned[1]), 1e-12)
         kappa[b] = share * kappa[a] + (1 - share) * kappa[b]
         impulse[b] += impulse[a]
         keep[a] = False
-    return Rings(centre, radius, impulse, heading, kappa, rings.stream).take(keep)
 
 
 @njit(cache=True)
@@ -216,33 +293,39 @@ def _sum_layers(centre: Array, radius: Array, strength: Array, stream: IntArray,
 def _sum_rings(points: Array, rings: Array, bed: float, out: Array) -> None:
     """Sum over rings, whose columns are as packed by `ring_velocity`."""
     root_half_pi = math.sqrt(math.pi / 2)
+    highest = rings[:, 10].max()
     for p in range(points.shape[0]):
         height = max(bed - points[p, 2], 0.0)
+        if height > highest:
+            continue
         u = v = up = 0.0
         for j in range(rings.shape[0]):
             dx, dy = points[p, 0] - rings[j, 0], points[p, 1] - rings[j, 1]
             r2 = dx * dx + dy * dy
-            if r2 < rings[j, 8] or r2 > rings[j, 9]:
+            if r2 < rings[j, 8] or r2 > rings[j, 9] or height > rings[j, 10]:
                 continue
             r = math.sqrt(r2)
-            kappa = rings[j, 6]
-            w = 1.0
-            if kappa > 0.0:
-                w = rings[j, 7] * math.exp(kappa * (dx * rings[j, 4] + dy * rings[j, 5]) / r)
-            root_w = math.sqrt(w)
-            R = rings[j, 2] * math.sqrt(root_w)
+            root_w, R = 1.0, rings[j, 2]
+            if rings[j, 6] > 0.0:
+                w = rings[j, 7] * math.exp(rings[j, 6] * (dx * rings[j, 4] + dy * rings[j, 5]) / r)
+                root_w = math.sqrt(w)
+                R *= math.sqrt(root_w)
             t = math.log(r / R)
-            if abs(t) > _REACH or height > 8.0 * R:
+            if abs(t) > _REACH or height > HIGHEST * R:
                 continue
-            g = math.exp(-t * t / (2.0 * _LOG_WIDTH * _LOG_WIDTH))
-            delta = WALL_JET_SPREAD * R
-            layer = delta * root_half_pi * math.erf(height / (math.sqrt(2.0) * delta))
-            slope = math.exp(-height * height / (2.0 * delta * delta)) - layer / R
-            a = rings[j, 3] * root_w * g * math.exp(-height / R) / r
-            radial = a * slope / r
+            thin = WALL_JET_SPREAD * R
+            delta = math.hypot(thin, rings[j, 11])
+            root_w *= math.sqrt(thin / delta)
+            layer, slope = delta * root_half_pi, 0.0
+            if height < 4.0 * delta:  # above, erf and Gaussian are 1 and 0 to 6e-5 and 3e-4
+                layer *= math.erf(height / (math.sqrt(2.0) * delta))
+                slope = math.exp(-height * height / (2.0 * delta * delta))
+            left = max(1.0 - height * rings[j, 12], 0.0)
+            a = rings[j, 3] * root_w * math.exp(-t * t / (2.0 * _LOG_WIDTH * _LOG_WIDTH) - height / R) / r
+            radial = a * ((slope - layer / R) * left - layer * rings[j, 12]) / r
             u += dx * radial
             v += dy * radial
-            up += a * t * layer / (_LOG_WIDTH * _LOG_WIDTH * r)
+            up += a * t * layer * left / (_LOG_WIDTH * _LOG_WIDTH * r)
         out[p, 0] += u
         out[p, 1] += v
         out[p, 2] -= up

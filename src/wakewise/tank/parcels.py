@@ -1,46 +1,22 @@
-"""Divergence-free velocity of Gaussian impulse parcels above a flat bed: the free jets of the simulated water.
+"""Impulse parcels: what the free jets of the simulated water are made of, and the velocity that they induce.
 
-A parcel of impulse m (m4/s, impulse over density), size sigma and centre X adds
-
-    u(x) = m (G - A) - r_hat (m . r_hat) (G - 3 A),        r = x - X,
-    G = exp(-q/2) / ((2 pi)^(3/2) sigma^3),   A = [erf(s/sqrt 2) - sqrt(2/pi) s exp(-q/2)] / (4 pi r^3),
-
-with s = |r| / sigma and q = s^2: the divergence-free part of the Gaussian-smoothed impulse density m G (impulse, or
-"magnetisation", variables: Chorin 1994, Vorticity and Turbulence). Mirror parcels below the bed keep
-water from flowing through it.
+The sum itself, and what a parcel is, are in `wakewise.tank.induction`; how parcels move and grow in
+`wakewise.tank.closure`.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numba import njit
-from scipy.special import erf
 
 from wakewise.arrays import Array, IntArray
-from wakewise.tank.chunks import over_points
+from wakewise.tank.faces import Room
+from wakewise.tank.induction import impulse_velocity
 
-_Q_END = 49.0  # beyond seven sigma the Gaussian is below 3e-11 of its centre and A is 1 / (4 pi r^3)
-_KNOTS = 4096
-
-
-def _shape_tables() -> tuple[Array, Array]:
-    """G and A for sigma = 1 at equal steps of q; linear interpolation between them is good to 1e-5."""
-    q = np.linspace(0.0, _Q_END, _KNOTS)
-    s = np.sqrt(q)
-    G = np.exp(-q / 2) / (2 * np.pi) ** 1.5
-    A = np.empty_like(G)
-    A[0] = G[0] / 3
-    A[1:] = (erf(s[1:] / math.sqrt(2)) - math.sqrt(2 / math.pi) * s[1:] * np.exp(-q[1:] / 2)) / (4 * np.pi * s[1:] ** 3)
-    # The closed form of A loses digits to cancellation near zero; its series there is G(0) (1/3 - q/10 + q^2/56).
-    near = q < 0.05
-    A[near] = G[0] * (1 / 3 - q[near] / 10 + q[near] ** 2 / 56)
-    return G, A
-
-
-_G_TABLE, _A_TABLE = _shape_tables()
+_PARALLEL = 0.9  # cosine: opposite parcels would cancel instead of stirring each other, so they never merge
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +35,8 @@ class Parcels:
         Which jet it belongs to: twice the thruster's index, plus one for reverse thrust.
     gust : ndarray, shape (n, 3)
         Turbulent share of the impulse, a standard normal variable before scaling.
+    disk_m_s : ndarray, shape (n, 3)
+        Velocity of the disk when it was sent: its water starts with it and loses it to what is entrained.
     """
 
     position_m: Array
@@ -67,40 +45,33 @@ class Parcels:
     diameter_m: Array
     stream: IntArray
     gust: Array
+    disk_m_s: Array
 
     @classmethod
     def none(cls) -> Parcels:
         """No parcels at all: still water."""
-        return cls(
-            np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
-        )
+        v = np.zeros((0, 3))
+        return cls(v, v, np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64), v, v)
 
     @property
     def count(self) -> int:
         """How many there are."""
         return len(self.sigma_m)
 
+    @property
+    def size_m4_s(self) -> Array:
+        """Length of each impulse, shape (n,)."""
+        size: Array = np.sqrt(np.einsum("ni,ni->n", self.impulse_m4_s, self.impulse_m4_s))
+        return size
+
     def take(self, keep: np.ndarray) -> Parcels:
         """Those that a mask or an index array picks."""
-        return Parcels(
-            self.position_m[keep],
-            self.impulse_m4_s[keep],
-            self.sigma_m[keep],
-            self.diameter_m[keep],
-            self.stream[keep],
-            self.gust[keep],
-        )
+        return Parcels(*(getattr(self, field.name)[keep] for field in fields(self)))
 
-    def joined(self, later: Parcels) -> Parcels:
+    def joined(self, *later: Parcels) -> Parcels:
         """These followed by the later ones."""
-        return Parcels(
-            np.concatenate([self.position_m, later.position_m]),
-            np.concatenate([self.impulse_m4_s, later.impulse_m4_s]),
-            np.concatenate([self.sigma_m, later.sigma_m]),
-            np.concatenate([self.diameter_m, later.diameter_m]),
-            np.concatenate([self.stream, later.stream]),
-            np.concatenate([self.gust, later.gust]),
-        )
+        groups = (self, *later)
+        return Parcels(*(np.concatenate([getattr(group, f.name) for group in groups]) for f in fields(self)))
 
 
 def parcel_velocity(
@@ -116,75 +87,93 @@ def parcel_velocity(
     bed_z_m : float
         The plane z = bed_z_m, through which nothing flows; infinite for water without a bed.
     """
-    out = np.zeros((len(points_W_m), 3))
-    if len(sigmas_m) and len(points_W_m):
-        points = np.ascontiguousarray(points_W_m, dtype=np.float64)
-        # One array per quantity: the inner loop then reads memory in order and the compiler vectorises it.
-        rows = [np.ascontiguousarray(row) for row in (*positions_m.T, *impulses_m4_s.T)] + [1.0 / sigmas_m]
-        images = math.isfinite(bed_z_m)
-        bed = bed_z_m if images else 0.0
-        over_points(
-            lambda some, result: _sum_parcels(some, *rows, images, bed, _G_TABLE, _A_TABLE, result),
-            points,
-            out,
-            len(points) * len(sigmas_m) * (2 if images else 1),
-        )
-    return out
+    room = Room.of(bed_z_m, (math.inf, math.inf), surface=False)
+    return confined_velocity(points_W_m, positions_m, impulses_m4_s, sigmas_m, room)
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
-def _sum_parcels(
-    points: Array,
+def confined_velocity(
+    points_W_m: Array, positions_m: Array, impulses_m4_s: Array, sigmas_m: Array, room: Room
+) -> Array:
+    """Velocity of parcels and of their images in a room's faces; arguments as `parcel_velocity`."""
+    sources = room.with_images(positions_m, impulses_m4_s, sigmas_m)
+    u = impulse_velocity(points_W_m, *sources)
+    for face in room.faces:
+        if face.name == "bed":
+            # On the bed itself parcel and image cancel across it; the sum only has their rounding.
+            u[points_W_m[:, 2] == face.at_m, 2] = 0.0
+    return u
+
+
+def merged(parcels: Parcels, spacing: float) -> Parcels:
+    """Pairs of successive parcels of one jet closer than `spacing` sigma made one; their impulse is conserved.
+
+    Sizes are averaged, not widened by the distance: in a row the distance lies along the jet, and widening would
+    spread the jet sideways as well.
+    """
+    if parcels.count < 2:
+        return parcels
+    return _merged(parcels, np.arange(parcels.count), parcels.stream, spacing)
+
+
+def merged_across(parcels: Parcels, spacing: float) -> Parcels:
+    """Pairs of far-travelled parcels of different jets, alike in size and direction and very close, made one.
+
+    Parcels are sorted into cells of half the spacing at most, level by level of size; neighbours in a cell may merge.
+    """
+    old = np.flatnonzero(parcels.sigma_m > parcels.diameter_m)  # 12 diameters of path
+    if len(old) < 2:
+        return parcels
+    level = np.floor(2 * np.log2(parcels.sigma_m[old])).astype(np.int64)
+    cell = np.floor(parcels.position_m[old] / (spacing * 2.0 ** (level / 2))[:, None]).astype(np.int64)
+    order = np.lexsort((old, cell[:, 2], cell[:, 1], cell[:, 0], level))
+    groups = np.cumsum(np.any(np.diff(np.column_stack([level, cell])[order], axis=0, prepend=0) != 0, axis=1))
+    labels = np.empty(parcels.count, dtype=np.int64)
+    labels[old[order]] = groups - groups[0]
+    return _merged(parcels, old[order], labels, spacing)
+
+
+def _merged(parcels: Parcels, order: IntArray, label: IntArray, spacing: float) -> Parcels:
+    """Walk through parcels in an order; each may take up the one before it with the same label."""
+    position, impulse = parcels.position_m.copy(), parcels.impulse_m4_s.copy()
+    sigma, gust, disk = parcels.sigma_m.copy(), parcels.gust.copy(), parcels.disk_m_s.copy()
+    keep = np.ones(parcels.count, dtype=np.bool_)
+    labels = int(label[order].max()) + 1
+    _merge_pairs(order, position, impulse, sigma, gust, disk, label, labels, spacing, keep)
+    out = Parcels(position, impulse, sigma, parcels.diameter_m, parcels.stream, gust, disk)
+    return out if keep.all() else out.take(keep)
+
+
+@njit(cache=True)
+def _merge_pairs(
+    order: IntArray,
     X: Array,
-    Y: Array,
-    Z: Array,
-    MX: Array,
-    MY: Array,
-    MZ: Array,
-    S: Array,
-    images: bool,
-    bed: float,
-    G_table: Array,
-    A_table: Array,
-    out: Array,
+    m: Array,
+    sigma: Array,
+    gust: Array,
+    disk: Array,
+    label: IntArray,
+    labels: int,
+    spacing: float,
+    keep: np.ndarray,
 ) -> None:
-    """Sum over parcels; free of branches inside, so that the compiler can work on several parcels at once."""
-    knots_per_q = (_KNOTS - 1) / _Q_END
-    last_q = _Q_END - 0.02
-    four_pi_inverse = 1.0 / (4.0 * math.pi)
-    for p in range(points.shape[0]):
-        x, y = points[p, 0], points[p, 1]
-        # On the bed itself parcel and image agree along it and cancel across it.
-        on_bed = images and points[p, 2] == bed
-        for side in range(1 if on_bed or not images else 2):
-            # The mirror image's velocity at x is the mirrored velocity of the parcel at the mirrored point.
-            z = points[p, 2] if side == 0 else 2.0 * bed - points[p, 2]
-            u = v = w = 0.0
-            for j in range(S.shape[0]):
-                dx, dy, dz = x - X[j], y - Y[j], z - Z[j]
-                mx, my, mz, s = MX[j], MY[j], MZ[j], S[j]
-                r2 = dx * dx + dy * dy + dz * dz + 1e-15
-                inverse_r2 = 1.0 / r2
-                q = r2 * s * s
-                f = min(q, last_q) * knots_per_q
-                k = np.int32(f)
-                f -= k
-                s3 = s * s * s
-                G_near = (G_table[k] + (G_table[k + 1] - G_table[k]) * f) * s3
-                A_near = (A_table[k] + (A_table[k + 1] - A_table[k]) * f) * s3
-                A_far = four_pi_inverse * inverse_r2 * math.sqrt(inverse_r2)
-                far = q >= last_q
-                G = 0.0 if far else G_near
-                A = A_far if far else A_near
-                along = (mx * dx + my * dy + mz * dz) * inverse_r2 * (G - 3.0 * A)
-                across = G - A
-                u += mx * across - dx * along
-                v += my * across - dy * along
-                w += mz * across - dz * along
-            out[p, 0] += u
-            out[p, 1] += v
-            out[p, 2] += w if side == 0 else -w
-        if on_bed:
-            out[p, 0] *= 2.0
-            out[p, 1] *= 2.0
-            out[p, 2] = 0.0
+    last = np.full(labels, -1)
+    for j in order:
+        i = last[label[j]]
+        last[label[j]] = j
+        if i < 0:
+            continue
+        reach = spacing * min(sigma[i], sigma[j])
+        if np.sum((X[i] - X[j]) ** 2) > reach * reach:
+            continue
+        a, b = np.sqrt(np.sum(m[i] ** 2)), np.sqrt(np.sum(m[j] ** 2))
+        if np.sum(m[i] * m[j]) < _PARALLEL * a * b:
+            continue
+        p = a / (a + b)
+        X[j] = p * X[i] + (1 - p) * X[j]
+        sigma[j] = p * sigma[i] + (1 - p) * sigma[j]
+        disk[j] = p * disk[i] + (1 - p) * disk[j]
+        gust[j] = (p * gust[i] + (1 - p) * gust[j]) / np.sqrt(p * p + (1 - p) * (1 - p))
+        m[j] += m[i]
+        keep[i] = False
+        # A merged parcel waits for the next step, so that rows thin evenly.
+        last[label[j]] = -1

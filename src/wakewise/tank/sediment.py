@@ -1,10 +1,10 @@
 """Silt on the bed and in the water: lifted by jets, carried, mixed, settled; no gram is lost.
 
-The bed is a grid of cells with a load in kg/m2. Where the water's shear stress exceeds the silt's threshold, silt
-leaves its cell at Partheniades' rate as particles, each standing for a parcel of silt. Particles move with the water,
-sink, and walk at random with the eddy diffusivity K = K0 + 0.40 u* min(h, H), h the height above the bed and u* the
-friction velocity of the cell below (mixing length theory next to a wall), including the
-drift grad K that keeps well-mixed silt mixed (Visser 1997, doi 10.3354/meps158275).
+The bed is a grid of cells with a load in kg/m2. Where the water's shear stress exceeds the grains' threshold, they
+leave their cell at Partheniades' rate (silt) or van Rijn's (sand) as particles, each standing for many grains.
+Particles move with the water, sink, and walk at random with the eddy diffusivity K = K0 + 0.40 u* min(h, H), h the
+height above the bed and u* the friction velocity of the cell below (mixing length theory next to a wall), including
+the drift grad K that keeps well-mixed silt mixed (Visser 1997, doi 10.3354/meps158275).
 """
 
 from __future__ import annotations
@@ -17,9 +17,11 @@ import numpy as np
 from wakewise.arrays import Array, IntArray
 from wakewise.interfaces import Flow, ScalarGrid
 from wakewise.tank.grains import (
+    SAND_M,
     VON_KARMAN,
     erosion_rate_kg_m2_s,
     friction_velocity_m_s,
+    pickup_rate_kg_m2_s,
     settling_speed_m_s,
     threshold_stress_Pa,
 )
@@ -28,12 +30,13 @@ CELL_M = 0.05
 SHEAR_HEIGHT_M = 0.01  # where the log law takes the water's speed from; the wall jets' slip speed stands for it
 BACKGROUND_DIFFUSIVITY_M2_S = 1e-5  # still tank water, low end of 1e-5..1e-4
 MIXING_HEIGHT_M = 0.065  # 0.40 u* h reaches a jet's 0.022 sqrt(T/rho) about here, and grows no more
+SUSPENDED_NEAR_M = 0.8  # particles of grains suspended from the start are finer within this of the target
 _FIRST_HEIGHT_M = 0.005  # silt that leaves the bed starts evenly spread below this
 
 
 @dataclass(frozen=True, kw_only=True)
 class SiltLaws:
-    """What the silt is made of."""
+    """What the silt, or sand, is made of; `sand` says that van Rijn's pickup lifts it and not Partheniades' rate."""
 
     grain_m: float
     grain_density_kg_m3: float
@@ -41,6 +44,7 @@ class SiltLaws:
     erosion_kg_m2_s: float
     threshold_Pa: float
     settling_m_s: float
+    sand: bool = False
 
     @classmethod
     def of(
@@ -50,8 +54,9 @@ class SiltLaws:
         water_density_kg_m3: float,
         erosion_kg_m2_s: float,
         threshold_Pa: float | None = None,
+        pickup: str = "auto",
     ) -> SiltLaws:
-        """Laws of a grain; its own threshold unless one is given."""
+        """Laws of a grain; its own threshold unless one is given; `pickup` is auto, partheniades or van-rijn."""
         own = threshold_stress_Pa(grain_m, grain_density_kg_m3, water_density_kg_m3)
         return cls(
             grain_m=grain_m,
@@ -60,7 +65,15 @@ class SiltLaws:
             erosion_kg_m2_s=erosion_kg_m2_s,
             threshold_Pa=own if threshold_Pa is None else threshold_Pa,
             settling_m_s=settling_speed_m_s(grain_m, grain_density_kg_m3, water_density_kg_m3),
+            sand=pickup == "van-rijn" or (pickup == "auto" and grain_m >= SAND_M),
         )
+
+    def lifted_kg_m2_s(self, stress_Pa: Array) -> Array:
+        """Rate at which a bed under a stress gives up grains, same shape."""
+        if self.sand:
+            grain = self.grain_m, self.grain_density_kg_m3, self.water_density_kg_m3
+            return pickup_rate_kg_m2_s(stress_Pa, self.threshold_Pa, *grain)
+        return erosion_rate_kg_m2_s(stress_Pa, self.threshold_Pa, self.erosion_kg_m2_s)
 
 
 class Silt:
@@ -102,6 +115,44 @@ class Silt:
         # A full set of new particles stands for the load of 0.01 m2; every pairing doubles the mass of the next ones.
         self._birth_kg = max(0.01 * load_kg_m2 / max_particles, 1e-12)
         self.pairings = 0
+        self._start_kg = self.total_kg
+
+    def suspend(self, concentration_kg_m3: float, centre_W_m: Array) -> None:
+        """Add grains, evenly spread in all the water, before the first step.
+
+        A share of the particles stands for the water within 0.8 m of a place, finer there than elsewhere, where
+        fewer and heavier ones do; within each part they are stratified in height and all alike.
+        """
+        if concentration_kg_m3 <= 0.0:
+            return
+        n = self._max // 2
+        low, high = np.array([*self._low, 0.0]), np.array([*-self._low, self._size[2]])
+        inner_low = np.maximum(low[:2], centre_W_m[:2] - SUSPENDED_NEAR_M)
+        inner_high = np.minimum(high[:2], centre_W_m[:2] + SUSPENDED_NEAR_M)
+        near_m2 = float(np.prod(np.maximum(inner_high - inner_low, 0.0)))
+        far_m2 = float(np.prod(high[:2] - low[:2])) - near_m2
+        near = n * 3 // 4 if far_m2 > 1e-9 else n
+        inner = self._rng.uniform(inner_low, inner_high, (near, 2))
+        outer = np.zeros((0, 2))
+        while len(outer) < n - near:
+            drawn = self._rng.uniform(low[:2], high[:2], (n, 2))
+            outside = np.any((drawn < inner_low) | (drawn > inner_high), axis=1)
+            outer = np.concatenate([outer, drawn[outside]])[: n - near]
+        for xy, area in ((inner, near_m2), (outer, far_m2)):
+            if not len(xy):
+                continue
+            z = (self._rng.permutation(len(xy)) + self._rng.uniform(size=len(xy))) / len(xy) * self._size[2]
+            self.position_m = np.concatenate([self.position_m, np.column_stack([xy, z])])
+            share = concentration_kg_m3 * area * float(self._size[2]) / len(xy)
+            self.mass_kg = np.concatenate([self.mass_kg, np.full(len(xy), share)])
+        self._start_kg = self.total_kg
+        # Grains that settle may be lifted again: as particles no heavier than those near the target, and no lighter.
+        self._birth_kg = max(self._birth_kg, float(self.mass_kg.min()) / 100)
+
+    @property
+    def mass_error_rel(self) -> float:
+        """Mass gained or lost since the start over that at the start; 0 of nothing."""
+        return abs(self.total_kg - self._start_kg) / self._start_kg if self._start_kg > 0.0 else self.total_kg
 
     @property
     def total_kg(self) -> float:
@@ -184,7 +235,7 @@ class Silt:
         laws = self.laws
         stress = laws.water_density_kg_m3 * self._star_m_s**2
         area = float(self._cell.prod())
-        rate = erosion_rate_kg_m2_s(stress, laws.threshold_Pa, laws.erosion_kg_m2_s)
+        rate = laws.lifted_kg_m2_s(stress)
         i, j = np.nonzero((rate > 0.0) & (self.bed_kg_m2 > 0.0))
         if not len(i):
             return

@@ -1,15 +1,24 @@
-"""Gyro, pressure sensor and camera-based pose of the simulated vehicle: rates, noise, bias and latency."""
+"""Sensors of the simulated vehicle: camera-based pose, optical tracking, inertial unit and pressure, on one clock.
+
+Rates, noise, bias, latency, and poses that fail in turbid water. A camera sees its marks by their contrast, which over
+a path d in water of beam attenuation c falls as exp(-c d) (S. Q. Duntley, Light in the sea, J. Opt. Soc. Am. 53 (1963)
+214, doi 10.1364/JOSA.53.000214); poses begin to fail where less than `LEAST_CONTRAST` of it is left and are lost for
+good at half of that.
+"""
 
 from __future__ import annotations
 
 import heapq
+import math
 
 import numpy as np
 
+from wakewise.arrays import Array
 from wakewise.geometry import Pose, quat_from_rotvec, quat_multiply
 from wakewise.interfaces import BodyState, Measurement
 from wakewise.tank.settings import TankSettings
 
+LEAST_CONTRAST = 0.1  # an assumption: detectors of printed marks work down to a contrast of some percent to a fifth
 _TICK_TOLERANCE_S = 1e-9  # a sample due at the end of a step belongs to that step
 
 
@@ -23,41 +32,68 @@ class Sensors:
 
     def __init__(self, settings: TankSettings, rng: np.random.Generator) -> None:
         self._settings = settings
-        self._pose_rng, self._gyro_rng, self._depth_rng = rng.spawn(3)
+        self._pose_rng, imu_rng, self._depth_rng, self._tracking_rng = rng.spawn(4)
+        self._gyro_rng, self._force_rng = imu_rng.spawn(2)
         self._gyro_bias_B = self._gyro_rng.normal(0.0, settings.gyro_bias_rad_s, 3)
-        self._taken = [0, 0, 0]
+        self._force_bias_B = self._force_rng.normal(0.0, settings.accelerometer_bias_m_s2, 3)
+        self._samplers = (self._pose, self._imu, self._depth, self._tracking)
+        self._rates_hz = (
+            settings.pose_rate_hz,
+            settings.imu_rate_hz,
+            settings.depth_rate_hz,
+            settings.tracking_rate_hz,
+        )
+        self._taken = [0] * len(self._samplers)
         self._under_way: list[tuple[float, int, Measurement]] = []
         self._count = 0
 
-    @property
-    def rates_hz(self) -> tuple[float, float, float]:
-        """Of pose, gyro and depth."""
-        s = self._settings
-        return (s.pose_rate_hz, s.gyro_rate_hz, s.depth_rate_hz)
-
     def next_due_s(self) -> float:
         """When the next sample is to be taken; the first ones one period after the start."""
-        return min((n + 1) / rate for n, rate in zip(self._taken, self.rates_hz, strict=True))
+        return min((n + 1) / rate for n, rate in zip(self._taken, self._rates_hz, strict=True) if rate > 0.0)
 
-    def sample(self, time_s: float, state: BodyState) -> None:
-        """Take the samples that are due at `time_s`, where the vehicle is in the true `state`."""
+    def sample(self, time_s: float, state: BodyState, force_B_m_s2: Array, turbidity_per_m: float = 0.0) -> None:
+        """Take the samples that are due at `time_s`.
+
+        Parameters
+        ----------
+        time_s : float
+        state : BodyState
+            True pose and twist.
+        force_B_m_s2 : ndarray, shape (3,)
+            True specific force at the body origin.
+        turbidity_per_m : float
+            Beam attenuation between camera and target.
+        """
+        for kind, (take, rate_hz) in enumerate(zip(self._samplers, self._rates_hz, strict=True)):
+            if rate_hz > 0.0 and (self._taken[kind] + 1) / rate_hz <= time_s + _TICK_TOLERANCE_S:
+                self._taken[kind] += 1
+                take(time_s, state, force_B_m_s2, turbidity_per_m)
+
+    def _pose(self, time_s: float, state: BodyState, _force: Array, turbidity_per_m: float) -> None:
         s = self._settings
-        for kind, rate_hz in enumerate(self.rates_hz):
-            if (self._taken[kind] + 1) / rate_hz > time_s + _TICK_TOLERANCE_S:
-                continue
-            self._taken[kind] += 1
-            if kind == 0:
-                turn = quat_from_rotvec(self._pose_rng.normal(0.0, s.pose_noise_rad, 3))
-                shift = self._pose_rng.normal(0.0, s.pose_noise_m, 3)
-                seen = Pose(state.X_WB.p_m + shift, quat_multiply(state.X_WB.q, turn))
-                self._send(time_s + s.pose_latency_s, Measurement(time_s=time_s, X_WB=seen))
-            elif kind == 1:
-                noise = self._gyro_rng.normal(0.0, s.gyro_noise_rad_s, 3)
-                omega = state.nu_B[3:] + self._gyro_bias_B + noise
-                self._send(time_s, Measurement(time_s=time_s, omega_B_rad_s=omega))
-            else:
-                depth = float(state.X_WB.p_m[2] + self._depth_rng.normal(0.0, s.depth_noise_m))
-                self._send(time_s, Measurement(time_s=time_s, depth_m=depth))
+        # Drawn whether or not it is lost, so that a lost pose leaves the noise of the next ones alone.
+        turn = quat_from_rotvec(self._pose_rng.normal(0.0, s.pose_noise_rad, 3))
+        shift = self._pose_rng.normal(0.0, s.pose_noise_m, 3)
+        if self._pose_rng.uniform() < pose_loss(turbidity_per_m, s.pose_range_m, s.pose_dropout):
+            return
+        if any(begin <= time_s < end for begin, end in s.pose_outages_s):
+            return
+        seen = Pose(state.X_WB.p_m + shift, quat_multiply(state.X_WB.q, turn))
+        self._send(time_s + s.pose_latency_s, Measurement(time_s=time_s, X_WB=seen))
+
+    def _imu(self, time_s: float, state: BodyState, force_B_m_s2: Array, _turbidity: float) -> None:
+        s = self._settings
+        omega = state.nu_B[3:] + self._gyro_bias_B + self._gyro_rng.normal(0.0, s.gyro_noise_rad_s, 3)
+        force = force_B_m_s2 + self._force_bias_B + self._force_rng.normal(0.0, s.accelerometer_noise_m_s2, 3)
+        self._send(time_s, Measurement(time_s=time_s, omega_B_rad_s=omega, force_B_m_s2=force))
+
+    def _depth(self, time_s: float, state: BodyState, _force: Array, _turbidity: float) -> None:
+        depth = float(state.X_WB.p_m[2] + self._depth_rng.normal(0.0, self._settings.depth_noise_m))
+        self._send(time_s, Measurement(time_s=time_s, depth_m=depth))
+
+    def _tracking(self, time_s: float, state: BodyState, _force: Array, _turbidity: float) -> None:
+        place = state.X_WB.p_m + self._tracking_rng.normal(0.0, self._settings.tracking_noise_m, 3)
+        self._send(time_s + self._settings.tracking_latency_s, Measurement(time_s=time_s, p_WB_m=place))
 
     def collect(self, time_s: float) -> tuple[Measurement, ...]:
         """What has arrived by `time_s` and was not collected before, oldest sample first."""
@@ -69,3 +105,10 @@ class Sensors:
     def _send(self, arrival_s: float, measurement: Measurement) -> None:
         heapq.heappush(self._under_way, (arrival_s, self._count, measurement))
         self._count += 1
+
+
+def pose_loss(turbidity_per_m: float, range_m: float, dropout: float) -> float:
+    """Chance that a camera pose fails: `dropout` in clear water, rising to 1 as contrast falls below the least."""
+    contrast = math.exp(-turbidity_per_m * range_m)
+    seen = min(max(2.0 * contrast / LEAST_CONTRAST - 1.0, 0.0), 1.0)
+    return 1.0 - (1.0 - dropout) * seen

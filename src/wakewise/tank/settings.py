@@ -2,14 +2,43 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from wakewise.settings import Settings
 
 Length = Annotated[float, Field(gt=0.3, le=100.0)]
 Speed = Annotated[float, Field(ge=-1.0, le=1.0)]
+Place = tuple[float, float, float]
+
+WATERS: dict[str, dict[str, float]] = {
+    "clear": {"silt": 0.0, "suspended_mg_l": 0.0},
+    "silt": {"silt": 0.1, "suspended_mg_l": 0.0, "grain_m": 20e-6, "grain_density_kg_m3": 2710.0},
+    # 50 mg/L of ground calcite with a median grain of 0.3 mm. It is sand: it sinks 4 cm/s, the water of a tank 1.5 m
+    # deep is clear after 35 s, and no thruster keeps it up. What it tests is sand on the bed, not turbid water.
+    "caco3-50mg": {"silt": 0.0, "suspended_mg_l": 50.0, "grain_m": 3e-4, "grain_density_kg_m3": 2710.0},
+}
+"""Fields that a kind of water sets, unless they are given as well."""
+
+
+class ThrusterFailure(Settings):
+    """One thruster that fails at one time and stays so."""
+
+    thruster: int = Field(..., ge=1, le=64, description="its number, from 1")
+    at_s: float = Field(0.0, ge=0.0, description="when, after the start")
+    kind: Literal["dead", "stuck", "half"] = Field("dead", description="no thrust, a constant one, or a share of it")
+    value: float | None = Field(
+        None, description="stuck: the thrust in N, null for what it then has; half: the share left, null for 0.5"
+    )
+
+    @model_validator(mode="after")
+    def _value_fits(self) -> ThrusterFailure:
+        if self.kind == "dead" and self.value is not None:
+            raise ValueError("value: a dead thruster has none")
+        if self.kind == "half" and self.value is not None and not 0.0 <= self.value <= 1.0:
+            raise ValueError("value: the share left must be between 0 and 1")
+        return self
 
 
 class TankSettings(Settings):
@@ -25,15 +54,43 @@ class TankSettings(Settings):
     size_m: tuple[Length, Length, Length] = Field((6.0, 5.0, 1.5), description="length, width and depth of the water")
     density_kg_m3: float = Field(1000.0, gt=900.0, lt=1100.0, description="of the water; vehicles are trimmed in 1000")
     current_m_s: tuple[Speed, Speed, Speed] = Field((0.03, 0.02, 0.0), description="steady current: north, east, down")
+    current_file: str | None = Field(
+        None, description="series in place of current_m_s: CSV (time_s,u,v[,w] in m/s) or NOAA's JSON"
+    )
+    current_file_from_s: float = Field(0.0, ge=0.0, description="where in the series the trial starts")
+    current_file_to_s: float | None = Field(None, gt=0.0, description="where the part used ends, null for all")
+    current_file_gain: float = Field(1.0, ge=-10.0, le=10.0, description="multiplies the series")
+    current_file_gap_s: float | None = Field(
+        None, gt=0.0, description="longest pause allowed in the part used, null for three median steps"
+    )
+    wave_amplitude_m: float = Field(0.0, ge=0.0, le=0.5, description="of a linear wave on the surface, 0 for none")
+    wave_period_s: float = Field(3.0, gt=1.0, le=60.0, description="its period: waves below 1 Hz")
+    wave_heading_deg: float = Field(0.0, ge=-360.0, le=360.0, description="where it runs to, from north through east")
+    pump_speed_m_s: float = Field(0.0, ge=0.0, le=5.0, description="exit speed of a pump's fixed jet, 0 for none")
+    pump_diameter_m: float = Field(0.05, ge=0.005, le=0.5, description="diameter of its outlet")
+    pump_at_m: Place = Field((-2.9, 0.0, 0.8), description="place of its outlet")
+    pump_towards: Place = Field((1.0, 0.0, 0.0), description="where it blows")
+    background_m_s: float = Field(
+        0.0, ge=0.0, le=0.3, description="rms per axis of turbulence that no thruster made, 0 for none"
+    )
+    background_length_m: float = Field(0.2, ge=0.02, le=5.0, description="length of its energetic eddies")
     turbulence: float = Field(0.25, ge=0.0, le=0.5, description="fluctuation on a jet's axis over its mean speed")
+    swirl: bool = Field(False, description="jets twice as wide, as a propeller's swirl makes them")
     flow_step_s: float = Field(0.05, ge=0.005, le=0.1, description="time step of the water")
     max_parcels: int = Field(
         4096, ge=256, le=65536, description="above this the jets are made coarser, and it is logged"
     )
 
+    water: Literal["clear", "silt", "caco3-50mg"] = Field(
+        "silt", description="sets silt, suspended_mg_l and grains, unless they are given too; caco3-50mg clears in 35 s"
+    )
     silt: float = Field(0.1, ge=0.0, le=20.0, description="kg/m2 of loose fine silt on the bed, 0 for a clean bed")
     grain_m: float = Field(20e-6, ge=1e-6, le=1e-3, description="grain diameter of the silt")
     grain_density_kg_m3: float = Field(2710.0, gt=1150.0, le=8000.0, description="density of the grains (calcite 2710)")
+    suspended_mg_l: float = Field(0.0, ge=0.0, le=5000.0, description="evenly in the water at the start")
+    pickup: Literal["auto", "partheniades", "van-rijn"] = Field(
+        "auto", description="law of erosion; auto takes van Rijn's for sand, from 62.5 um on"
+    )
     erosion_kg_m2_s: float = Field(5e-5, ge=0.0, le=1e-2, description="Partheniades' erosion rate M")
     erosion_threshold_Pa: float | None = Field(None, gt=0.0, le=10.0, description="None: Soulsby's, from the grain")
     max_silt_particles: int = Field(4000, ge=100, le=100000, description="above this, pairs of particles become one")
@@ -44,16 +101,44 @@ class TankSettings(Settings):
     damping_pct: float = Field(30.0, ge=0.0, le=90.0, description="plant's drag differs by up to this")
     added_mass_pct: float = Field(20.0, ge=0.0, le=90.0, description="plant's added mass differs by up to this")
     thrust_pct: float = Field(5.0, ge=0.0, le=90.0, description="each thruster's gain differs by up to this")
+    failures: tuple[ThrusterFailure, ...] = Field((), description="thrusters that fail: thruster, at_s, kind, value")
+    inflow_loss: bool = Field(False, description="thrust falls where water already runs through the disk")
+    tether_diameter_m: float = Field(0.0, ge=0.0, le=0.05, description="of a cable to the vehicle, 0 for none")
+    tether_length_m: float = Field(5.0, gt=0.0, le=500.0, description="paid out; the vehicle goes no farther")
+    tether_from_m: Place = Field((-2.5, 0.0, 0.0), description="where the cable comes from: a winch, the surface")
+    tether_at_B_m: Place = Field((0.0, 0.0, 0.0), description="where it holds the vehicle, in the body frame")
     plant_step_s: float = Field(0.005, ge=0.0005, le=0.02, description="longest time step of the vehicle")
 
     pose_rate_hz: float = Field(62.0, gt=0.0, le=500.0, description="rate of the camera-based pose")
     pose_noise_m: float = Field(0.002, ge=0.0, le=1.0, description="its position noise, one sigma per axis")
     pose_noise_rad: float = Field(0.0035, ge=0.0, le=1.0, description="its attitude noise, one sigma per axis")
     pose_latency_s: float = Field(0.03, ge=0.0, le=1.0, description="from the instant it shows to its arrival")
-    gyro_rate_hz: float = Field(50.0, gt=0.0, le=2000.0, description="rate of the gyro")
-    gyro_noise_rad_s: float = Field(0.002, ge=0.0, le=1.0, description="its white noise per sample, one sigma")
+    pose_dropout: float = Field(0.01, ge=0.0, le=1.0, description="chance that a pose fails in clear water")
+    pose_range_m: float = Field(0.7, gt=0.0, le=20.0, description="distance over which the pose's marks are seen")
+    pose_outages_s: tuple[tuple[float, float], ...] = Field(
+        (), description="spans of time (from, to) in which there is no pose at all"
+    )
+    tracking_rate_hz: float = Field(10.0, ge=0.0, le=500.0, description="rate of optical tracking, 0 for none")
+    tracking_noise_m: float = Field(0.005, ge=0.0, le=1.0, description="its position noise, one sigma per axis")
+    tracking_latency_s: float = Field(0.03, ge=0.0, le=1.0, description="from the instant it shows to its arrival")
+    imu_rate_hz: float = Field(50.0, gt=0.0, le=2000.0, description="rate of the inertial unit")
+    gyro_noise_rad_s: float = Field(0.002, ge=0.0, le=1.0, description="gyro's white noise per sample, one sigma")
     gyro_bias_rad_s: float = Field(
         0.003, ge=0.0, le=1.0, description="its constant bias, drawn once, one sigma per axis"
     )
+    accelerometer_noise_m_s2: float = Field(
+        0.05, ge=0.0, le=10.0, description="accelerometer's white noise per sample, one sigma"
+    )
+    accelerometer_bias_m_s2: float = Field(
+        0.05, ge=0.0, le=10.0, description="its constant bias, drawn once, one sigma per axis"
+    )
     depth_rate_hz: float = Field(20.0, gt=0.0, le=500.0, description="rate of the pressure sensor")
     depth_noise_m: float = Field(0.005, ge=0.0, le=1.0, description="its noise, one sigma")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_the_water_has_it(cls, given: Any) -> Any:
+        """Fill in what the kind of water says and the user does not."""
+        if isinstance(given, dict) and isinstance(given.get("water"), str):
+            return WATERS.get(given["water"], {}) | given
+        return given

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import logging
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.interfaces import BodyState, Measurement, ScalarGrid
-from wakewise.tank.grains import beam_attenuation_per_m, speed_at_stress_m_s
+from wakewise.tank.blockage import Blockage
+from wakewise.tank.closure import PLAIN, SWIRLING
+from wakewise.tank.currents import build_ambient
+from wakewise.tank.grains import speed_at_stress_m_s
+from wakewise.tank.induction import impulse_velocity
+from wakewise.tank.measuring import TargetProbes, WaterMeasure
 from wakewise.tank.plant import VehiclePlant
-from wakewise.tank.probes import bed_points, surface_points, water_points
+from wakewise.tank.probes import surface_points
 from wakewise.tank.sediment import SHEAR_HEIGHT_M, Silt, SiltLaws
 from wakewise.tank.sensors import Sensors
 from wakewise.tank.settings import TankSettings
+from wakewise.tank.tether import Tether
 from wakewise.tank.water import Water
 from wakewise.targets import Target
 from wakewise.vehicles import Vehicle, electrical_power_W
@@ -23,26 +29,14 @@ from wakewise.vehicles import Vehicle, electrical_power_W
 GRID_SPACING_M = 0.05
 _GRID_HALF_M = 0.8
 _GRID_HEIGHT_M = 1.0
-_CLOSE_M = 0.3  # bed and water within this of the target count as being at it
-_PROBES = 300
+_CONTACT_POINTS = 1500  # on the target, besides its vertices, so that a hull meets one
 _SILT_STEP_S = 0.1  # longest step of the silt: a few cm of travel in the fastest wall jets
 _STIRRING_SHARE = 0.4  # jets slower than this share of the threshold's speed are left out of the search for erosion
+_TURBIDITY_EVERY_S = 1.0  # how often the camera's water is looked at for the loss of poses
 _TIME_TOLERANCE_S = 1e-9
+_SOON_S = 600.0
 
-
-@dataclass(frozen=True, kw_only=True)
-class WaterMeasure:
-    """What the thrusters do to the water at the target, at one instant.
-
-    Speeds are in excess of the same water without thrusters. `target_speed_*` on points spread evenly over the target's
-    surface; `bed_speed_p95_m_s` 1 to 2 cm above the bed within 0.3 m of the target's foot; `turbidity_per_m` is the
-    mean beam attenuation by silt in the water within 0.3 m of the target's centre.
-    """
-
-    target_speed_mean_m_s: float
-    target_speed_p95_m_s: float
-    bed_speed_p95_m_s: float
-    turbidity_per_m: float
+log = logging.getLogger(__name__)
 
 
 class Tank:
@@ -62,7 +56,8 @@ class Tank:
     Raises
     ------
     InputError
-        If the vehicle starts in the floor, a wall, the air or the target, or the target does not stand on the bed.
+        If the vehicle starts in the floor, a wall, the air or the target, the target does not stand on the bed, or
+        the settings' current, pump, cable or failures do not fit.
     """
 
     def __init__(
@@ -73,27 +68,32 @@ class Tank:
             raise InputError(
                 f"target {target.name}: stands on a bed at {target.bed_z_m:g} m, tank.size_m has {depth:g}"
             )
-        water_rng, silt_rng, sensor_rng, probe_rng = rng.spawn(4)
+        water_rng, silt_rng, sensor_rng, probe_rng, current_rng = rng.spawn(5)
         self.settings = settings
         self.target = target
-        current = np.array(settings.current_m_s)
+        self.ambient = build_ambient(settings, current_rng)
+        more = surface_points(target, _CONTACT_POINTS, np.random.default_rng(0))
         self._plant = VehiclePlant(
             vehicle,
             start,
             density_kg_m3=settings.density_kg_m3,
-            current_W_m_s=current,
+            ambient=self.ambient,
             size_m=settings.size_m,
-            target_W_m=target.mesh.vertices_m,
+            target_W_m=np.concatenate([target.mesh.vertices_m, more]),
+            failures=settings.failures,
+            tether=_tether(settings),
         )
         self.water = Water(
             vehicle.disk_areas_m2,
             density_kg_m3=settings.density_kg_m3,
             bed_z_m=depth,
             rng=water_rng,
-            current_W_m_s=current,
+            ambient=self.ambient,
             half_size_m=(length / 2, width / 2),
             turbulence=settings.turbulence,
             max_parcels=settings.max_parcels,
+            spreading=SWIRLING if settings.swirl else PLAIN,
+            body=Blockage.of(target),
         )
         laws = SiltLaws.of(
             settings.grain_m,
@@ -101,25 +101,28 @@ class Tank:
             settings.density_kg_m3,
             settings.erosion_kg_m2_s,
             settings.erosion_threshold_Pa,
+            settings.pickup,
         )
         self.silt = Silt(laws, settings.silt, settings.size_m, settings.max_silt_particles, silt_rng)
+        self.silt.suspend(1e-3 * settings.suspended_mg_l, target.centre_W_m)
+        _say_when_it_clears(settings, laws)
         self._stirring_speed = _STIRRING_SHARE * speed_at_stress_m_s(
             laws.threshold_Pa / settings.density_kg_m3, SHEAR_HEIGHT_M, laws.grain_m
         )
         self._sensors = Sensors(settings, sensor_rng)
-        self._probes = (
-            surface_points(target, _PROBES, probe_rng),
-            bed_points(target.centre_W_m, depth, _CLOSE_M),
-            water_points(target, _CLOSE_M),
-        )
+        self._probes = TargetProbes(target, probe_rng)
         self._time = 0.0
         self._flow_time = 0.0
         self._flow_steps = 0
         self._silt_every = max(1, math.floor(_SILT_STEP_S / settings.flow_step_s + 1e-9))
         self._impulse_N_s = np.zeros((len(vehicle.thrusters), 2))
         self._disks_before_m = self._plant.disks()[0]
+        # The water at the disks is looked at once for each of its own steps.
+        self._inflow = self.ambient.velocity(self._disks_before_m, 0.0) if settings.inflow_loss else None
+        self._muddy = self.silt.total_kg > 0.0
         self._touching = ""
         self._measured: WaterMeasure | None = None
+        self._turbidity_per_m = self._probes.turbidity_per_m(laws, self._silt_grid())
 
     @property
     def time_s(self) -> float:
@@ -201,30 +204,33 @@ class Tank:
     def measure(self) -> WaterMeasure:
         """Speeds and turbidity at the target now; the water moves in steps, so it is computed once for each."""
         if self._measured is None:
-            surface, bed, water = self._probes
-            speed = np.linalg.norm(self.excess_velocity(np.concatenate([surface, bed])), axis=1)
-            at_target, at_bed = speed[: len(surface)], speed[len(surface) :]
-            grid = self.concentration_grid()
-            node = np.rint((water - grid.origin_W_m) / grid.spacing_m).astype(np.int64)
-            silt = float(grid.values[tuple(node.T)].mean())
-            laws = self.silt.laws
-            self._measured = WaterMeasure(
-                target_speed_mean_m_s=float(at_target.mean()),
-                target_speed_p95_m_s=float(np.quantile(at_target, 0.95)),
-                bed_speed_p95_m_s=float(np.quantile(at_bed, 0.95)),
-                turbidity_per_m=float(beam_attenuation_per_m(silt, laws.grain_m, laws.grain_density_kg_m3)),
-            )
+            X_WC = self._plant.state.X_WB @ self._plant.vehicle.X_BC
+            grid, density = self._silt_grid(), self.settings.density_kg_m3
+            self._measured = self._probes.measure(self.water, self.silt.laws, grid, X_WC.p_m, density)
         return self._measured
+
+    def _silt_grid(self) -> ScalarGrid | None:
+        return self.concentration_grid() if len(self.silt.mass_kg) else None
+
+    def _inflow_W_m_s(self) -> Array:
+        """Velocity of the water at each disk without the free jet that its own thruster sends, shape (n, 3)."""
+        origins, parcels = self._disks_before_m, self.water.parcels
+        inflow = self.water.velocity(origins)
+        for i in range(len(origins)):
+            own = parcels.take(parcels.stream // 2 == i)
+            inflow[i] -= impulse_velocity(origins[i : i + 1], own.position_m, own.impulse_m4_s, own.sigma_m)[0]
+        return inflow
 
     def _advance(self, commands_N: Array, dt_s: float) -> None:
         before = self._plant.thrusts_N
-        self._plant.step(commands_N, dt_s)
+        self._plant.step(commands_N, dt_s, self._inflow)
+        self._touching = self._touching or self._plant.contact
         mean = 0.5 * (before + self._plant.thrusts_N)
         self._impulse_N_s[:, 0] += np.maximum(mean, 0.0) * dt_s
         self._impulse_N_s[:, 1] += np.maximum(-mean, 0.0) * dt_s
         self._time += dt_s
         if self._sensors.next_due_s() - self._time < _TIME_TOLERANCE_S:
-            self._sensors.sample(self._time, self._plant.state)
+            self._sensors.sample(self._time, self._plant.state, self._plant.force_B_m_s2, self._turbidity_per_m)
 
     def _move_water(self) -> None:
         origins, axes = self._plant.disks()
@@ -233,8 +239,37 @@ class Tank:
         self._disks_before_m = origins
         self._impulse_N_s = np.zeros_like(self._impulse_N_s)
         self._flow_steps += 1
-        if self.settings.silt > 0.0 and self._flow_steps % self._silt_every == 0:
-            circles = self.water.stirred_bed(self._stirring_speed)
+        if self._inflow is not None:
+            self._inflow = self._inflow_W_m_s()
+        if self._muddy and self._flow_steps % self._silt_every == 0:
+            circles = np.concatenate([self.water.stirred_bed(self._stirring_speed), self.ambient.stirred_bed()])
             self.silt.step(self.water, circles, self._silt_every * dt_s)
-        self._touching = self._touching or self._plant.touches()
+            if self._flow_steps % round(_TURBIDITY_EVERY_S / dt_s) == 0:
+                self._turbidity_per_m = self._probes.turbidity_per_m(self.silt.laws, self._silt_grid())
         self._measured = None
+
+
+def _tether(settings: TankSettings) -> Tether | None:
+    """The cable that the settings ask for, if any."""
+    if settings.tether_diameter_m == 0.0:
+        return None
+    return Tether(
+        winch_W_m=np.array(settings.tether_from_m),
+        p_BT_m=np.array(settings.tether_at_B_m),
+        diameter_m=settings.tether_diameter_m,
+        length_m=settings.tether_length_m,
+        density_kg_m3=settings.density_kg_m3,
+    )
+
+
+def _say_when_it_clears(settings: TankSettings, laws: SiltLaws) -> None:
+    """Warn that grains which are in the water at the start will not stay there."""
+    clears_s = settings.size_m[2] / laws.settling_m_s
+    if settings.suspended_mg_l > 0.0 and clears_s < _SOON_S:
+        log.warning(
+            "tank.suspended_mg_l %g: grains of %.3g mm sink %.1f mm/s and all lie on the bed after %.0f s",
+            settings.suspended_mg_l,
+            1e3 * settings.grain_m,
+            1e3 * laws.settling_m_s,
+            clears_s,
+        )

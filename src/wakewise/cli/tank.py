@@ -1,0 +1,174 @@
+"""`wakewise tank`: what the simulated water does, for anyone who wants to hold it against other water."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from wakewise.cli.console import print_json
+from wakewise.cli.options import Json
+
+if TYPE_CHECKING:
+    from wakewise.geometry import Pose
+    from wakewise.targets import Target
+
+app = typer.Typer(
+    help="The simulated water: its flow at any points.",
+    no_args_is_help=False,
+    rich_markup_mode=None,
+)
+
+VehicleName = Annotated[str, typer.Option("--vehicle", help="Library name or vehicle YAML file.")]
+PoseNumbers = Annotated[
+    tuple[float, float, float, float, float, float],
+    typer.Option(
+        "--pose",
+        metavar="X Y Z ROLL PITCH YAW",
+        help="Where the vehicle is held: m and rad; z and yaw as in NED, down and clockwise seen from above.",
+    ),
+]
+Thrusts = Annotated[
+    Path,
+    typer.Option(
+        "--thrusts",
+        help="CSV with time_s and one thrust in N per thruster (thrust_1_N ... or the thrusters' names, any order), "
+        "each row held until the next; the last row ends the history.",
+    ),
+]
+Points = Annotated[Path, typer.Option("--points", help="CSV with x_m, y_m, z_m in the world (NED).")]
+Floor = Annotated[
+    float | None,
+    typer.Option("--floor", metavar="Z", help="Depth of the floor; open water if not given.", show_default=False),
+]
+TargetMesh = Annotated[
+    str | None,
+    typer.Option(
+        "--target",
+        metavar="MESH",
+        help="A mesh file in m, or branching, brain, plate: stands on the floor at x = y = 0.",
+        show_default=False,
+    ),
+]
+FlowName = Annotated[str, typer.Option("--flow", help="parcels, the water of trials; or lattice, steady mean jets.")]
+Every = Annotated[
+    float | None,
+    typer.Option("--every", metavar="S", help="Times of the answer; else those of the thrusts.", show_default=False),
+]
+ProbeSeed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the turbulence.")]
+Turbulence = Annotated[bool, typer.Option("--turbulence", help="With the turbulence of trials; else mean jets.")]
+Swirl = Annotated[bool, typer.Option("--swirl", help="Parcels as wide as a propeller's swirling jets.")]
+Density = Annotated[float, typer.Option("--density", min=900.0, max=1100.0, help="Of the water, kg/m3.")]
+ProbeOut = Annotated[
+    Path | None, typer.Option("--out", help="Write the JSON object here, or arrays to a .npz.", show_default=False)
+]
+
+
+@app.callback()
+def _group() -> None:
+    """The simulated water: its flow at any points."""
+
+
+@app.command("probe")
+def probe_command(
+    thrusts: Thrusts,
+    points: Points,
+    vehicle: VehicleName = "paper",
+    pose: PoseNumbers = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    floor: Floor = None,
+    target: TargetMesh = None,
+    flow: FlowName = "parcels",
+    every: Every = None,
+    seed: ProbeSeed = 0,
+    turbulence: Turbulence = False,
+    swirl: Swirl = False,
+    density: Density = 1000.0,
+    out: ProbeOut = None,
+    json: Json = False,
+) -> None:
+    """Give the flow at points and times for a vehicle held in place and a history of thrusts.
+
+    Thrusts are those delivered (no lag). Mean and 95th percentile of the speed are over all points and times.
+    """
+    import numpy as np
+
+    from wakewise.tank import TankSettings
+    from wakewise.tank.probe import probe, read_points, read_thrusts, regular_times
+    from wakewise.vehicles import load_vehicle
+
+    chosen = load_vehicle(vehicle)
+    history, columns = read_thrusts(thrusts, chosen)
+    result = probe(
+        chosen,
+        _pose(pose),
+        history,
+        read_points(points),
+        times_s=None if every is None else regular_times(history, every),
+        floor_z_m=floor,
+        target=_target(target, floor),
+        flow=flow,
+        turbulence=TankSettings().turbulence if turbulence else 0.0,
+        swirl=swirl,
+        density_kg_m3=density,
+        seed=seed,
+    )
+    speeds = result.speeds_m_s
+    figures = {
+        "vehicle": chosen.name,
+        "flow": flow,
+        "thruster_of_column": columns,
+        "thrusts_held": "until the next row",
+        "times_s": result.times_s.tolist(),
+        "velocities_m_s": result.velocities_m_s.tolist(),
+        "speed_mean_m_s": float(speeds.mean()),
+        "speed_p95_m_s": float(np.quantile(speeds, 0.95)),
+    }
+    if out is not None and out.suffix == ".npz":
+        from wakewise.files import whole_file
+
+        with whole_file(out) as temporary:
+            np.savez_compressed(
+                temporary, times_s=result.times_s, points_W_m=result.points_W_m, velocities_m_s=result.velocities_m_s
+            )
+    elif out is not None:
+        from wakewise.files import write_json
+
+        write_json(out, figures)
+    if json:
+        print_json(figures)
+        return
+    typer.echo(f"{chosen.name}, {flow}: {len(result.times_s)} times, {len(result.points_W_m)} points")
+    for k, time_s in enumerate(result.times_s):
+        p95 = np.quantile(speeds[k], 0.95)
+        typer.echo(f"{time_s:8.2f} s   mean {speeds[k].mean():.4f} m/s   95th percentile {p95:.4f} m/s")
+    typer.echo(f"all          mean {speeds.mean():.4f} m/s   95th percentile {np.quantile(speeds, 0.95):.4f} m/s")
+    if out is not None:
+        typer.echo(f"written: {out}")
+
+
+def _pose(numbers: tuple[float, float, float, float, float, float]) -> Pose:
+    import math
+
+    import numpy as np
+
+    from wakewise.errors import InputError
+    from wakewise.geometry import Pose, quat_from_euler
+
+    if not all(math.isfinite(number) for number in numbers):
+        raise InputError(f"--pose: {' '.join(f'{n:g}' for n in numbers)}, all six must be finite")
+    if max(abs(angle) for angle in numbers[3:]) > 2 * math.pi:
+        raise InputError(f"--pose: angles {' '.join(f'{n:g}' for n in numbers[3:])}, radians up to 2 pi are allowed")
+    return Pose(np.array(numbers[:3]), quat_from_euler(*numbers[3:]))
+
+
+def _target(name: str | None, floor_z_m: float | None) -> Target | None:
+    if name is None:
+        return None
+    from wakewise.errors import InputError
+    from wakewise.targets import coral, coral_kinds, load_mesh, place_on_bed
+
+    if floor_z_m is None:
+        raise InputError("--target: stands on a floor, give --floor Z too")
+    mesh = coral(name) if name in coral_kinds() else load_mesh(Path(name).expanduser())
+    return place_on_bed(Path(name).stem, mesh, floor_z_m)

@@ -1,0 +1,159 @@
+"""What a trial is told about its water: speeds, pressure and shear at the target, silt in the camera's way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from wakewise.arrays import Array
+from wakewise.interfaces import Flow, ScalarGrid
+from wakewise.tank.grains import beam_attenuation_per_m, friction_velocity_m_s
+from wakewise.tank.probes import bed_points, surface_points, water_points
+from wakewise.tank.sediment import SHEAR_HEIGHT_M, SiltLaws
+from wakewise.targets import Target
+
+CLOSE_M = 0.3
+"""Bed and water within this of the target count as being at it."""
+
+FRAME_S = 1 / 30
+"""Time between the two pictures that a tracer's way is measured over."""
+
+_PROBES = 300
+_TRACERS = 60
+_RAYS = 60
+_RAY_STEPS = 24
+
+
+@dataclass(frozen=True, kw_only=True)
+class WaterMeasure:
+    """What the water does at the target at one instant.
+
+    Speeds of `target_*` and `bed_*` are in excess of the same water without thrusters: on points spread evenly over the
+    target's surface, and 1 to 2 cm above the bed within 0.3 m of its foot. What follows is of the whole water, currents
+    included: `target_pressure_*` is 1/2 rho u^2 on the surface, `bed_shear_p95_Pa` the stress on the bed within the
+    0.3 m, and `tracer_speed_mean_m_s` what PIV would call the speed there, the straight way of tracers over the time
+    of one picture. `turbidity_per_m` is the mean beam attenuation by silt in the water within 0.3 m of the target's
+    centre, and `ray_optical_depth` that attenuation along the rays from the camera to the side of the target that it
+    faces, from end to end, a mean without unit.
+    """
+
+    target_speed_mean_m_s: float
+    target_speed_p95_m_s: float
+    bed_speed_p95_m_s: float
+    turbidity_per_m: float
+    target_pressure_mean_Pa: float
+    target_pressure_p95_Pa: float
+    bed_shear_p95_Pa: float
+    tracer_speed_mean_m_s: float
+    ray_optical_depth: float
+
+
+class ExcessFlow(Flow, Protocol):
+    """Water that knows which part of its motion the thrusters made."""
+
+    def excess_velocity(self, points_W_m: Array) -> Array:
+        """Velocity less that of the same water without thrusters, shape (n, 3), at points, shape (n, 3)."""
+        ...
+
+    def ambient_velocity(self, points_W_m: Array) -> Array:
+        """Velocity of the same water without thrusters, shape (n, 3), at points, shape (n, 3)."""
+        ...
+
+
+class TargetProbes:
+    """The places where a trial's water is looked at; drawn once, so that all methods are judged at the same ones."""
+
+    def __init__(self, target: Target, rng: np.random.Generator) -> None:
+        self._centre = target.centre_W_m
+        self._bed_z = target.bed_z_m
+        self.surface_W_m = surface_points(target, _PROBES, rng)
+        self.bed_W_m = bed_points(target.centre_W_m, target.bed_z_m, CLOSE_M)
+        self._floor_W_m = self.bed_W_m * [1.0, 1.0, 0.0] + [0.0, 0.0, target.bed_z_m]
+        self._water_W_m = water_points(target, CLOSE_M)
+
+    def measure(
+        self,
+        water: ExcessFlow,
+        laws: SiltLaws,
+        silt: ScalarGrid | None,
+        camera_W_m: Array,
+        density_kg_m3: float,
+    ) -> WaterMeasure:
+        """Look at all of them.
+
+        Parameters
+        ----------
+        water : ExcessFlow
+        laws : SiltLaws
+        silt : ScalarGrid or None
+            Concentration in kg/m3; None for clear water.
+        camera_W_m : ndarray, shape (3,)
+        density_kg_m3 : float
+        """
+        points = np.concatenate([self.surface_W_m, self.bed_W_m, self._floor_W_m])
+        excess = water.excess_velocity(points)
+        whole = excess + water.ambient_velocity(points)
+        n, m = len(self.surface_W_m), len(self.surface_W_m) + len(self.bed_W_m)
+        at_target, at_bed = np.linalg.norm(excess[:n], axis=1), np.linalg.norm(excess[n:m], axis=1)
+        pressure = 0.5 * density_kg_m3 * np.einsum("ij,ij->i", whole[:n], whole[:n])
+        star = friction_velocity_m_s(np.linalg.norm(whole[m:, :2], axis=1), SHEAR_HEIGHT_M, laws.grain_m)
+        every = max(n // _TRACERS, 1)
+        return WaterMeasure(
+            target_speed_mean_m_s=float(at_target.mean()),
+            target_speed_p95_m_s=float(np.quantile(at_target, 0.95)),
+            bed_speed_p95_m_s=float(np.quantile(at_bed, 0.95)),
+            turbidity_per_m=self.turbidity_per_m(laws, silt),
+            target_pressure_mean_Pa=float(pressure.mean()),
+            target_pressure_p95_Pa=float(np.quantile(pressure, 0.95)),
+            bed_shear_p95_Pa=float(density_kg_m3 * np.quantile(star, 0.95) ** 2),
+            tracer_speed_mean_m_s=float(
+                tracer_speeds_m_s(water, self.surface_W_m[::every], whole[:n:every], FRAME_S, self._bed_z).mean()
+            ),
+            ray_optical_depth=self.ray_optical_depth(laws, silt, camera_W_m),
+        )
+
+    def turbidity_per_m(self, laws: SiltLaws, silt: ScalarGrid | None) -> float:
+        """Mean beam attenuation by silt near the target's centre, 1/m."""
+        if silt is None:
+            return 0.0
+        return _attenuation(laws, float(concentration_at(silt, self._water_W_m).mean()))
+
+    def ray_optical_depth(self, laws: SiltLaws, silt: ScalarGrid | None, camera_W_m: Array) -> float:
+        """Line integral of the beam attenuation by silt from the camera to the target, mean over rays."""
+        if silt is None:
+            return 0.0
+        every = max(len(self.surface_W_m) // _RAYS, 1)
+        ends = self.surface_W_m[::every]
+        facing = (ends - self._centre) @ (camera_W_m - self._centre) > 0.0
+        ends = ends[facing] if facing.any() else ends
+        share = ((np.arange(_RAY_STEPS) + 0.5) / _RAY_STEPS)[None, :, None]
+        places = camera_W_m + share * (ends - camera_W_m)[:, None, :]
+        mean = concentration_at(silt, places.reshape(-1, 3)).reshape(len(ends), _RAY_STEPS).mean(axis=1)
+        return _attenuation(laws, float((mean * np.linalg.norm(ends - camera_W_m, axis=1)).mean()))
+
+
+def tracer_speeds_m_s(water: Flow, starts_W_m: Array, velocities_m_s: Array, frame_s: float, bed_z_m: float) -> Array:
+    """Distance that tracers go in the flow of this instant over the time of one frame, divided by it, shape (n,).
+
+    The midpoint rule; `velocities_m_s` are those at the starts, both shape (n, 3). A tracer does not enter the bed.
+    """
+    middle = starts_W_m + 0.5 * frame_s * velocities_m_s
+    middle[:, 2] = np.minimum(middle[:, 2], bed_z_m)
+    speed: Array = np.linalg.norm(water.velocity(middle), axis=1)
+    return speed
+
+
+def concentration_at(silt: ScalarGrid, points_W_m: Array) -> Array:
+    """Concentration at the node nearest to each point, shape (n,); zero outside the grid."""
+    node = np.rint((points_W_m - silt.origin_W_m) / silt.spacing_m).astype(np.int64)
+    shape = np.array(silt.values.shape)
+    inside = np.all((node >= 0) & (node < shape), axis=1)
+    found = np.zeros(len(points_W_m))
+    found[inside] = silt.values[tuple(node[inside].T)]
+    return found
+
+
+def _attenuation(laws: SiltLaws, amount: float) -> float:
+    return float(beam_attenuation_per_m(amount, laws.grain_m, laws.grain_density_kg_m3))

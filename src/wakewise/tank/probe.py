@@ -1,0 +1,346 @@
+"""The truth flow at any points, for a vehicle held in place and given thrusts, to be held against other flows."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from wakewise.arrays import Array, freeze
+from wakewise.errors import InputError
+from wakewise.geometry import Pose
+from wakewise.interfaces import Flow
+from wakewise.tank.blockage import Blockage
+from wakewise.tank.closure import PLAIN, SWIRLING
+from wakewise.tank.lattice import LatticeFlow, load_mean_field
+from wakewise.tank.water import Water
+from wakewise.targets import Mesh, Target
+from wakewise.vehicles import Vehicle
+
+FLOWS = ("parcels", "lattice")
+_STEP_S = 0.02
+_NUMBERED = re.compile(r"(?:thrust|thruster|t)?[_ ]?(\d+)", re.IGNORECASE)
+_MOST_VALUES = 50_000_000
+_MOST_PARCELS = 16384
+_SURFACE_AWAY_M = 20.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ThrustHistory:
+    """Thrusts that hold from one time to the next, shapes (k,) and (k, n); the last row ends the history.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two rows, times do not rise or a value is not finite.
+    """
+
+    times_s: Array
+    thrusts_N: Array
+
+    def __post_init__(self) -> None:
+        freeze(self, times_s=(None,), thrusts_N=(len(self.times_s), None))
+        if len(self.times_s) < 2:
+            raise InputError(f"thrusts: {len(self.times_s)} rows, at least 2 are needed: a start and an end")
+        falling = np.flatnonzero(np.diff(self.times_s) <= 0.0)
+        if len(falling):
+            k = int(falling[0]) + 1
+            raise InputError(
+                f"thrusts: time_s {self.times_s[k]:g} in row {k + 1} does not come after {self.times_s[k - 1]:g}"
+            )
+
+    @property
+    def impulse_N_s(self) -> Array:
+        """Time integral of each thrust over the history, shape (n,)."""
+        total: Array = np.diff(self.times_s) @ self.thrusts_N[:-1]
+        return total
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Probed:
+    """Velocities of the water, shape (k, n, 3), at times, shape (k,), and points, shape (n, 3), in the world."""
+
+    times_s: Array
+    points_W_m: Array
+    velocities_m_s: Array
+
+    def __post_init__(self) -> None:
+        k, n = len(self.times_s), len(self.points_W_m)
+        freeze(self, times_s=(k,), points_W_m=(n, 3), velocities_m_s=(k, n, 3))
+
+    @property
+    def speeds_m_s(self) -> Array:
+        """Shape (k, n)."""
+        speeds: Array = np.linalg.norm(self.velocities_m_s, axis=2)
+        return speeds
+
+
+def read_table(path: Path, what: str) -> tuple[list[str], Array]:
+    """Read a CSV file of finite numbers under one row of names.
+
+    Raises
+    ------
+    InputError
+        In one line, with file and place.
+    """
+    try:
+        rows = [row for row in csv.reader(path.read_text(encoding="utf-8-sig").splitlines()) if row]
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file, {what} is needed") from None
+    except (OSError, UnicodeDecodeError):
+        raise InputError(f"{path}: cannot be read as text, {what} is needed") from None
+    if not rows:
+        raise InputError(f"{path}: empty, {what} is needed")
+    header = [name.strip() for name in rows[0]]
+    if len(set(header)) < len(header):
+        raise InputError(f"{path}: a column is named twice in {', '.join(header)}")
+    table = np.empty((len(rows) - 1, len(header)))
+    for k, row in enumerate(rows[1:]):
+        if len(row) != len(header):
+            raise InputError(f"{path} row {k + 1}: {len(row)} values, the header has {len(header)}")
+        for j, text in enumerate(row):
+            try:
+                table[k, j] = float(text)
+            except ValueError:
+                raise InputError(f"{path} row {k + 1}: '{text}' in {header[j]}, a number is needed") from None
+            if not math.isfinite(table[k, j]):
+                raise InputError(f"{path} row {k + 1}: {text} in {header[j]}, must be finite")
+    return header, table
+
+
+def read_thrusts(path: Path, vehicle: Vehicle) -> tuple[ThrustHistory, dict[str, str]]:
+    """Read a history of thrusts in N, and say which column was taken for which thruster.
+
+    Columns are time_s and one for each thruster, in any order: named as the vehicle names its thrusters (with or
+    without ``_N``), or by number from 1 as in steps.parquet (``thrust_1_N``, ``thruster_1``, ``T1``, ``1``). If no
+    name is either, the columns are taken in the vehicle's order.
+
+    Raises
+    ------
+    InputError
+        If the file, a column or a value is bad, or columns and thrusters do not match.
+    """
+    header, table = read_table(path, "a CSV with time_s and one thrust in N per thruster")
+    if "time_s" not in header:
+        raise InputError(f"{path}: no column time_s among {', '.join(header)}")
+    n = len(vehicle.thrusters)
+    columns = [name for name in header if name != "time_s"]
+    if len(columns) != n:
+        raise InputError(f"{path}: {len(columns)} thrust columns, {vehicle.name} has {n} thrusters")
+    places = [_thruster_of(name, vehicle) for name in columns]
+    if all(place is None for place in places):
+        places = list(range(n))
+    if None in places or len(set(places)) < n:
+        bad = next((c for c, p in zip(columns, places, strict=True) if p is None or places.count(p) > 1), "")
+        raise InputError(f"{path}: column {bad} is not one thruster's alone, use thrust_1_N to thrust_{n}_N")
+    thrusts = np.empty((len(table), n))
+    for name, place in zip(columns, places, strict=True):
+        thrusts[:, place] = table[:, header.index(name)]
+    taken = {c: vehicle.thrusters[p].name for c, p in zip(columns, places, strict=True) if p is not None}
+    try:
+        return ThrustHistory(times_s=table[:, header.index("time_s")], thrusts_N=thrusts), taken
+    except InputError as fault:
+        raise InputError(f"{path}: {fault}") from None
+
+
+def read_points(path: Path) -> Array:
+    """Read points of the world, columns x_m, y_m and z_m in any order, shape (n, 3).
+
+    Raises
+    ------
+    InputError
+    """
+    header, table = read_table(path, "a CSV with x_m, y_m, z_m")
+    missing = [name for name in ("x_m", "y_m", "z_m") if name not in header]
+    if missing:
+        raise InputError(f"{path}: no column {', '.join(missing)} among {', '.join(header)}")
+    if not len(table):
+        raise InputError(f"{path}: no points under its header")
+    return table[:, [header.index(name) for name in ("x_m", "y_m", "z_m")]]
+
+
+def regular_times(history: ThrustHistory, every_s: float) -> Array:
+    """Times at equal steps over a history, its start included, shape (k,).
+
+    Raises
+    ------
+    InputError
+        If the step is not positive, or gives more than a million times.
+    """
+    length = float(history.times_s[-1] - history.times_s[0])
+    if not (math.isfinite(every_s) and every_s > 0.0 and length / every_s < 1e6):
+        raise InputError(f"every: {every_s:g} s, must be more than 0 and leave fewer than a million times")
+    times: Array = history.times_s[0] + every_s * np.arange(math.floor(length / every_s + 1e-9) + 1)
+    return np.minimum(times, history.times_s[-1])
+
+
+def probe(
+    vehicle: Vehicle,
+    X_WB: Pose,
+    history: ThrustHistory,
+    points_W_m: Array,
+    *,
+    times_s: Array | None = None,
+    floor_z_m: float | None = None,
+    target: Target | None = None,
+    flow: str = "parcels",
+    turbulence: float = 0.0,
+    swirl: bool = False,
+    density_kg_m3: float = 1000.0,
+    seed: int = 0,
+) -> Probed:
+    """Find the flow of a vehicle that is held at one pose while its thrusters push as told, in water at rest before.
+
+    Thrusts are what the thrusters give: there is no lag, no limit and no loss. Water is without walls and surface;
+    the floor is a plane through which nothing flows and along which jets that strike it run out.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    X_WB : Pose
+    history : ThrustHistory
+    points_W_m : ndarray, shape (n, 3)
+    times_s : ndarray, shape (k,), or None
+        Rising, within the history; None takes the history's own.
+    floor_z_m : float or None
+        Depth of the floor; None for open water.
+    target : Target or None
+        A body on the floor that turns the flow aside.
+    flow : str
+        ``parcels``, the water that trials fly in; or ``lattice``, means of a solved jet for each thruster, joined by
+        momentum: at each time the steady flow of the thrusts of then, as if they had long been running.
+    turbulence : float
+        Root mean square of the fluctuation on a jet's axis over its mean speed; 0 gives mean jets. Parcels only.
+    swirl : bool
+        Whether parcels spread as a propeller's swirling jet does; the lattice's table swirls as it was computed.
+    density_kg_m3 : float
+    seed : int
+        Of the turbulence.
+
+    Raises
+    ------
+    InputError
+        If anything does not fit: points or thrusters below the floor, times outside the history, what a flow cannot do.
+    """
+    if flow not in FLOWS:
+        raise InputError(f"flow: '{flow}', allowed are {', '.join(FLOWS)}")
+    if history.thrusts_N.shape[1] != len(vehicle.thrusters):
+        raise InputError(f"thrusts: {history.thrusts_N.shape[1]} columns, {vehicle.name} has {len(vehicle.thrusters)}")
+    times = history.times_s if times_s is None else np.asarray(times_s, dtype=np.float64)
+    if len(times) == 0 or np.any(np.diff(times) <= 0.0):
+        raise InputError("times: must be at least one, and rise")
+    if times[0] < history.times_s[0] or times[-1] > history.times_s[-1] + 1e-9:
+        raise InputError(
+            f"times: {times[0]:g} to {times[-1]:g} s, the thrusts go from {history.times_s[0]:g} to "
+            f"{history.times_s[-1]:g} s"
+        )
+    if len(times) * len(points_W_m) * 3 > _MOST_VALUES:
+        raise InputError(f"{len(times)} times and {len(points_W_m)} points, allowed {_MOST_VALUES // 3} together")
+    points = np.asarray(points_W_m, dtype=np.float64)
+    origins = X_WB.apply(vehicle.thruster_positions_B_m)
+    axes = vehicle.thruster_axes_B @ X_WB.R.T
+    if floor_z_m is not None:
+        _check_above(points, floor_z_m, "point")
+        _check_above(origins, floor_z_m, "thruster")
+    elif target is not None:
+        raise InputError("target: stands on a floor, give its depth")
+    if flow == "lattice":
+        if floor_z_m is not None or target is not None or turbulence > 0.0:
+            raise InputError(
+                "flow lattice: holds mean jets in open water only; floor, target and turbulence need parcels"
+            )
+        values = _lattice(vehicle, origins, axes, history, points, times, density_kg_m3)
+    else:
+        # Where there is a bed there is a surface at z = 0: it is put out of reach.
+        lift = np.array(
+            [0.0, 0.0, 0.0 if floor_z_m is None else _SURFACE_AWAY_M - min(points[:, 2].min(), X_WB.p_m[2])]
+        )
+        water = Water(
+            vehicle.disk_areas_m2,
+            density_kg_m3=density_kg_m3,
+            bed_z_m=math.inf if floor_z_m is None else floor_z_m + float(lift[2]),
+            rng=np.random.default_rng(seed),
+            turbulence=turbulence,
+            max_parcels=_MOST_PARCELS,
+            spreading=SWIRLING if swirl else PLAIN,
+            body=None if target is None else Blockage.of(_lifted(target, float(lift[2]))),
+        )
+        values = _parcels(water, origins + lift, axes, history, points + lift, times)
+    return Probed(times_s=times, points_W_m=points, velocities_m_s=values)
+
+
+def _lifted(target: Target, by_m: float) -> Target:
+    """The same target on a bed that lies deeper."""
+    down = np.array([0.0, 0.0, by_m])
+    mesh = Mesh(target.mesh.vertices_m + down, target.mesh.faces)
+    return replace(target, mesh=mesh, centre_W_m=target.centre_W_m + down, bed_z_m=target.bed_z_m + by_m)
+
+
+def _parcels(water: Water, origins: Array, axes: Array, history: ThrustHistory, points: Array, times: Array) -> Array:
+    """Step the water from one time that matters to the next: rows of the history and times asked for."""
+    values = np.empty((len(times), len(points), 3))
+    stops = np.union1d(history.times_s, times)
+    stops = stops[stops <= times[-1]]
+    asked = {float(t): k for k, t in enumerate(times)}
+    now = float(history.times_s[0])
+    for stop in stops:
+        steps = math.ceil((stop - now) / _STEP_S - 1e-9)
+        for _ in range(steps):
+            dt_s = (stop - now) / steps
+            row = int(np.searchsorted(history.times_s, now + 1e-12, side="right")) - 1
+            thrusts = history.thrusts_N[row]
+            impulses = dt_s * np.stack([np.maximum(thrusts, 0.0), np.maximum(-thrusts, 0.0)], axis=1)
+            water.step(dt_s, origins, origins, axes, impulses)
+        now = float(stop)
+        if now in asked:
+            values[asked[now]] = water.velocity(points)
+    return values
+
+
+def _lattice(
+    vehicle: Vehicle,
+    origins: Array,
+    axes: Array,
+    history: ThrustHistory,
+    points: Array,
+    times: Array,
+    density_kg_m3: float,
+) -> Array:
+    """Steady flow of the thrusts at each time; the last row only ends the history, so the one before it holds there."""
+    table = load_mean_field()
+    values = np.empty((len(times), len(points), 3))
+    rows = np.minimum(np.searchsorted(history.times_s, times, side="right") - 1, len(history.times_s) - 2)
+    for row in np.unique(rows):
+        thrusts = history.thrusts_N[row]
+        steady: Flow = LatticeFlow(
+            table=table,
+            origins_W_m=origins,
+            directions_W=-np.where(thrusts >= 0.0, 1.0, -1.0)[:, None] * axes,
+            thrusts_N=np.abs(thrusts),
+            areas_m2=vehicle.disk_areas_m2,
+            density_kg_m3=density_kg_m3,
+        )
+        values[rows == row] = steady.velocity(points)
+    return values
+
+
+def _thruster_of(column: str, vehicle: Vehicle) -> int | None:
+    """Index of the thruster that a column is named after, or None."""
+    bare = column.removesuffix("_N")
+    for i, thruster in enumerate(vehicle.thrusters):
+        if thruster.name in (column, bare):
+            return i
+    found = _NUMBERED.fullmatch(bare)
+    number = int(found.group(1)) if found else 0
+    return number - 1 if 1 <= number <= len(vehicle.thrusters) else None
+
+
+def _check_above(points_W_m: Array, floor_z_m: float, what: str) -> None:
+    deepest = int(np.argmax(points_W_m[:, 2]))
+    if points_W_m[deepest, 2] > floor_z_m + 1e-9:
+        place = ", ".join(f"{v:g}" for v in points_W_m[deepest])
+        raise InputError(f"{what} {deepest + 1} at ({place}) m is below the floor at z = {floor_z_m:g} m")

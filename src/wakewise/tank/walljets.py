@@ -1,0 +1,107 @@
+"""All wall jets of the tank: rings on every face, and on the planes in which jets meet head-on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from wakewise.arrays import Array
+from wakewise.tank.bedjets import Rings, coarsened, grown, layer_speed, packed_rings, packed_velocity, with_ring_images
+from wakewise.tank.faces import Face, Room
+from wakewise.tank.meeting import Sheet
+
+Plane = Face | Sheet
+
+_MOST = 400  # rings
+_REST = 3.0  # wall jets rest at this many times the parcels' rest speed: on the bed 3 mm/s,
+_SHEET_REST = 10.0  # and the jets of a meeting, of which there may be many, at this many
+
+
+class WallJets:
+    """Rings by the plane that they run along; rings that reach beyond twice the tank, or come to rest, are gone."""
+
+    def __init__(self, room: Room) -> None:
+        self._room = room
+        self._rings: dict[Plane, Rings] = {}
+        self._seen: list[tuple[Plane, Array]] | None = None  # rings and images, packed for the kernel
+
+    @property
+    def count(self) -> int:
+        """How many rings there are."""
+        return sum(rings.count for rings in self._rings.values())
+
+    def on_bed(self) -> Rings:
+        """Rings on the bed."""
+        for plane, rings in self._rings.items():
+            if isinstance(plane, Face) and plane.name == "bed":
+                return rings
+        return Rings.none()
+
+    def add(self, plane: Plane, rings: Rings) -> None:
+        """Let new rings start, given in the plane's own frame."""
+        self._rings[plane] = self._rings.get(plane, Rings.none()).joined(rings)
+        self._seen = None
+
+    def grow(self, dt_s: float, rest_speed_m_s: float, ambient: Callable[[Array], Array]) -> None:
+        """Let rings run out for dt_s, carried along the plane by the ambient water at their centres."""
+        kept: dict[Plane, Rings] = {}
+        for plane, rings in self._rings.items():
+            centres = plane.world(np.column_stack([rings.centre_m, np.full(rings.count, plane.depth_m)]))
+            thickness = plane.thickness_m if isinstance(plane, Sheet) else 0.0
+            wider, layer = grown(rings, plane.turned(ambient(centres)), dt_s, thickness)
+            rest = rest_speed_m_s * (_SHEET_REST if isinstance(plane, Sheet) else _REST)
+            wider = wider.take((layer >= rest) & (wider.radius_m < self._reach_m()))
+            if wider.count:
+                kept[plane] = wider
+        self._rings = kept
+        self._seen = None
+
+    def thin(self) -> None:
+        """Make neighbouring rings of a jet one; of too many, let the slowest go."""
+        self._rings = {plane: coarsened(rings) for plane, rings in self._rings.items()}
+        if self.count > _MOST:
+            speeds = {plane: layer_speed(rings) for plane, rings in self._rings.items()}
+            least = np.sort(np.concatenate(list(speeds.values())))[-_MOST]
+            self._rings = {plane: rings.take(speeds[plane] >= least) for plane, rings in self._rings.items()}
+        self._seen = None
+
+    def velocity(self, points_W_m: Array) -> Array:
+        """Velocity of all of them with their images, shape (n, 3), at points, shape (n, 3)."""
+        u = np.zeros((len(points_W_m), 3))
+        if self._seen is None:
+            self._seen = [
+                (
+                    plane,
+                    packed_rings(with_ring_images(rings, plane, self._room), per_height=self._per_height(plane))
+                    if isinstance(plane, Face)
+                    else packed_rings(rings, plane.thickness_m),
+                )
+                for plane, rings in self._rings.items()
+                if rings.count
+            ]
+        for plane, packed in self._seen:
+            local = plane.local(points_W_m)
+            side = np.abs(local[:, 2]) if isinstance(plane, Sheet) else plane.depth_m - local[:, 2]
+            near = side < packed[:, 10].max()
+            if near.any():
+                u[near] += plane.back(_on_plane(plane, local[near], packed))
+        return u
+
+    def _per_height(self, face: Face) -> float:
+        opposite = [other for other in self._room.faces if other.axis == face.axis and other.side != face.side]
+        return 1.0 / abs(opposite[0].at_m - face.at_m) if opposite else 0.0
+
+    def _reach_m(self) -> float:
+        return 2 * max((abs(face.at_m) for face in self._room.faces if face.axis != 2), default=np.inf)
+
+
+def _on_plane(plane: Plane, points_m: Array, packed: Array) -> Array:
+    """Velocity in the plane's frame; a sheet has the same rings on its other side, mirrored."""
+    if isinstance(plane, Face):
+        return packed_velocity(points_m, packed, plane.depth_m)
+    beyond = points_m[:, 2] > plane.depth_m
+    points_m[beyond, 2] = 2 * plane.depth_m - points_m[beyond, 2]
+    u = packed_velocity(points_m, packed, plane.depth_m)
+    u[beyond, 2] *= -1.0
+    return u

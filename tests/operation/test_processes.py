@@ -1,0 +1,35 @@
+"""Determinism: a flight's record does not know how many processes ran beside it."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+FLIGHT = """
+import sys
+from pathlib import Path
+from wakewise.operation import build_mission, fly_mission, load_scenario
+short = {
+    "mission.elevations_deg": [40], "mission.views": [3], "mission.speed_m_s": 0.5, "mission.acceleration_m_s2": 0.5,
+    "mission.settle_s": 0.5, "mission.approach_m": 0.0, "tank.wave_amplitude_m": 0.01, "tank.background_m_s": 0.005,
+    "tank.inflow_loss": True, "method": "dp",
+}
+scenario = load_scenario("quick", None, short)
+fly_mission(scenario, build_mission(scenario), Path(sys.argv[1]))
+"""
+
+
+def _start(folder: Path) -> subprocess.Popen:
+    return subprocess.Popen([sys.executable, "-c", FLIGHT, str(folder)], stdout=subprocess.DEVNULL)
+
+
+@pytest.mark.slow
+def test_the_same_seed_gives_the_same_bytes_on_one_and_on_two_processes(tmp_path):
+    """One flight alone, then two at once: all three leave the same steps.parquet, byte for byte."""
+    assert _start(tmp_path / "alone").wait() == 0
+    both = [_start(tmp_path / name) for name in ("one", "two")]
+    assert [process.wait() for process in both] == [0, 0]
+    records = {name: (tmp_path / name / "steps.parquet").read_bytes() for name in ("alone", "one", "two")}
+    assert len(records["alone"]) > 10_000
+    assert records["alone"] == records["one"] == records["two"]

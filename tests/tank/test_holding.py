@@ -1,0 +1,33 @@
+"""Whether a vehicle can hold: the margin is what the thrusters give over what drag asks."""
+
+import numpy as np
+import pytest
+
+from wakewise.tank import holding
+from wakewise.vehicles import achievable_wrench, compile_body, damping_wrench, load_vehicle
+
+VEHICLE = load_vehicle("paper")
+
+
+def test_the_margin_is_thrust_over_drag():
+    """For a stream from ahead it is the largest pure surge force over the drag at that speed."""
+    found = holding(VEHICLE, np.array([[-0.5, 0.0, 0.0]]), 1000.0)
+    drag = damping_wrench(compile_body(VEHICLE), np.array([0.5, 0, 0, 0, 0, 0]))
+    assert found.drag_N == pytest.approx(drag[:3])
+    assert found.share == pytest.approx(achievable_wrench(VEHICLE)[0, 1] / -drag[0], rel=1e-6)
+    assert "0.50 m/s" in found.said()
+    assert f"{found.margin_pct:+.0f} %" in found.said()
+
+
+def test_the_hardest_stream_counts():
+    """Of several streams the one with the least margin is kept; faster water leaves less; still water has none."""
+    slow = holding(VEHICLE, np.array([[0.1, 0.0, 0.0]]), 1000.0)
+    both = holding(VEHICLE, np.array([[0.1, 0.0, 0.0], [0.0, 0.9, 0.0], [0.0, 0.0, 0.0]]), 1000.0)
+    assert both.passing_B_m_s.tolist() == [0.0, 0.9, 0.0]
+    assert both.share < slow.share
+    assert holding(VEHICLE, np.zeros((4, 3)), 1000.0) is None
+
+
+def test_a_stream_too_fast_leaves_less_than_nothing():
+    """At 2.5 m/s no small vehicle holds: the margin is negative."""
+    assert holding(VEHICLE, np.array([[0.0, 2.5, 0.0]]), 1000.0).margin_pct < 0.0
