@@ -61,11 +61,11 @@ def tilted_vehicle():
     return replace(PAPER, thrusters=thrusters)
 
 
-@pytest.mark.parametrize(("decoupled", "method"), [(True, "exact"), (False, "planar")])
+@pytest.mark.parametrize(("decoupled", "method"), [(True, "lines"), (False, "boxes")])
 def test_never_worse_than_a_dense_grid(decoupled, method):
     """No point of a wide and of a fine grid over the null space lies more than 1e-4 below the result."""
     rng = np.random.default_rng(7)
-    for _ in range(12):
+    for _ in range(5):
         G, weights = random_gram(rng, decoupled=decoupled), random_weights(rng)
         wrench, previous = random_wrench(rng), rng.normal(size=8)
         found = gentle_allocation(LAYOUT, wrench, G, weights, previous)
@@ -73,9 +73,9 @@ def test_never_worse_than_a_dense_grid(decoupled, method):
         start = LAYOUT.inverse @ wrench
         fine = LAYOUT.null.T @ (found.thrusts_N - start)
         grid = min(
-            lowest_on_grid(LAYOUT, start, np.zeros(2), G, previous, weights, 60.0, 201),
-            lowest_on_grid(LAYOUT, start, np.zeros(2), G, previous, weights, 6.0, 201),
-            lowest_on_grid(LAYOUT, start, fine, G, previous, weights, 0.5, 101),
+            lowest_on_grid(LAYOUT, start, np.zeros(2), G, previous, weights, 60.0, 101),
+            lowest_on_grid(LAYOUT, start, np.zeros(2), G, previous, weights, 6.0, 101),
+            lowest_on_grid(LAYOUT, start, fine, G, previous, weights, 0.5, 61),
         )
         assert found.method == method
         assert value <= grid * (1.0 + 1e-4)
@@ -158,7 +158,7 @@ def test_a_null_space_in_one_piece_is_scaled_and_shifted_too():
         assert np.all(found.thrusts_N >= layout.lower_N) and np.all(found.thrusts_N <= layout.upper_N)
         np.testing.assert_allclose(found.wrench_B, found.scale * wrench, atol=1e-8 * np.linalg.norm(wrench))
     gentle = gentle_allocation(layout, random_wrench(rng), random_gram(rng, decoupled=False), Weights())
-    assert gentle.method == "planar"
+    assert gentle.method == "boxes"
 
 
 def test_more_than_two_spare_thrusters_are_searched_from_several_starts():
@@ -169,7 +169,7 @@ def test_more_than_two_spare_thrusters_are_searched_from_several_starts():
     layout = compile_layout(B, lower, upper)
     wrench, G, weights = random_wrench(rng), random_gram(rng, 10, decoupled=False), Weights(effort=1e-2)
     found = gentle_allocation(layout, wrench, G, weights)
-    assert layout.k == 4 and found.method == "restarts"
+    assert layout.k == 4 and found.method == "boxes"
     np.testing.assert_allclose(found.wrench_B, wrench, atol=1e-9)
     value = cost(G, found.thrusts_N.copy(), np.zeros(10), weights.packed)
     others = [
@@ -177,7 +177,7 @@ def test_more_than_two_spare_thrusters_are_searched_from_several_starts():
         for r in np.geomspace(1e-3, 10.0, 2000)
     ]
     assert value <= min(others) * (1.0 + 1e-4)
-    assert found.gap >= 0.0
+    assert 0.0 <= found.gap <= 1.0
 
 
 def test_without_spare_thrusters_the_answer_is_unique():
@@ -214,6 +214,7 @@ def test_disturbance_is_the_wake_rooms():
     ("change", "words"),
     [
         ({"lower_N": np.full(8, 1.0)}, "zero thrust"),
+        ({"lower_N": np.full(8, 2.0), "upper_N": np.full(8, 1.0)}, "above upper limit"),
         ({"wrench_B": np.full(6, np.nan)}, "finite"),
         ({"wrench_B": np.zeros(5)}, "shape"),
         ({"B": np.zeros((5, 8))}, "shape"),

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import typer
 
 from wakewise import __version__
-from wakewise.cli import bench, compare, evaluate, reconstruct, scan, vehicle
+from wakewise.cli import allocate, bench, compare, evaluate, reconstruct, scan, tank, target, vehicle, wake
 from wakewise.errors import InputError, WakewiseError
 
 app = typer.Typer(
@@ -23,8 +23,12 @@ app.command("scan")(scan.scan)
 app.command("compare")(compare.compare)
 app.command("reconstruct")(reconstruct.reconstruct_photos)
 app.command("evaluate")(evaluate.evaluate)
+app.command("allocate")(allocate.allocate)
 app.command("bench")(bench.bench)
 app.add_typer(vehicle.app, name="vehicle")
+app.add_typer(tank.app, name="tank")
+app.add_typer(target.app, name="target")
+app.add_typer(wake.app, name="wake")
 
 _INTERRUPTED = 130
 _STOPPED = "stopped; what was finished is kept, run the same command again to go on"

@@ -1,8 +1,8 @@
 """One wrench to many thrusts: the least thrusts, or the gentlest ones, that make the same wrench.
 
 All thrusts that make a wrench differ by null-space thrusts only: T = T_0 + Z lambda. `pseudo_inverse` takes the
-smallest |T| within limits; `gentle_allocation` takes the T that disturbs the target least. Both give up the same share
-of a wrench that the limits do not allow, so that they can be compared at equal wrench.
+smallest |T| within limits; `gentle_allocation` takes the T that disturbs the target least. Both give up the same part
+of a wrench that the limits do not allow (`reach`), so that they can be compared at equal wrench.
 """
 
 from __future__ import annotations
@@ -10,19 +10,35 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import null_space
-from scipy.optimize import linprog, nnls
 
 from wakewise.arrays import Array, freeze, frozen
-from wakewise.control.coupled import planar_search, restart_search
-from wakewise.control.search import box_range, cost, coupling, disjoint_search
+from wakewise.control.boxes import box_search
+from wakewise.control.cells import CLOSED
+from wakewise.control.convex import convex_allocation, is_incoherent
+from wakewise.control.layout import Layout, compile_layout
+from wakewise.control.reach import AXES, by_priority, is_all, parse_priority, within_limits
+from wakewise.control.search import cost, disjoint_search, split_allocation
 from wakewise.errors import InputError
 
-COUPLING_LIMIT = 1e-10
-"""Gram entries between two null vectors below this share of the largest count as zero: they are rounding."""
+__all__ = [
+    "Allocation",
+    "Layout",
+    "Weights",
+    "compile_layout",
+    "disturbance_of",
+    "gentle_allocation",
+    "least_thrusts",
+    "pseudo_inverse",
+]
 
-_PARALLEL_LINES = 48
-_RESTARTS = 32
+COUPLING_LIMIT = 1e-10
+"""Gram entries between two parts of the null space below this share of the largest count as zero: they are rounding."""
+
+BUDGET = 2000
+"""Most boxes that branch and bound looks at unless told otherwise: a few milliseconds with two spare thrusters."""
+
+_STARTS = (0, 0, 6, 12, 24, 32)
+_RESTS, _RESTS_KEPT = 400, 8
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,13 +53,14 @@ class Allocation:
     disturbance : float or None
         D = s' G s in (m/s)^2, None where no Gram matrix was given.
     method : str
-        "pseudo-inverse"; "unique" (no null space); "exact" (independent lines, global minimum proven); "planar" (two
-        coupled directions); "restarts" (more than two).
+        "pseudo-inverse" (least thrusts); "unique" (no thruster to spare); "lines" (the null space splits into lines,
+        each searched exactly); "convex" (a quadratic program, where squares of speeds add up); "boxes" (branch and
+        bound, any layout).
     gap : float
-        How far the weighted cost may lie above its global minimum, relative: proven for "exact", estimated for
-        "planar" and "restarts", zero otherwise.
+        How far the weighted cost may lie above its global minimum, relative: proven by a lower bound, zero for
+        "pseudo-inverse" and "unique". Up to 1e-5 counts as closed; more means that the budget of "boxes" was spent.
     scale : float
-        Share of the attainable part of the requested wrench that the limits allowed, 1 if all of it.
+        Share of the attainable part of the requested wrench that the limits allow in its own direction, 1 if all of it.
     """
 
     thrusts_N: Array
@@ -61,6 +78,12 @@ class Allocation:
     def given_up_B(self) -> Array:
         """Requested wrench that is not made, shape (6,)."""
         return np.asarray(self.requested_B - self.wrench_B)
+
+    @property
+    def given_up(self) -> dict[str, float]:
+        """The same by axis (X, Y, Z in N, K, M, N in N m), only what is more than rounding."""
+        limit = 1e-9 * (1.0 + float(np.linalg.norm(self.requested_B)))
+        return {axis: float(x) for axis, x in zip(AXES, self.given_up_B, strict=True) if abs(x) > limit}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -81,170 +104,6 @@ class Weights:
     def packed(self) -> Array:
         """(w_D, w_u, w_p), shape (3,)."""
         return np.array([self.disturbance, self.effort, self.previous], dtype=np.float64)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Layout:
-    """An allocation matrix with its limits, and what follows from them; make one with `compile_layout`.
-
-    `inverse`, shape (n, 6), gives the least thrusts; `null`, shape (n, k), is an orthonormal basis of the thrusts
-    without wrench, and `lines`, shape (k, n), the same as vectors that share no thruster, if there are such (else
-    shape (0, n)). A thruster whose limits are both zero has failed: its row is zero in all of them.
-    """
-
-    B: Array
-    lower_N: Array
-    upper_N: Array
-    inverse: Array
-    null: Array
-    lines: Array
-
-    def __post_init__(self) -> None:
-        n = self.B.shape[1]
-        freeze(self, B=(6, n), lower_N=(n,), upper_N=(n,), inverse=(n, 6), null=(n, None), lines=(None, n))
-
-    @property
-    def k(self) -> int:
-        """Dimension of the null space."""
-        return int(self.null.shape[1])
-
-
-def compile_layout(B: Array, lower_N: Array, upper_N: Array) -> Layout:
-    """Check an allocation matrix, shape (6, n), and limits, shape (n,), and work out what each wrench needs of them.
-
-    Where the thrusters cannot make every wrench, the nearest is taken, with moments measured against forces at the
-    thrusters' own lever arm (root mean square), so that newtons and newton metres can be added.
-
-    Raises
-    ------
-    InputError
-        On a wrong shape, on numbers that are not finite, or on limits that exclude zero thrust.
-    """
-    B = frozen(B, (6, None), "allocation matrix")
-    n = B.shape[1]
-    lower, upper = frozen(lower_N, (n,), "lower limits"), frozen(upper_N, (n,), "upper limits")
-    if np.any(lower > 0.0) or np.any(upper < 0.0):
-        worst = int(np.argmax(np.maximum(lower, -upper)))
-        raise InputError(
-            f"thruster {worst + 1}: limits {lower[worst]:g} to {upper[worst]:g} N, zero thrust must lie between them"
-        )
-    alive = np.flatnonzero(upper - lower > 0.0)
-    inverse, null, lines = np.zeros((n, 6)), np.zeros((n, 0)), np.zeros((0, n))
-    if alive.size:
-        force, moment = np.linalg.norm(B[:3, alive]), np.linalg.norm(B[3:, alive])
-        arm = moment / force if force > 0.0 and moment > 0.0 else 1.0
-        scaling = np.array([1.0, 1.0, 1.0, 1.0 / arm, 1.0 / arm, 1.0 / arm])
-        scaled = B[:, alive] * scaling[:, None]
-        inverse[alive] = np.linalg.pinv(scaled, rcond=1e-9) * scaling
-        basis = null_space(scaled, rcond=1e-9)
-        null = np.zeros((n, basis.shape[1]))
-        null[alive] = basis
-        lines = _independent_lines(null)
-    return Layout(B=B, lower_N=lower, upper_N=upper, inverse=inverse, null=null, lines=lines)
-
-
-def _independent_lines(null: Array) -> Array:
-    """Null vectors that share no thruster, shape (k, n), or shape (0, n) if there is no such basis."""
-    n, k = null.shape
-    linked = np.abs(null @ null.T) > 1e-9
-    group = np.arange(n)
-    for i in range(n):
-        for j in range(i):
-            if linked[i, j]:
-                group[group == group[i]] = group[j]
-    lines = []
-    for label in np.unique(group):
-        members = group == label
-        block = null[members] @ null[members].T
-        values, vectors = np.linalg.eigh(block)
-        if np.sum(values > 0.5) > 1:
-            return np.zeros((0, n))
-        if values[-1] > 0.5:
-            line = np.zeros(n)
-            line[members] = vectors[:, -1]
-            lines.append(line)
-    return np.array(lines).reshape(k, n) if len(lines) == k else np.zeros((0, n))
-
-
-def _line_scale(thrusts: Array, line: Array, lower: Array, upper: Array) -> float:
-    """Largest share alpha <= 1 for which some t keeps alpha T + t line within limits (pairs of limits, closed form)."""
-    moving = np.abs(line) >= 1e-12
-    a, z = thrusts[moving], line[moving]
-    # Each thruster allows t from (near - alpha a)/z to (far - alpha a)/z; every start must lie below every end.
-    near = np.where(z > 0.0, lower[moving], upper[moving]) / z
-    far = np.where(z > 0.0, upper[moving], lower[moving]) / z
-    rate = (a / z)[None, :] - (a / z)[:, None]
-    room = far[None, :] - near[:, None]
-    over = rate > room
-    return float(np.min(room[over] / rate[over], initial=1.0))
-
-
-def _within_limits(layout: Layout, thrusts: Array) -> tuple[Array, float]:
-    """Least-norm thrusts within limits that make the largest possible share of the same wrench, and that share."""
-    lower, upper = layout.lower_N, layout.upper_N
-    if np.all(thrusts >= lower) and np.all(thrusts <= upper):
-        return thrusts, 1.0
-    if len(layout.lines) != layout.k:
-        result, scale = _within_polytope(layout, thrusts)
-    else:
-        silent = np.all(np.abs(layout.null) < 1e-12, axis=1)
-        scale = _box_scale(thrusts[silent], lower[silent], upper[silent])
-        for line in layout.lines:
-            scale = min(scale, _line_scale(thrusts, line, lower, upper))
-        result = scale * thrusts
-        for line in layout.lines:
-            low, high = box_range(result, line, lower, upper)
-            result = result + (low if low > 0.0 else min(high, 0.0)) * line
-    return np.clip(result, lower, upper), scale
-
-
-def _box_scale(thrusts: Array, lower: Array, upper: Array) -> float:
-    """Largest share alpha <= 1 of the thrusts that is within limits as it stands."""
-    room = np.where(thrusts > 0.0, upper, lower)
-    over = np.abs(thrusts) > np.abs(room)
-    return float(np.min(room[over] / thrusts[over], initial=1.0))
-
-
-def _within_polytope(layout: Layout, thrusts: Array) -> tuple[Array, float]:
-    """The same for null spaces in one piece: linear programming over (alpha, lambda), then the smallest lambda."""
-    Z = layout.null
-    rows = np.vstack([np.column_stack([thrusts, Z]), np.column_stack([-thrusts, -Z])])
-    limits = np.concatenate([layout.upper_N, -layout.lower_N])
-    objective = np.zeros(1 + layout.k)
-    objective[0] = -1.0
-    bounds: list[tuple[float | None, float | None]] = [(0.0, 1.0), *[(None, None)] * layout.k]
-    found = linprog(objective, A_ub=rows, b_ub=limits, bounds=bounds, method="highs")
-    if not found.success or found.x is None:
-        scale = _box_scale(thrusts, layout.lower_N, layout.upper_N)
-        return scale * thrusts, scale
-    scale = float(found.x[0])
-    # Below one, the limits leave a single point, or nearly: the program's own answer is the one to take.
-    shift = _least_shift(layout, thrusts) if scale >= 1.0 - 1e-12 else None
-    return scale * thrusts + Z @ (found.x[1:] if shift is None else shift), scale
-
-
-def _least_shift(layout: Layout, thrusts: Array) -> Array | None:
-    """Smallest lambda, shape (k,), that brings T + Z lambda within limits; None if rounding hides it.
-
-    Least-distance programming by non-negative least squares (C. L. Lawson and R. J. Hanson, Solving Least Squares
-    Problems, 1974, chapter 23).
-    """
-    rows = np.vstack([layout.null, -layout.null])
-    limits = np.concatenate([layout.lower_N - thrusts, thrusts - layout.upper_N])
-    E = np.vstack([rows.T, limits])
-    target = np.zeros(layout.k + 1)
-    target[-1] = 1.0
-    try:
-        u, _ = nnls(E, target)
-    except RuntimeError:  # its iteration limit
-        return None
-    residual = E @ u - target
-    if abs(residual[-1]) < 1e-12:
-        return None
-    shift = np.asarray(-residual[:-1] / residual[-1])
-    moved = thrusts + layout.null @ shift
-    inside = np.all(moved >= layout.lower_N - 1e-9) and np.all(moved <= layout.upper_N + 1e-9)
-    return shift if inside else None
 
 
 def pseudo_inverse(B: Array, wrench_B: Array, lower_N: Array, upper_N: Array) -> Allocation:
@@ -272,10 +131,16 @@ def pseudo_inverse(B: Array, wrench_B: Array, lower_N: Array, upper_N: Array) ->
     return least_thrusts(compile_layout(B, lower_N, upper_N), wrench_B)
 
 
-def least_thrusts(layout: Layout, wrench_B: Array, gram: Array | None = None) -> Allocation:
-    """`pseudo_inverse` for a layout compiled once; with `gram`, shape (2 n, 2 n), also says the disturbance."""
+def least_thrusts(
+    layout: Layout, wrench_B: Array, gram: Array | None = None, priority: str | None = None
+) -> Allocation:
+    """`pseudo_inverse` for a layout compiled once; with `gram`, shape (2 n, 2 n), also says the disturbance.
+
+    `priority`, such as "ZKMN,XY", says which axes to give up last where the limits (or missing thrusters) do not allow
+    the whole wrench; without it the wrench keeps its direction.
+    """
     requested = frozen(wrench_B, (6,), "wrench")
-    thrusts, scale = _within_limits(layout, layout.inverse @ requested)
+    thrusts, scale = _start(layout, requested, priority)
     return Allocation(
         thrusts_N=thrusts,
         wrench_B=layout.B @ thrusts,
@@ -287,19 +152,35 @@ def least_thrusts(layout: Layout, wrench_B: Array, gram: Array | None = None) ->
     )
 
 
+def _start(layout: Layout, requested: Array, priority: str | None) -> tuple[Array, float]:
+    """Least thrusts of what can be made of a wrench, and the share that keeps its direction."""
+    groups = None if priority is None else parse_priority(priority)
+    thrusts, scale = within_limits(layout, layout.inverse @ requested)
+    if groups is not None and not is_all(layout, thrusts, requested):
+        thrusts = by_priority(layout, requested, groups)
+    return thrusts, scale
+
+
 def disturbance_of(gram: Array, thrusts_N: Array) -> float:
     """D = s' G s in (m/s)^2 with s_i = sqrt|T_i| in the slot of the jet that is on; G has shape (2 n, 2 n)."""
     return float(cost(gram, np.array(thrusts_N), np.array(thrusts_N), np.array([1.0, 0.0, 0.0])))
 
 
 def gentle_allocation(
-    layout: Layout, wrench_B: Array, gram: Array, weights: Weights, previous_N: Array | None = None
+    layout: Layout,
+    wrench_B: Array,
+    gram: Array,
+    weights: Weights,
+    previous_N: Array | None = None,
+    priority: str | None = None,
+    budget: int = BUDGET,
 ) -> Allocation:
     """Thrusts of least w_D D + w_u |T|^2 + w_p |T - T_previous|^2 among those that make the wrench within limits.
 
-    Where the null space falls apart into lines that share no thruster and no Gram entry (vectored layouts of four
-    horizontal and four vertical thrusters do), the global minimum is found and proven; otherwise see
-    `coupled.planar_search` and `coupled.restart_search`. The cost never exceeds that of `pseudo_inverse`.
+    The global minimum, with a proven gap. Where the null space falls apart into lines that share no thruster and no
+    Gram entry (vectored layouts of four horizontal and four vertical thrusters do), each line is searched exactly; a
+    diagonal Gram matrix makes the problem convex; everything else is left to branch and bound, whose gap is what it
+    reached within its budget. The cost never exceeds that of `least_thrusts`.
 
     Parameters
     ----------
@@ -310,35 +191,39 @@ def gentle_allocation(
     weights : Weights
     previous_N : ndarray, shape (n,), optional
         Thrusts of the step before; zeros if not given.
+    priority : str, optional
+        As `least_thrusts`.
+    budget : int
+        Most boxes to look at, where the layout needs branch and bound.
 
     Raises
     ------
     InputError
-        If the wrench, the Gram matrix or the previous thrusts have a wrong shape or are not finite.
+        If the wrench, the Gram matrix or the previous thrusts have a wrong shape or are not finite, the priority is not
+        a list of axes, or the budget is less than 1.
     """
     n = layout.B.shape[1]
     requested = frozen(wrench_B, (6,), "wrench")
     G = frozen(gram, (2 * n, 2 * n), "Gram matrix")
     previous = np.zeros(n) if previous_N is None else frozen(previous_N, (n,), "previous thrusts")
-    start, scale = _within_limits(layout, layout.inverse @ requested)
+    if budget < 1:
+        raise InputError(f"budget: {budget} boxes, must be at least 1")
+    if priority is not None:
+        parse_priority(priority)
     packed = weights.packed
     lower, upper = layout.lower_N, layout.upper_N
-    gap = 0.0
-    if layout.k == 0:
-        thrusts, method = start, "unique"
-    elif len(layout.lines) == layout.k and (layout.k == 1 or coupling(G, layout.lines) <= COUPLING_LIMIT):
-        thrusts, gap = disjoint_search(G, start, layout.lines, lower, upper, previous, packed)
-        method = "exact"
-    elif layout.k == 2:
-        thrusts, gap = planar_search(G, start, layout.null, lower, upper, previous, packed, _PARALLEL_LINES)
-        method = "planar"
+    scale = 1.0
+    if len(layout.lines) == layout.k > 0:
+        done, thrusts, gap = split_allocation(
+            G, layout.inverse, requested, layout.lines, lower, upper, previous, packed, COUPLING_LIMIT
+        )
+        method = "lines"
     else:
-        starts = _feasible_starts(layout, start, previous)
-        thrusts, gap = restart_search(G, starts, layout.null, lower, upper, previous, packed)
-        method = "restarts"
+        done = False
+    if not done or (priority is not None and not is_all(layout, thrusts, requested)):
+        start, scale = _start(layout, requested, priority)
+        thrusts, method, gap = _search(layout, start, G, previous, packed, budget)
     value = cost(G, thrusts, previous, packed)
-    if value > cost(G, start, previous, packed):
-        thrusts, value = start, cost(G, start, previous, packed)
     return Allocation(
         thrusts_N=thrusts,
         wrench_B=layout.B @ thrusts,
@@ -350,18 +235,84 @@ def gentle_allocation(
     )
 
 
-def _feasible_starts(layout: Layout, start: Array, previous: Array) -> Array:
+def _search(
+    layout: Layout, start: Array, G: Array, previous: Array, packed: Array, budget: int
+) -> tuple[Array, str, float]:
+    """Least cost among the thrusts that make the wrench of `start`, how it was found, and its proven gap (absolute)."""
+    lower, upper = layout.lower_N, layout.upper_N
+    if layout.k == 0:
+        return start, "unique", 0.0
+    groups = _coupled_groups(layout, G)
+    method = "lines" if all(group.shape[1] == 1 for group in groups) else "boxes"
+    if method == "boxes" and is_incoherent(G):
+        found = convex_allocation(layout.B, start, lower, upper, G, previous, packed)
+        # The solver's own tolerance is not always enough; what it leaves open goes the way of all other layouts.
+        exact = found is not None and is_all(layout, found[0], layout.B @ start)
+        if found is not None and exact and found[1] <= CLOSED * cost(G, found[0], previous, packed):
+            return found[0], "convex", found[1]
+    spare = np.any(np.abs(layout.null) > 1e-12, axis=1)
+    thrusts, gap = start.copy(), 0.0
+    for group in groups:
+        own = np.any(np.abs(group) > 1e-12, axis=1)
+        # Thrusters of other groups neither move nor count; those that never move count.
+        here = own | ~spare
+        base, before = np.where(here, start, 0.0), np.where(here, previous, 0.0)
+        if group.shape[1] == 1:
+            result, part = disjoint_search(G, base, group.T.copy(), lower, upper, before, packed)
+        else:
+            starts = _feasible_starts(layout, base, before, group)
+            if group.shape[1] > 2:
+                starts = np.vstack([starts, _at_rest(layout, base, before, group, G, packed)])
+            result, part, _ = box_search(G, starts, group, lower, upper, before, packed, budget)
+        if cost(G, result, before, packed) <= cost(G, base, before, packed):
+            thrusts[own] = result[own]
+        gap += part
+    return thrusts, method, gap
+
+
+def _coupled_groups(layout: Layout, G: Array) -> list[Array]:
+    """Parts of the null space, those joined that share a Gram entry; orthonormal bases, shape (n, k_g) each."""
+    strength = np.abs(G).reshape(2, layout.B.shape[1], 2, -1).max(axis=(0, 2))
+    owner = [np.any(np.abs(block) > 1e-12, axis=1) for block in layout.blocks]
+    limit = COUPLING_LIMIT * float(strength.max(initial=0.0))
+    groups: list[list[int]] = []
+    for new in range(len(owner)):
+        joined = [new]
+        for group in groups.copy():
+            if any(strength[np.ix_(owner[new], owner[old])].max() > limit for old in group):
+                groups.remove(group)
+                joined = [*group, *joined]
+        groups.append(joined)
+    return [np.ascontiguousarray(np.hstack([layout.blocks[b] for b in group])) for group in groups]
+
+
+def _feasible_starts(layout: Layout, start: Array, previous: Array, Z: Array) -> Array:
     """The least thrusts, the previous ones brought to this wrench, and points along fixed random directions."""
-    Z = layout.null
-    toward = Z.T @ (previous - start)
+    k = Z.shape[1]
+    toward = Z @ (Z.T @ (previous - start))
     # A fixed stream: the same wrench gives the same thrusts.
-    directions = np.random.default_rng(0).normal(size=(_RESTARTS - 2, layout.k))
-    starts = [start, start + _reach(layout, start, Z @ toward, 1.0) * (Z @ toward)]
+    directions = np.random.default_rng(0).normal(size=(_STARTS[min(k, len(_STARTS) - 1)], k))
+    starts = [start, start + _reach(layout, start, toward, 1.0) * toward]
     for number, direction in enumerate(directions):
         step = Z @ (direction / np.linalg.norm(direction))
         share = ((number + 1) / len(directions)) ** 2
         starts.append(start + share * _reach(layout, start, step, np.inf) * step)
     return np.clip(np.array(starts), layout.lower_N, layout.upper_N)
+
+
+def _at_rest(layout: Layout, start: Array, previous: Array, Z: Array, G: Array, packed: Array) -> Array:
+    """The cheapest of many points where as many thrusters rest as the null space has dimensions: minima like these."""
+    k = Z.shape[1]
+    moving = np.flatnonzero(np.any(np.abs(Z) > 1e-12, axis=1))
+    rng = np.random.default_rng(0)
+    sets = np.array([rng.permutation(moving)[:k] for _ in range(_RESTS)])
+    sets = sets[np.abs(np.linalg.det(Z[sets])) > 1e-3 / 2.0**k]
+    shifts = np.linalg.solve(Z[sets], start[sets][:, :, None])[:, :, 0]
+    T = start - shifts @ Z.T
+    np.put_along_axis(T, sets, 0.0, axis=1)
+    T = T[np.all((layout.lower_N <= T) & (layout.upper_N >= T), axis=1)]
+    values = np.array([cost(G, row, previous, packed) for row in T])
+    return np.ascontiguousarray(T[np.argsort(values, kind="stable")[:_RESTS_KEPT]])
 
 
 def _reach(layout: Layout, start: Array, step: Array, most: float) -> float:

@@ -1,6 +1,6 @@
-"""Kernels for null spaces whose directions are coupled: not proven to be global, and said so in the result.
+"""Descent where the directions of the null space are coupled: to a minimum from a start, quickly and without proof.
 
-They build on `search.line_minimum`, which is exact along a line; the cost f is defined there.
+It builds on `search.line_minimum`, which is exact along a line; the cost f is defined there. `boxes` proves.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def _move(
 
 
 @njit(cache=True)
-def _descend(
+def descend(
     G: Array, thrusts: Array, null: Array, lower: Array, upper: Array, previous: Array, weights: Array, sweeps: int
 ) -> float:
     """Line searches along the null vectors and along what keeps silent thrusters silent; in place, returns f."""
@@ -73,108 +73,33 @@ def _descend(
 
 
 @njit(cache=True)
-def _try_line(
-    G: Array,
-    best: Array,
-    value: float,
-    base: Array,
-    direction: Array,
-    lower: Array,
-    upper: Array,
-    previous: Array,
-    weights: Array,
+def explore(
+    G: Array, thrusts: Array, null: Array, lower: Array, upper: Array, previous: Array, weights: Array, rounds: int
 ) -> float:
-    """Replace `best` (in place) by the minimum of a line if that is lower; return the lowest f."""
-    low, high = box_range(base, direction, lower - 1e-9, upper + 1e-9)
-    if not low < high or not np.isfinite(high - low):
-        return value
-    constant_part = base.copy()
-    for i in range(base.size):
-        if abs(direction[i]) >= 1e-12:
-            constant_part[i] = 0.0
-        elif base[i] < lower[i] - 1e-9 or base[i] > upper[i] + 1e-9:
-            return value
-    constant = cost(G, constant_part, constant_part, np.array([weights[0], weights[1], 0.0]))
-    for i in range(base.size):
-        if abs(direction[i]) < 1e-12:
-            constant += weights[2] * (base[i] - previous[i]) ** 2
-    counted = np.ones(base.size, np.bool_)
-    t, _, _ = line_minimum(G, base, direction, counted, low, high, previous, weights, value - constant)
-    if np.isfinite(t):
-        trial = np.minimum(np.maximum(base + t * direction, lower), upper)
-        found = cost(G, trial, previous, weights)
-        if found < value:
-            best[:] = trial
-            return found
-    return value
+    """Leave a minimum by bringing one thruster at a time to rest, or across zero, and descend from there; in place.
 
-
-@njit(cache=True)
-def planar_search(
-    G: Array, start: Array, null: Array, lower: Array, upper: Array, previous: Array, weights: Array, lines: int
-) -> tuple[Array, float]:
-    """Minimum over a two-dimensional null space whose two directions are coupled.
-
-    Every minimum lies on a line T_i = 0 or T_i = limit (searched exactly, one by one) or inside a cell between them
-    (found from `lines` parallel lines in each of two directions, spread over the disc that effort allows, and descent).
-    `null`, shape (n, 2), has orthonormal columns. Returns the thrusts and an estimate of the gap: the gain that the
-    second half of the parallel lines still brought.
+    Ends after a round without gain. Returns f.
     """
-    n = start.size
-    best = start.copy()
-    value = _descend(G, best, null, lower, upper, previous, weights, 3)
-    origin = start - null @ (null.T @ start)
-    for i in range(n):
-        size = null[i, 0] ** 2 + null[i, 1] ** 2
-        if size < 1e-18:
-            continue
-        direction = null @ (np.array([-null[i, 1], null[i, 0]]) / np.sqrt(size))
-        direction[i] = 0.0
-        for side in range(3):
-            wanted = 0.0 if side == 0 else (lower[i] if side == 1 else upper[i])
-            if side > 0 and wanted == 0.0:
+    n = thrusts.size
+    value = cost(G, thrusts, previous, weights)
+    for _ in range(rounds):
+        before = value
+        for i in range(n):
+            along = np.dot(null[i], null[i])
+            if along < 1e-9:
                 continue
-            base = origin + null @ (null[i] * ((wanted - origin[i]) / size))
-            base[i] = wanted
-            value = _try_line(G, best, value, base, direction, lower, upper, previous, weights)
-    value = min(value, _descend(G, best, null, lower, upper, previous, weights, 3))
-    # The minimum has w_u |T|^2 <= f: no coordinate in the null space can lie outside this disc.
-    reach = np.sqrt(np.dot(np.maximum(np.abs(lower), np.abs(upper)), np.maximum(np.abs(lower), np.abs(upper))))
-    if weights[1] > 0.0:
-        reach = min(reach, np.sqrt(max(value / weights[1] - np.dot(origin, origin), 0.0)))
-    first = value
-    for half in range(2):
-        if half == 1:
-            first = value
-        for step in range(lines // 2):
-            # Squared spacing: denser near zero, where the sign changes lie.
-            u = 2.0 * (2 * step + half + 0.5) / lines - 1.0
-            offset = reach * u * abs(u)
-            for c in range(2):
-                base = origin + offset * null[:, c]
-                value = _try_line(G, best, value, base, null[:, 1 - c].copy(), lower, upper, previous, weights)
-    value = min(value, _descend(G, best, null, lower, upper, previous, weights, 8))
-    return best, max(first - value, TOLERANCE * abs(value))
-
-
-@njit(cache=True)
-def restart_search(
-    G: Array, starts: Array, null: Array, lower: Array, upper: Array, previous: Array, weights: Array
-) -> tuple[Array, float]:
-    """Best of descents from several feasible starts, shape (r, n), for null spaces of more than two dimensions.
-
-    The gap estimate is what the second half of the starts still gained over the first.
-    """
-    best = starts[0].copy()
-    value = np.inf
-    half_value = np.inf
-    for r in range(starts.shape[0]):
-        if r == (starts.shape[0] + 1) // 2:
-            half_value = value
-        thrusts = starts[r].copy()
-        found = _descend(G, thrusts, null, lower, upper, previous, weights, 12)
-        if found < value:
-            value = found
-            best = thrusts
-    gap = half_value - value if np.isfinite(half_value) else abs(value)
-    return best, max(gap, TOLERANCE * abs(value))
+            direction = null @ null[i]
+            for kick in range(2):
+                goal = 0.0 if kick == 0 else -thrusts[i]
+                if abs(thrusts[i]) < 1e-9:
+                    goal = np.mean(np.abs(thrusts)) * (1.0 if kick == 0 else -1.0)
+                low, high = box_range(thrusts, direction, lower, upper)
+                t = min(max((goal - thrusts[i]) / along, min(low, 0.0)), max(high, 0.0))
+                trial = np.minimum(np.maximum(thrusts + t * direction, lower), upper)
+                found = descend(G, trial, null, lower, upper, previous, weights, 4)
+                if found < value * (1.0 - 1e-9):
+                    value = found
+                    thrusts[:] = trial
+        if value >= before:
+            break
+    return value

@@ -325,3 +325,41 @@ def disjoint_search(
             thrusts += t * lines[g]
             gap += part
     return np.minimum(np.maximum(thrusts, lower), upper), gap
+
+
+@njit(cache=True)
+def split_allocation(
+    G: Array,
+    inverse: Array,
+    wrench: Array,
+    lines: Array,
+    lower: Array,
+    upper: Array,
+    previous: Array,
+    weights: Array,
+    coupling_limit: float,
+) -> tuple[bool, Array, float]:
+    """Least thrusts and `disjoint_search` in one call: what a control step needs, wherever no limit is in the way.
+
+    Returns whether it applies (the wrench can be made within limits, and the lines are not coupled), the thrusts and
+    the proven gap. `inverse` has shape (n, 6).
+    """
+    n = lower.size
+    start = np.zeros(n)
+    for i in range(n):
+        for axis in range(6):
+            start[i] += inverse[i, axis] * wrench[axis]
+    moves = np.zeros(n, np.bool_)
+    for g in range(lines.shape[0]):
+        low, high = box_range(start, lines[g], lower, upper)
+        if low > high:
+            return False, start, 0.0
+        for i in range(n):
+            moves[i] = moves[i] or abs(lines[g, i]) >= 1e-12
+    for i in range(n):
+        if not moves[i] and not lower[i] <= start[i] <= upper[i]:
+            return False, start, 0.0
+    if lines.shape[0] > 1 and coupling(G, lines) > coupling_limit:
+        return False, start, 0.0
+    thrusts, gap = disjoint_search(G, start, lines, lower, upper, previous, weights)
+    return True, thrusts, gap

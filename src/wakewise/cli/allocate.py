@@ -1,0 +1,261 @@
+"""`wakewise allocate`: one wrench to thrusts, with the disturbance before and after."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from wakewise.cli.console import print_json, print_table, shown
+from wakewise.cli.options import Json
+
+if TYPE_CHECKING:
+    from wakewise.arrays import Array
+    from wakewise.control import Allocation
+    from wakewise.geometry import Pose
+    from wakewise.vehicles import Vehicle
+
+Six = tuple[float, float, float, float, float, float]
+
+VehicleName = Annotated[str, typer.Option("--vehicle", help="Library name or vehicle YAML file.")]
+PoseNumbers = Annotated[
+    Six,
+    typer.Option(
+        "--pose",
+        metavar="X Y Z ROLL PITCH YAW",
+        help="Where the vehicle is: m and rad; z and yaw as in NED, down and clockwise seen from above.",
+    ),
+]
+WrenchNumbers = Annotated[
+    Six,
+    typer.Option(
+        "--wrench", metavar="X Y Z K M N", help="Force (N) and moment (N m) about the body origin, body axes (FRD)."
+    ),
+]
+Points = Annotated[
+    Path, typer.Option("--points", help="CSV with x_m, y_m, z_m in the world (NED) and weight: what to spare.")
+]
+WakeModelName = Annotated[
+    str, typer.Option("--wake-model", help="paper, paper-calibrated, fitted, linear, jet or jet-fitted.")
+]
+Sum = Annotated[str, typer.Option("--sum", help="How jets that meet add up: coherent or incoherent.")]
+Failed = Annotated[
+    list[str] | None,
+    typer.Option("--failed", metavar="NAME|INDEX", help="A thruster that gives nothing; may be repeated."),
+]
+Priority = Annotated[
+    str | None,
+    typer.Option(
+        metavar="AXES",
+        help="What to give up last where limits do not allow the wrench, such as ZKMN,XY; else its direction is kept.",
+        show_default=False,
+    ),
+]
+Effort = Annotated[float, typer.Option("--w-effort", help="Weight of squared thrust beside D, (m/s)^2 per N^2.")]
+Change = Annotated[float, typer.Option("--w-previous", help="Weight of squared change, (m/s)^2 per N^2.")]
+Previous = Annotated[
+    str | None,
+    typer.Option(metavar="T1,T2,...", help="Thrusts of the step before (N), for --w-previous.", show_default=False),
+]
+Boxes = Annotated[int, typer.Option("--budget", min=1, max=1_000_000, help="Most boxes that branch and bound takes.")]
+
+
+def allocate(
+    pose: PoseNumbers,
+    wrench: WrenchNumbers,
+    points: Points,
+    vehicle: VehicleName = "paper",
+    wake_model: WakeModelName = "jet",
+    sum_: Sum = "coherent",
+    failed: Failed = None,
+    priority: Priority = None,
+    w_effort: Effort = 1e-6,
+    w_previous: Change = 0.0,
+    previous: Previous = None,
+    budget: Boxes = 50_000,
+    json: Json = False,
+) -> None:
+    """Give the thrusts that make a wrench and disturb weighted points least: D + w_effort |T|^2 at its global minimum.
+
+    D is the weighted sum of squared water speeds at the points, (m/s)^2. Beside it stand the least thrusts of the same
+    wrench (pseudo-inverse). The gap is proven: how far the cost may lie above its minimum, relative.
+    """
+    import numpy as np
+
+    from wakewise import control, wake
+    from wakewise.errors import InputError
+    from wakewise.vehicles import load_vehicle
+
+    chosen = load_vehicle(vehicle)
+    X_WB = _pose(pose)
+    if not np.all(np.isfinite(wrench)):
+        raise InputError(f"--wrench: {_words(wrench)}, all six must be finite")
+    if sum_ not in ("coherent", "incoherent"):
+        raise InputError(f"--sum {sum_}: unknown, allowed: coherent, incoherent")
+    superposition: Literal["coherent", "incoherent"] = "coherent" if sum_ == "coherent" else "incoherent"
+    model = wake.wake_model(wake_model)
+    places, weights = _points(points, chosen, X_WB)
+    before = None if previous is None else _thrusts(previous, len(chosen.thrusters))
+    lower, upper = chosen.thrust_lower_N.copy(), chosen.thrust_upper_N.copy()
+    dead = sorted({_thruster(name, chosen) for name in failed or []})
+    lower[dead] = upper[dead] = 0.0
+    layout = control.compile_layout(chosen.allocation_matrix, lower, upper)
+    G = wake.gram(
+        model,
+        places,
+        weights,
+        X_WB.apply(chosen.thruster_positions_B_m),
+        chosen.thruster_axes_B @ X_WB.R.T,
+        chosen.disk_areas_m2,
+        superposition,
+    )
+    cost = control.Weights(disturbance=1.0, effort=w_effort, previous=w_previous)
+    wanted = np.array(wrench)
+    gentle = control.gentle_allocation(layout, wanted, G, cost, before, priority, budget)
+    least = control.least_thrusts(layout, wanted, G, priority)
+    size = float(np.linalg.norm(wanted))
+    figures: dict[str, Any] = {
+        "vehicle": chosen.name,
+        "thrusters": [t.name for t in chosen.thrusters],
+        "failed": [chosen.thrusters[i].name for i in dead],
+        "wake_model": model.name,
+        "sum": sum_,
+        "thrusts_N": gentle.thrusts_N.tolist(),
+        "wrench_made": gentle.wrench_B.tolist(),
+        "wrench_error_rel": float(np.linalg.norm(gentle.given_up_B)) / size if size > 0.0 else 0.0,
+        "scale": gentle.scale,
+        "given_up": gentle.given_up,
+        "disturbance": gentle.disturbance,
+        "disturbance_pinv": least.disturbance,
+        "thrusts_pinv_N": least.thrusts_N.tolist(),
+        "method": gentle.method,
+        "gap": gentle.gap,
+        "null_space": layout.null.T.tolist() if not len(layout.lines) else layout.lines.tolist(),
+        "rank": layout.rank,
+        "w_effort": w_effort,
+        "w_previous": w_previous,
+    }
+    if json:
+        print_json(figures)
+        return
+    _show(chosen, gentle, least, figures)
+
+
+def _show(vehicle: Vehicle, gentle: Allocation, least: Allocation, figures: dict[str, Any]) -> None:
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for heading in ("thruster", "least thrusts", "", "gentle", ""):
+        table.add_column(heading, justify="left" if heading in ("thruster", "") else "right")
+    most = max(1e-9, *(abs(float(T)) for a in (gentle, least) for T in a.thrusts_N))
+    for i, thruster in enumerate(vehicle.thrusters):
+        name = f"{i + 1} {thruster.name}" + (" (failed)" if thruster.name in figures["failed"] else "")
+        old, new = float(least.thrusts_N[i]), float(gentle.thrusts_N[i])
+        table.add_row(name, f"{old:.2f} N", _bar(old, most), f"{new:.2f} N", _bar(new, most))
+    print_table(table)
+    before, after = figures["disturbance_pinv"], figures["disturbance"]
+    typer.echo(f"\ndisturbance D   {shown(before)} (m/s)^2 before, {shown(after)} after" + _saved(before, after))
+    certain = "exact" if gentle.gap <= 1e-5 else "budget spent: raise --budget for a smaller gap"
+    typer.echo(f"method          {gentle.method}, gap {gentle.gap:.1e} ({certain})")
+    typer.echo(f"wrench          error {figures['wrench_error_rel']:.1e} of what was asked")
+    units = {"X": "N", "Y": "N", "Z": "N", "K": "N m", "M": "N m", "N": "N m"}
+    if gentle.given_up:
+        lost = ", ".join(f"{axis} {value:.3g} {units[axis]}" for axis, value in gentle.given_up.items())
+        typer.echo(f"given up        {lost}")
+
+
+def _saved(before: float, after: float) -> str:
+    return f": {100.0 * (1.0 - after / before):.1f} % less" if before > 0.0 else ""
+
+
+def _bar(thrust_N: float, most_N: float) -> str:
+    """Ten cells to each side of zero."""
+    cells = round(10 * abs(thrust_N) / most_N)
+    bar = "█" * cells
+    return f"{bar:>10}│{'':10}" if thrust_N < 0 else f"{'':10}│{bar:<10}"
+
+
+def _words(numbers: tuple[float, ...]) -> str:
+    return " ".join(f"{number:g}" for number in numbers)
+
+
+def _pose(numbers: Six) -> Pose:
+    import math
+
+    import numpy as np
+
+    from wakewise.errors import InputError
+    from wakewise.geometry import Pose, quat_from_euler
+
+    if not all(math.isfinite(number) for number in numbers):
+        raise InputError(f"--pose: {_words(numbers)}, all six must be finite")
+    if max(abs(angle) for angle in numbers[3:]) > 2 * math.pi:
+        raise InputError(f"--pose: angles {_words(numbers[3:])}, radians up to 2 pi are allowed")
+    return Pose(np.array(numbers[:3]), quat_from_euler(*numbers[3:]))
+
+
+def _thruster(name: str, vehicle: Vehicle) -> int:
+    from wakewise.errors import InputError
+
+    names = [t.name for t in vehicle.thrusters]
+    if name in names:
+        return names.index(name)
+    if name.isdecimal() and 1 <= int(name) <= len(names):
+        return int(name) - 1
+    raise InputError(f"--failed {name}: no such thruster, allowed: 1 to {len(names)}, {', '.join(names)}")
+
+
+def _thrusts(text: str, count: int) -> Array:
+    import numpy as np
+
+    from wakewise.errors import InputError
+
+    try:
+        thrusts = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        raise InputError(f"--previous {text}: not numbers parted by commas") from None
+    if len(thrusts) != count or not np.all(np.isfinite(thrusts)):
+        raise InputError(f"--previous {text}: {len(thrusts)} numbers, allowed: {count} finite ones, one per thruster")
+    return thrusts
+
+
+def _points(path: Path, vehicle: Vehicle, X_WB: Pose) -> tuple[Array, Array]:
+    """Points, shape (n, 3), and weights, shape (n,), of a CSV file; refuses points inside the vehicle's box."""
+    import csv
+
+    import numpy as np
+
+    from wakewise.errors import InputError
+
+    columns = ("x_m", "y_m", "z_m", "weight")
+    try:
+        rows = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines(), strict=True))
+    except (OSError, UnicodeDecodeError, csv.Error) as fault:
+        raise InputError(f"--points {path}: cannot be read as CSV, {fault}") from None
+    head = [name.strip() for name in rows[0]] if rows else []
+    if sorted(head) != sorted(columns):
+        raise InputError(f"--points {path}: columns {', '.join(head) or 'none'}, allowed: {', '.join(columns)}")
+    values = []
+    for line, row in enumerate(rows[1:], start=2):
+        if not any(cell.strip() for cell in row):
+            continue
+        try:
+            values.append([float(row[head.index(name)]) for name in columns])
+        except (ValueError, IndexError):
+            raise InputError(f"--points {path}: line {line} '{','.join(row)}', four numbers are needed") from None
+        if len(row) != len(columns) or not np.all(np.isfinite(values[-1])):
+            raise InputError(f"--points {path}: line {line} '{','.join(row)}', four finite numbers are needed")
+        if values[-1][3] < 0.0:
+            raise InputError(f"--points {path}: line {line} has weight {values[-1][3]:g}, must not be negative")
+    table = np.array(values).reshape(-1, 4)
+    if not np.sum(table[:, 3]) > 0.0:
+        what = "holds no points" if not len(table) else "all weights are 0, at least one must be more"
+        raise InputError(f"--points {path}: {what}")
+    inside = np.all(np.abs(X_WB.inverse().apply(table[:, :3])) < 0.5 * vehicle.size_m, axis=1)
+    if np.any(inside):
+        raise InputError(
+            f"--points {path}: {int(inside.sum())} of {len(table)} points lie inside the vehicle's box "
+            f"({_words(tuple(vehicle.size_m))} m), the target must be outside"
+        )
+    return table[:, :3], table[:, 3]
