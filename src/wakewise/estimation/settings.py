@@ -12,10 +12,10 @@ class FilterSettings(Settings):
 
     The defaults of the sensors are those of a camera pose (2 mm, 0.2 deg), of optical tracking (5 mm), a low-cost
     inertial unit (JY901 class: 0.1 deg/s, 5 mg) and a pressure sensor (MS5837 class, 5 mm). The defaults of the model
-    are for station keeping with tenths of a newton per thruster: 5 % of 0.2 N on 10 kg is 1e-3 m/s2, lasting the 0.1 s
-    of the thruster's lag, as white noise 1e-3 sqrt(2 x 0.1) = 5e-4 m/s2/sqrt(Hz); with arms of 0.15 m on 0.1 kg m2
-    about 0.01 rad/s2/sqrt(Hz). Trim is constant, drag's error changes with speed by some 0.01 N within seconds. When
-    more happens than that, the filter notices and lets the noise grow (`error_state`).
+    are for station keeping with tenths of a newton per thruster: gains within 5 % (one sigma 3 %) of 0.2 N on 10 kg
+    are 6e-4 m/s2, lasting the 0.1 s of the thruster's lag, as white noise 6e-4 sqrt(2 x 0.1) = 3e-4 m/s2/sqrt(Hz); with
+    arms of 0.15 m on 0.1 kg m2 about 0.004 rad/s2/sqrt(Hz). Trim is constant, drag's error changes with speed by some
+    0.01 N within seconds. When more happens than that, the filter notices and lets the noise grow (`error_state`).
     """
 
     position_std_m: float = Field(default=0.002, description="noise of a pose's position, per axis", gt=0.0, le=1.0)
@@ -37,10 +37,13 @@ class FilterSettings(Settings):
         default=0.0001, description="random walk of the accelerometer's bias (m/s2/sqrt(s))", gt=0.0, le=1.0
     )
     acceleration_noise_m_s2: float = Field(
-        default=0.0005, description="white error of the modelled acceleration (m/s2/sqrt(Hz))", gt=0.0, le=10.0
+        default=0.0003, description="white error of the modelled acceleration (m/s2/sqrt(Hz))", gt=0.0, le=10.0
     )
     turning_noise_rad_s2: float = Field(
-        default=0.01, description="white error of the modelled angular acceleration (rad/s2/sqrt(Hz))", gt=0.0, le=100.0
+        default=0.004,
+        description="white error of the modelled turning (rad/s2/sqrt(Hz))",
+        gt=0.0,
+        le=100.0,
     )
     force_std_N: float = Field(default=1.0, description="unmodelled force at the start, per axis", gt=0.0, le=1000.0)
     force_walk_N: float = Field(
