@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from wakewise.cli import vehicle_import, vehicle_thruster
+from wakewise.cli import vehicle_import, vehicle_thruster, vehicle_trim
 from wakewise.cli.console import print_json, print_table, shown
 from wakewise.cli.options import Json
 
@@ -17,6 +17,7 @@ app = typer.Typer(
 app.command("import")(vehicle_import.import_file)
 app.command("thruster")(vehicle_thruster.thruster)
 app.command("lag")(vehicle_thruster.lag)
+app.command("trim")(vehicle_trim.trim)
 
 Name = Annotated[str, typer.Argument(help="Library name, vehicle file, or a file that `vehicle import` can read.")]
 Out = Annotated[

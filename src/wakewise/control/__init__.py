@@ -6,6 +6,9 @@ the water can be compared at equal wrench. `make_controller` makes one by name.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 from wakewise.control.allocation import (
     Allocation,
     Layout,
@@ -16,8 +19,21 @@ from wakewise.control.allocation import (
     least_thrusts,
     pseudo_inverse,
 )
-from wakewise.control.baselines import dynamic_positioning, vehicle_layout
+from wakewise.control.baselines import (
+    dynamic_positioning,
+    instant,
+    linear,
+    planned,
+    planned_pseudo_inverse,
+    smooth,
+    unaware,
+)
+from wakewise.control.levers import LeverSettings, watched
 from wakewise.control.loop import ControllerState, TrackingController
+from wakewise.control.paper_planner import PaperPlanner
+from wakewise.control.plan_problem import Horizon, PlanProblem, PlanSettings, Surroundings
+from wakewise.control.planner import Planner, compile_plan
+from wakewise.control.receding import PlanningController, planning_controller
 from wakewise.control.settings import ControlSettings
 from wakewise.control.stability import (
     Axis,
@@ -31,13 +47,32 @@ from wakewise.control.stability import (
 )
 from wakewise.control.tracker import Tracker, TrackerState, make_tracker
 from wakewise.control.view import WakeView
-from wakewise.control.wake_aware import wake_aware
+from wakewise.control.wake_aware import vehicle_layout, wake_aware
 from wakewise.errors import InputError
-from wakewise.interfaces import WakeModel
+from wakewise.interfaces import Controller, WakeModel
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
 
-_MAKERS = {"dp": dynamic_positioning, "wake-aware": wake_aware}
+
+def _planner(vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings) -> PlanningController:
+    return planning_controller(vehicle, region, wake, settings, settings.plan)
+
+
+def _paper_planner(vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings) -> PlanningController:
+    return planning_controller(vehicle, region, wake, settings, name="planner-paper", solver=PaperPlanner)
+
+
+_MAKERS: dict[str, Callable[[Vehicle, Region, WakeModel, ControlSettings], Controller[Any]]] = {
+    "dp": dynamic_positioning,
+    "pseudo-inverse": planned_pseudo_inverse,
+    "unaware": unaware,
+    "smooth": smooth,
+    "linear": linear,
+    "instant": instant,
+    "wake-aware": planned,
+    "planner": _planner,
+    "planner-paper": _paper_planner,
+}
 
 METHODS: tuple[str, ...] = tuple(_MAKERS)
 """Names that `make_controller` knows; the first is the baseline."""
@@ -45,7 +80,7 @@ METHODS: tuple[str, ...] = tuple(_MAKERS)
 
 def make_controller(
     method: str, vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings | None = None
-) -> TrackingController:
+) -> Controller[Any]:
     """Controller of that name for a nominal vehicle, a region to spare and a wake model.
 
     Raises
@@ -65,26 +100,43 @@ __all__ = [
     "ControlSettings",
     "ControllerState",
     "Gains",
+    "Horizon",
     "Layout",
+    "LeverSettings",
     "Margins",
+    "PaperPlanner",
+    "PlanProblem",
+    "PlanSettings",
+    "Planner",
+    "PlanningController",
+    "Surroundings",
     "Tracker",
     "TrackerState",
     "TrackingController",
     "WakeView",
     "Weights",
     "compile_layout",
+    "compile_plan",
     "disturbance_of",
     "dynamic_positioning",
     "gentle_allocation",
+    "instant",
     "least_thrusts",
+    "linear",
     "loop_margins",
     "make_controller",
     "make_tracker",
     "margins",
+    "planned",
+    "planned_pseudo_inverse",
+    "planning_controller",
     "pseudo_inverse",
+    "smooth",
     "stable_gain_scale",
+    "unaware",
     "vehicle_axes",
     "vehicle_layout",
     "wake_aware",
+    "watched",
     "wished_gains",
 ]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from wakewise.control.levers import LeverSettings
+from wakewise.control.plan_problem import PlanSettings
 from wakewise.settings import Settings
 from wakewise.wake import WakeSettings
 
@@ -59,3 +61,5 @@ class ControlSettings(Settings):
     )
     w_effort: float = Field(default=1e-3, description="weight of squared thrust (per N^2)", gt=0.0)
     w_previous: float = Field(default=5e-3, description="weight of squared change of thrust per step (per N^2)", ge=0.0)
+    plan: PlanSettings = Field(default=PlanSettings(), description="horizon and weights of the methods that plan")
+    levers: LeverSettings = Field(default=LeverSettings(), description="what `wake-aware` uses beyond the free jet")

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from wakewise.arrays import Array
-from wakewise.control.allocation import Allocation, Weights, gentle_allocation, least_thrusts
-from wakewise.control.baselines import vehicle_layout
+from wakewise.control.allocation import Allocation, Layout, Weights, compile_layout, gentle_allocation, least_thrusts
 from wakewise.control.loop import TrackingController
 from wakewise.control.settings import ControlSettings
 from wakewise.control.tracker import make_tracker
@@ -12,6 +11,11 @@ from wakewise.control.view import WakeView
 from wakewise.interfaces import WakeModel
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
+
+
+def vehicle_layout(vehicle: Vehicle) -> Layout:
+    """Allocation matrix and limits of a vehicle, ready for use."""
+    return compile_layout(vehicle.allocation_matrix, vehicle.thrust_lower_N, vehicle.thrust_upper_N)
 
 
 def wake_aware(vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings) -> TrackingController:

@@ -13,6 +13,8 @@ BENCHES = {
     "disturbance": "the Gram matrix of D against the sum over points",
     "estimator": "the filter in the default tank: error, consistency, ten seconds without a camera",
     "dynamics": "one step of the vehicle, with and without Jacobians",
+    "gentle": "what each method and each lever does to the target's water, in the tank and in the paper's own world",
+    "operator": "an operator's velocity obeyed, against the water's disturbance, by w_track",
     "imaging": "one photograph",
     "lattice": "the lattice-Boltzmann solver: cell updates per core, and its distance from the twin",
     "tank": "the world of a trial against the clock",

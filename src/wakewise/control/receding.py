@@ -1,0 +1,332 @@
+"""The receding-horizon controller: a plan ten times a second, flown by a tracking loop at the rate of the controller.
+
+How a plan is applied. The planner plans on from where its last plan expected the vehicle to be (the nominal state, with
+nominal thrusts), not from the estimate. Between and across plans the vehicle is led along the nominal path by the PID
+that every other method has, gains and margins included, and the wrench of that PID is laid on top of the planned
+thrusts. This is a tube: the noise of the estimate does not enter the plan, and a plan that comes late or not at all
+does not open the loop (D. Q. Mayne, M. M. Seron, S. V. Rakovic, Automatica 41 (2005) 219, doi
+10.1016/j.automatica.2004.08.019). When the vehicle is farther from the nominal state than `Tube` allows, the
+plan begins anew at the estimate.
+
+How corrections are shared out. The thrusts of a correction minimise its cost in the planner's own majorised model of
+the first stage, so thrusters whose jets hit the target are spared there, too. The load that the estimator found acts
+in the plan; the PID's integral makes up for what is left.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from wakewise.arrays import Array, freeze
+from wakewise.control.guard import Guard
+from wakewise.control.loop import ControllerState, TrackingController
+from wakewise.control.plan_problem import Horizon, PlanProblem, PlanSettings, Surroundings, reference_of, state_of
+from wakewise.control.planner import PlanModel, Planner, compile_plan
+from wakewise.control.settings import ControlSettings
+from wakewise.control.tracker import Tracker, TrackerState, make_tracker
+from wakewise.control.wake_aware import wake_aware
+from wakewise.geometry import Pose, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
+from wakewise.interfaces import BodyState, Command, Goal, WakeModel
+from wakewise.targets import Region
+from wakewise.vehicles import Vehicle
+from wakewise.wake import arrival_time_s
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tube:
+    """How far the vehicle may be from the nominal state, and how unsure of its place, before something is done."""
+
+    position_m: float = 0.15
+    attitude_rad: float = 0.35
+    lost_m: float = 0.5
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlanState:
+    """What the controller remembers: the tracker's integral, the plan and its age, what the thrusters were told.
+
+    `thrusts_N`, shape (n,), are the last commands; `nominal_N`, shape (n,), what the planned commands alone would
+    make the thrusters give at the plan's start; `share`, shape (n, 6), shares corrections out; `backup` is the state
+    of PID and allocator.
+    """
+
+    tracker: TrackerState
+    thrusts_N: Array
+    nominal_N: Array
+    backup: ControllerState
+    plan: Horizon | None = None
+    share: Array | None = None
+    age_s: float = 0.0
+    trouble: str | None = None
+    saturated: bool = False
+
+    def __post_init__(self) -> None:
+        freeze(self, thrusts_N=(None,), nominal_N=(None,))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlanningController:
+    """Plans, flies the plan, and falls back; implements `wakewise.interfaces.Controller`.
+
+    `guard.counts` tells how often it fell back, by kind.
+    """
+
+    name: str
+    guard: Guard
+    tracker: Tracker
+    backup: TrackingController
+    hold_s: float
+    tube: Tube = field(default_factory=Tube)
+
+    @property
+    def model(self) -> PlanModel:
+        """What the planner believes."""
+        return self.guard.planner.model
+
+    def init(self) -> PlanState:
+        """State before the first step."""
+        n = self.model.thrusters
+        return PlanState(
+            tracker=self.tracker.init(), thrusts_N=np.zeros(n), nominal_N=np.zeros(n), backup=self.backup.init()
+        )
+
+    def step(self, state: PlanState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[PlanState, Command]:
+        """Decide the thrusts for the next `dt_s` seconds."""
+        trouble = self._unusable(estimate, goal)
+        if trouble is not None:
+            thrusts = state.thrusts_N * np.exp(-dt_s / self.hold_s)
+            state = replace(state, plan=None, thrusts_N=thrusts, nominal_N=thrusts, trouble=None)
+            return state, Command(thrusts_N=thrusts, wrench_B=np.zeros(6), fallback=trouble)
+        if state.plan is None or state.age_s >= 1.0 / self.model.settings.plan_hz - 1e-6:
+            state = self._replan(state, estimate, goal)
+        if state.plan is None or state.share is None:
+            return self._fall_back(state, dt_s, estimate, goal)
+        return self._follow(state, state.plan, state.share, dt_s, estimate)
+
+    def _unusable(self, estimate: BodyState, goal: Goal) -> str | None:
+        count = self.guard.count
+        for what, X_WB, nu_B in (("estimate", estimate.X_WB, estimate.nu_B), ("goal", goal.X_WB, goal.nu_B)):
+            if not np.isfinite(X_WB.p_m.sum() + X_WB.q.sum() + nu_B.sum()):
+                return count(f"{what} not finite", f"{what} not finite: holding the last thrusts, fading")
+        if estimate.covariance is not None:
+            spread = float(
+                np.sqrt(max(estimate.covariance[0, 0], estimate.covariance[1, 1], estimate.covariance[2, 2]))
+            )
+            if not spread <= self.tube.lost_m:
+                return count("lost", f"pose lost ({spread:.2f} m unsure): holding the last thrusts, fading")
+        return None
+
+    def _replan(self, state: PlanState, estimate: BodyState, goal: Goal) -> PlanState:
+        settings = self.model.settings
+        nominal, thrusts = state_of(estimate), state.thrusts_N
+        before = state.thrusts_N
+        if state.plan is not None:
+            expected = _at(state.plan, state.age_s, settings.stage_s)
+            away = float(np.linalg.norm(expected[:3] - nominal[:3]))
+            turned = float(np.linalg.norm(rotvec_from_quat(quat_multiply(quat_conjugate(expected[3:7]), nominal[3:7]))))
+            if away <= self.tube.position_m and turned <= self.tube.attitude_rad:
+                nominal, thrusts = expected, self._nominal_thrusts(state)
+                before = state.plan.commands_N[_stage(state.plan, state.age_s, settings.stage_s)]
+            else:
+                self.guard.count(
+                    "off the path", f"off the planned path by {away:.2f} m: planned anew from the estimate"
+                )
+
+        def make() -> PlanProblem:
+            return PlanProblem(
+                state=nominal,
+                thrusts_N=thrusts,
+                command_N=before,
+                reference=reference_of(goal, settings.stages, settings.stage_s),
+                quiet=quiet_stages(settings, goal.exposure_in_s, self._delay_s(nominal, thrusts)),
+                force_W_N=estimate.X_WB.R @ estimate.load_B[:3],
+                moment_B_Nm=estimate.load_B[3:],
+            )
+
+        found = self.guard.ask(make, state.plan, state.age_s)
+        if found.plan is None:
+            return replace(state, plan=None, share=None, age_s=0.0, trouble=found.trouble)
+        if found.trouble is not None:
+            # The old plan keeps its clock.
+            return replace(state, trouble=found.trouble)
+        return replace(
+            state,
+            plan=found.plan,
+            share=correction_share(self.model, found.plan),
+            age_s=0.0,
+            nominal_N=thrusts,
+            trouble=None,
+        )
+
+    def _delay_s(self, nominal: Array, thrusts_N: Array) -> float:
+        """Time that wash needs to the middle of the region, with the lever `travel`; else 0."""
+        if not self.model.settings.travel:
+            return 0.0
+        table = self.model.wake_table
+        distance_m = float(np.linalg.norm(table.middle - nominal[:3]))
+        # A thruster that idles would take for ever: half a newton is the least that is worth a delay.
+        thrust_N = max(float(np.sqrt(np.mean(thrusts_N**2))), 0.5)
+        return float(arrival_time_s(distance_m, thrust_N, float(np.mean(table.areas)), "steady"))
+
+    def _nominal_thrusts(self, state: PlanState) -> Array:
+        """What the planned commands alone would make the thrusters give now."""
+        table, thrusts = self.model.table, np.array(state.nominal_N)
+        if state.plan is None:
+            return thrusts
+        whole = _stage(state.plan, state.age_s, table.stage_s)
+        for k in range(whole):
+            thrusts = table.keep * thrusts + (1.0 - table.keep) * state.plan.commands_N[k]
+        rest = (state.age_s - whole * table.stage_s) / table.stage_s
+        keep = table.keep**rest
+        return np.asarray(keep * thrusts + (1.0 - keep) * state.plan.commands_N[whole])
+
+    def _follow(
+        self, state: PlanState, plan: Horizon, share: Array, dt_s: float, estimate: BodyState
+    ) -> tuple[PlanState, Command]:
+        model = self.model
+        stage_s = model.settings.stage_s
+        nominal = _at(plan, state.age_s, stage_s)
+        path = Goal(X_WB=Pose(nominal[:3], nominal[3:7]), nu_B=nominal[7:])
+        tracker, wrench = self.tracker.wrench(state.tracker, dt_s, estimate, path, saturated=state.saturated)
+        # The same tracker on the path itself, with nothing to correct, is its feed-forward alone: the plan has that.
+        _, feed = self.tracker.wrench(
+            self.tracker.init(),
+            0.0,
+            BodyState(X_WB=path.X_WB, nu_B=path.nu_B, load_B=estimate.load_B),
+            path,
+            saturated=False,
+        )
+        planned = plan.commands_N[_stage(plan, state.age_s, stage_s)]
+        wished = planned + share @ (wrench - feed)
+        thrusts = np.clip(wished, model.table.lower, model.table.upper)
+        if not np.isfinite(thrusts).all():
+            state = replace(state, plan=None, trouble=self.guard.count("not finite", "correction not finite"))
+            return self._fall_back(state, dt_s, estimate, path)
+        over = float(np.abs(wished - thrusts).max())
+        trouble = state.trouble
+        if over > 1e-9 and trouble is None:
+            trouble = self.guard.count("saturated", f"thrusters saturated: {over:.1f} N cut off")
+        command = Command(
+            thrusts_N=thrusts,
+            wrench_B=model.table.allocation @ planned + wrench - feed,
+            disturbance=plan.disturbance * float(np.sum(model.region.weights)),
+            fallback=trouble,
+        )
+        state = replace(state, tracker=tracker, thrusts_N=thrusts, age_s=state.age_s + dt_s, saturated=over > 1e-9)
+        return state, command
+
+    def _fall_back(self, state: PlanState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[PlanState, Command]:
+        backup = replace(state.backup, tracker=state.tracker, thrusts_N=state.thrusts_N)
+        backup, command = self.backup.step(backup, dt_s, estimate, goal)
+        words = "; ".join(part for part in (state.trouble, command.fallback) if part)
+        state = replace(
+            state,
+            backup=backup,
+            tracker=backup.tracker,
+            thrusts_N=command.thrusts_N,
+            nominal_N=command.thrusts_N,
+            plan=None,
+        )
+        return state, replace(command, fallback=words or None)
+
+
+def quiet_stages(settings: PlanSettings, exposure_in_s: float, delay_s: float = 0.0) -> Array:
+    """Factor of w_D per stage, shape (N,): `quiet_gain` where its wash, `delay_s` later, meets the exposure, else 1."""
+    quiet = np.ones(settings.stages)
+    if settings.quiet_gain > 1.0 and np.isfinite(exposure_in_s):
+        starts = delay_s + settings.stage_s * np.arange(settings.stages)
+        ends = starts + settings.stage_s
+        quiet[(ends > exposure_in_s) & (starts < exposure_in_s + settings.exposure_s)] = settings.quiet_gain
+    return quiet
+
+
+def correction_share(model: PlanModel, plan: Horizon) -> Array:
+    """Thrusts per unit of correcting wrench, shape (n, 6), of least cost in the plan's model of its first stage."""
+    table = model.table
+    alive = table.upper > table.lower
+    effort = 2.0 * table.stage_s * max(model.settings.w_effort, 1e-4)
+    weight = plan.curvature[np.ix_(alive, alive)] + effort * np.eye(int(alive.sum()))
+    B = table.allocation[:, alive]
+    easy = np.linalg.solve(weight, B.T)
+    share = np.zeros((model.thrusters, 6))
+    share[alive] = easy @ np.linalg.pinv(B @ easy, rcond=1e-9)
+    return share
+
+
+def _stage(plan: Horizon, age_s: float, stage_s: float) -> int:
+    return min(int((age_s + 1e-6) / stage_s), len(plan.commands_N) - 1)
+
+
+def _at(plan: Horizon, age_s: float, stage_s: float) -> Array:
+    """State that a plan expects at an age, shape (13,): between stages, the pose along the turn, the rest straight."""
+    k = _stage(plan, age_s, stage_s)
+    s = min(max(age_s / stage_s - k, 0.0), 1.0)
+    a, b = plan.states[k], plan.states[k + 1]
+    state = (1.0 - s) * a + s * b
+    turn = rotvec_from_quat(quat_multiply(quat_conjugate(a[3:7]), b[3:7]))
+    state[3:7] = quat_multiply(a[3:7], quat_from_rotvec(s * turn))
+    return state
+
+
+def planning_controller(
+    vehicle: Vehicle,
+    region: Region,
+    wake: WakeModel,
+    settings: ControlSettings,
+    plan: PlanSettings | None = None,
+    *,
+    name: str = "planner",
+    solver: Callable[[PlanModel], Planner] = Planner,
+    surroundings: Surroundings | None = None,
+    lower_N: Array | None = None,
+    upper_N: Array | None = None,
+    clock: Callable[[], float] = time.thread_time,
+) -> PlanningController:
+    """`planner`: receding-horizon planner, tracking loop, guard.
+
+    `PlanSettings(w_disturbance=0)` makes it `unaware`; the same with `w_change` makes it `smooth`. Arguments as for
+    `compile_plan`; `clock` as for `Guard`; `solver` is `Planner` or `PaperPlanner`. The first plan is made here,
+    since it compiles.
+    """
+    chosen = plan or PlanSettings()
+    model = compile_plan(
+        vehicle, region, wake, chosen, surroundings or around_target(region), lower_N=lower_N, upper_N=upper_N
+    )
+    return PlanningController(
+        name=name,
+        guard=Guard(planner=warmed(solver(model)), deadline_s=chosen.deadline_s, clock=clock),
+        tracker=make_tracker(vehicle, settings),
+        backup=wake_aware(vehicle, region, model.wake, settings),
+        hold_s=settings.hold_s,
+    )
+
+
+def warmed(planner: Planner) -> Planner:
+    """Make one plan and throw it away: what is compiled or allocated on first use is ready then."""
+    model = planner.model
+    n, N = model.thrusters, model.settings.stages
+    away = model.region.points_W_m.mean(axis=0) - np.array([1.0, 0.0, 0.5])
+    body = BodyState(X_WB=Pose(away))
+    problem = PlanProblem(
+        state=state_of(body),
+        thrusts_N=np.zeros(n),
+        command_N=np.zeros(n),
+        reference=reference_of(Goal(X_WB=body.X_WB), N, model.settings.stage_s),
+        quiet=np.ones(N),
+    )
+    planner.plan(problem, np.zeros((N, n)))
+    return planner
+
+
+def around_target(region: Region) -> Surroundings:
+    """The sphere round the region's surface points, which is all that a region tells of its surroundings."""
+    surface = region.points_W_m[region.distance_m <= 0.0]
+    if len(surface) == 0:
+        return Surroundings()
+    middle = 0.5 * (surface.min(axis=0) + surface.max(axis=0))
+    radius = float(np.linalg.norm(surface - middle, axis=1).max())
+    return Surroundings(spheres=np.array([[*middle, radius]]))

@@ -1,0 +1,195 @@
+"""What ballast keeps the target's water stillest over a mission, and what it would be worth.
+
+A mission is a list of poses to hold. At each, the thrusters carry net weight and the moment with which the vehicle
+rights itself, shared out as gently as can be; buoyancy and the place of the centre of gravity decide how much that is.
+The mean is taken over the trim that nobody knows beforehand, so that advice is not made for a vehicle that is exactly
+as written. Steady jets only: what moving costs does not depend on ballast.
+
+Floating is never the worse for the target (jets go up), so the least D lies at the largest float looked at. The advice
+is therefore the ballast of least effort among those that come near to it (`NEAR`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from wakewise.arrays import Array
+from wakewise.control.allocation import Weights, gentle_allocation
+from wakewise.control.levers import watched
+from wakewise.control.settings import ControlSettings
+from wakewise.control.view import WakeView
+from wakewise.control.wake_aware import vehicle_layout
+from wakewise.errors import InputError
+from wakewise.geometry import Pose
+from wakewise.interfaces import WakeModel
+from wakewise.targets import Region
+from wakewise.vehicles import Vehicle, compile_body, restoring_wrench
+
+WATER_KG_M3, GRAVITY_M_S2 = 1000.0, 9.80665
+FLOATS_N = (-2.0, -1.0, 0.0, 1.0, 1.5, 2.0, 3.0)
+"""Net buoyancies looked at, positive floats."""
+SHIFTS_MM = (-3.0, 0.0, 3.0, 6.0, 9.0)
+"""Shifts of the centre of gravity along the vehicle looked at, positive forward."""
+NEAR = 1.25
+"""Ballasts with at most this many times the least mean speed are as good as the best."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrimRow:
+    """One ballast: net buoyancy and shift of the centre of gravity, and what holding the mission's poses then costs.
+
+    `speed_m_s` is the root of D over the sum of weights, a mean speed at the region's points by the wake model;
+    `thrust_N` the mean sum of |T|, `effort_N2` of T^2; `down_N` that of jets that go down, by 45 deg or more.
+    """
+
+    float_N: float
+    shift_mm: float
+    speed_m_s: float
+    thrust_N: float
+    down_N: float
+    effort_N2: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrimAdvice:
+    """All ballasts looked at, the best of them, and the vehicle as it is."""
+
+    rows: tuple[TrimRow, ...]
+    best: TrimRow
+    now: TrimRow
+
+    @property
+    def words(self) -> str:
+        """The advice in one sentence."""
+        change = self.best.float_N - self.now.float_N
+        if change == 0.0 and self.best.shift_mm == self.now.shift_mm:
+            return "leave the ballast as it is"
+        parts = []
+        if change != 0.0:
+            parts.append(f"{'add floats' if change > 0.0 else 'add lead'} of {abs(change):.1f} N")
+        if self.best.shift_mm != self.now.shift_mm:
+            where = "forward" if self.best.shift_mm > self.now.shift_mm else "aft"
+            parts.append(f"move the centre of gravity {abs(self.best.shift_mm - self.now.shift_mm):.0f} mm {where}")
+        now, best = 1e3 * self.now.speed_m_s, 1e3 * self.best.speed_m_s
+        return (
+            f"{' and '.join(parts)}: {now:.2f} to {best:.2f} mm/s at the target by the wake model, "
+            f"{self.now.down_N:.2f} to {self.best.down_N:.2f} N of thrust blown downwards"
+        )
+
+
+def ballasted(vehicle: Vehicle, float_N: float, shift_mm: float = 0.0) -> Vehicle:
+    """The vehicle with this much more buoyancy (negative: less) and its centre of gravity this much farther forward.
+
+    Buoyancy is added at the centre of buoyancy, by volume; mass and inertia stay.
+
+    Raises
+    ------
+    InputError
+        If no displaced volume would be left.
+    """
+    volume_m3 = vehicle.displaced_volume_m3 + float_N / (WATER_KG_M3 * GRAVITY_M_S2)
+    if not volume_m3 > 0.0:
+        raise InputError(f"ballast: {float_N:g} N leaves a displaced volume of {volume_m3:g} m3, it must stay positive")
+    return replace(
+        vehicle, displaced_volume_m3=volume_m3, p_BG_m=vehicle.p_BG_m + np.array([1e-3 * shift_mm, 0.0, 0.0])
+    )
+
+
+def net_buoyancy_N(vehicle: Vehicle) -> float:
+    """Buoyancy less weight in fresh water of 1000 kg/m3, positive floats."""
+    return GRAVITY_M_S2 * (WATER_KG_M3 * vehicle.displaced_volume_m3 - vehicle.mass_kg)
+
+
+def trim_advice(
+    vehicle: Vehicle,
+    poses: tuple[Pose, ...],
+    region: Region,
+    wake: WakeModel,
+    settings: ControlSettings | None = None,
+    *,
+    unknown_N: float = 1.0,
+    current_N: Array | None = None,
+    floats_N: tuple[float, ...] = FLOATS_N,
+    shifts_mm: tuple[float, ...] = SHIFTS_MM,
+) -> TrimAdvice:
+    """Ballast of least mean D over poses and unknown loads, and of least effort among those that come near to it.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    poses : tuple of Pose
+        X_WB of the mission.
+    region, wake, settings
+        As a controller has them; with the bed lever, points on the bed count.
+    unknown_N : float
+        The trim error lies between minus and plus this; its ends and the middle are looked at.
+    current_N : ndarray, shape (3,), optional
+        Steady force of the current on the vehicle, in W.
+    floats_N, shifts_mm : tuple of float
+        Net buoyancies and shifts of the centre of gravity to compare; the vehicle's own are added.
+
+    Raises
+    ------
+    InputError
+        If there are no poses, or `unknown_N` is negative or not finite.
+    """
+    chosen = settings or ControlSettings()
+    if not poses:
+        raise InputError("trim: no poses, a mission must hold at least one")
+    if not (np.isfinite(unknown_N) and unknown_N >= 0.0):
+        raise InputError(f"trim: unknown_N {unknown_N:g}, must be finite and not negative")
+    view = WakeView.of(vehicle, watched(region, chosen.levers), wake, chosen.wake.sum)
+    grams = [view.gram(X_WB) for X_WB in poses]
+    weights = Weights(disturbance=chosen.w_disturbance / view.total_weight, effort=chosen.w_effort)
+    own = net_buoyancy_N(vehicle)
+    force_W = np.zeros(3) if current_N is None else np.asarray(current_N, dtype=np.float64)
+    errors = (-unknown_N, 0.0, unknown_N) if unknown_N > 0.0 else (0.0,)
+    buoyancies = sorted({*floats_N, round(own, 6)})
+    rows = tuple(
+        _row(vehicle, poses, grams, view, weights, force_W, errors, float_N - own, shift_mm, float_N)
+        for float_N, shift_mm in product(buoyancies, sorted({*shifts_mm, 0.0}))
+    )
+    now = next(row for row in rows if row.float_N == round(own, 6) and row.shift_mm == 0.0)
+    least = min(row.speed_m_s for row in rows)
+    best = min((row for row in rows if row.speed_m_s <= NEAR * least), key=lambda row: (row.effort_N2, row.speed_m_s))
+    return TrimAdvice(rows=rows, best=best, now=now)
+
+
+def _row(
+    vehicle: Vehicle,
+    poses: tuple[Pose, ...],
+    grams: list[Array],
+    view: WakeView,
+    weights: Weights,
+    force_W: Array,
+    errors: tuple[float, ...],
+    added_N: float,
+    shift_mm: float,
+    float_N: float,
+) -> TrimRow:
+    layout = vehicle_layout(vehicle)
+    D, thrust, down, effort = [], [], [], []
+    for error_N in errors:
+        body = compile_body(ballasted(vehicle, added_N + error_N, shift_mm), WATER_KG_M3, GRAVITY_M_S2)
+        for X_WB, G in zip(poses, grams, strict=True):
+            wrench = -restoring_wrench(body, X_WB.q)
+            wrench[:3] -= force_W @ X_WB.R
+            found = gentle_allocation(layout, wrench, G, weights)
+            T = found.thrusts_N
+            jets_W = -np.sign(T)[:, None] * (vehicle.thruster_axes_B @ X_WB.R.T)
+            value = 0.0 if found.disturbance is None else found.disturbance
+            D.append(value / view.total_weight)
+            thrust.append(float(np.abs(T).sum()))
+            down.append(float(np.abs(T)[jets_W[:, 2] > np.sqrt(0.5)].sum()))
+            effort.append(float(T @ T))
+    return TrimRow(
+        float_N=float_N,
+        shift_mm=shift_mm,
+        speed_m_s=float(np.sqrt(np.mean(D))),
+        thrust_N=float(np.mean(thrust)),
+        down_N=float(np.mean(down)),
+        effort_N2=float(np.mean(effort)),
+    )

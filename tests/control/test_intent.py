@@ -1,0 +1,67 @@
+"""An operator's wish as a goal: at the vehicle's place, moving as asked, looking where asked."""
+
+import numpy as np
+import pytest
+
+from wakewise.control import PlanSettings
+from wakewise.control.intent import LEASH_M, Intent, goal_of, moved_on, obeying, slewed
+from wakewise.control.plan_problem import reference_of
+from wakewise.errors import InputError
+from wakewise.geometry import Pose, quat_from_euler
+from wakewise.interfaces import BodyState
+
+HERE = BodyState(X_WB=Pose(np.array([0.5, -0.2, 1.0]), quat_from_euler(0.1, -0.2, 2.0)))
+
+
+def test_the_target_is_where_the_vehicle_will_be_at_the_commanded_velocity():
+    """p_target = p_now + v_des T, whatever the attitude."""
+    velocity = np.array([0.08, -0.03, 0.02])
+    goal = goal_of(Intent(velocity_W_m_s=velocity, heading_rad=1.0), HERE.X_WB.p_m)
+    reference = reference_of(goal, 20, 0.1)
+    np.testing.assert_allclose(reference[-1, :3], HERE.X_WB.p_m + 2.0 * velocity, atol=1e-12)
+
+
+def test_the_watched_point_stays_ahead_while_the_goal_moves():
+    """A tenth of a second on, the goal's forward axis still points at it, to second order."""
+    watch = np.array([0.0, 0.0, 1.4])
+    goal = goal_of(Intent(velocity_W_m_s=np.array([0.0, 0.1, 0.0]), watch_W_m=watch), HERE.X_WB.p_m)
+    later = reference_of(goal, 1, 0.1)[-1]
+    ahead = Pose(later[:3], later[3:7]).R[:, 0]
+    sight = (watch - later[:3]) / np.linalg.norm(watch - later[:3])
+    assert np.arccos(np.clip(ahead @ sight, -1.0, 1.0)) < 2e-4
+    np.testing.assert_allclose(goal.X_WB.R @ goal.nu_B[:3], [0.0, 0.1, 0.0], atol=1e-12)
+
+
+def test_obedience_scales_all_weights_of_tracking():
+    """5 is the planner's own setting; 20 is four times as strict and leaves the other weights alone."""
+    plan = PlanSettings()
+    assert obeying(plan, 5.0) == plan
+    strict = obeying(plan, 20.0)
+    assert strict.w_track == pytest.approx(4.0 * plan.w_track) and strict.w_path == pytest.approx(4.0 * plan.w_path)
+    assert strict.w_disturbance == plan.w_disturbance and strict.w_effort == plan.w_effort
+
+
+@pytest.mark.parametrize("bad", [0.0, -1.0, float("nan"), float("inf")])
+def test_an_obedience_that_means_nothing_is_refused(bad):
+    """Zero, negative, not finite."""
+    with pytest.raises(InputError, match="w_track"):
+        obeying(PlanSettings(), bad)
+
+
+def test_a_command_is_reached_at_bounded_acceleration():
+    """Never faster than allowed, and there in the end."""
+    v, wished = np.zeros(3), np.array([0.1, 0.0, -0.05])
+    for _ in range(200):
+        new = slewed(v, wished, 0.02, 0.1)
+        assert np.linalg.norm(new - v) <= 0.1 * 0.02 + 1e-12
+        v = new
+    np.testing.assert_allclose(v, wished)
+
+
+def test_the_commanded_place_waits_for_a_vehicle_that_is_held_up():
+    """It moves as commanded while the vehicle follows, and never farther than the leash from one that does not."""
+    place, velocity = HERE.X_WB.p_m, np.array([0.1, 0.0, 0.0])
+    np.testing.assert_allclose(moved_on(place, velocity, HERE, 0.02), place + 0.02 * velocity)
+    for _ in range(200):
+        place = moved_on(place, velocity, HERE, 0.02)
+    assert np.linalg.norm(place - HERE.X_WB.p_m) == pytest.approx(LEASH_M)
