@@ -14,6 +14,7 @@ BENCHES = {
     "estimator": "the filter in the default tank: error, consistency, ten seconds without a camera",
     "dynamics": "one step of the vehicle, with and without Jacobians",
     "gentle": "what each method and each lever does to the target's water, in the tank and in the paper's own world",
+    "planner": "the planner against the paper's recipe and IPOPT",
     "operator": "an operator's velocity obeyed, against the water's disturbance, by w_track",
     "imaging": "one photograph",
     "lattice": "the lattice-Boltzmann solver: cell updates per core, and its distance from the twin",
