@@ -71,4 +71,4 @@ def trim(vehicle: Vehicle = "paper", scenario: ScenarioFile = None, json: Json =
         table.add_row(f"{float_N:+.1f}", *cells, f"{np.mean([row.down_N for row in rows]):.2f}")
     print_table(table)
     typer.echo(f"advice: {advice.words}")
-    typer.echo("held against the simulated tank so far: the centre of gravity's part holds, the float's does not (0013)")
+    typer.echo("in the simulated tank the centre of gravity's part held, the float's did not (docs/decisions/0013)")
