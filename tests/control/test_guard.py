@@ -188,3 +188,14 @@ def test_it_flies_at_least_as_true_as_dp(controller, speed_m_s):
     assert rms(ours) < max(rms(dp), 0.002)
     half = len(ours) // 2
     assert rms(ours[half:]) < 1.5 * rms(ours[:half]) + 1e-3
+
+
+def test_a_world_that_waits_counts_a_late_plan_and_flies_it():
+    """Where the deadline is not enforced a busy machine changes no flight, and the count still tells."""
+    planner = Failing(model(iterations=1))
+    guard = Guard(planner=planner, deadline_s=0.1, clock=lambda: planner.now, enforce=False)
+    planner.trouble = "late"
+    found = guard.ask(problem, None, 0.0)
+    assert found.plan is not None
+    assert found.trouble is None
+    assert guard.counts == {"late": 1}

@@ -285,12 +285,13 @@ def planning_controller(
     lower_N: Array | None = None,
     upper_N: Array | None = None,
     clock: Callable[[], float] = time.thread_time,
+    enforce: bool = False,
 ) -> PlanningController:
     """`planner`: receding-horizon planner, tracking loop, guard.
 
     `PlanSettings(w_disturbance=0)` makes it `unaware`; the same with `w_change` makes it `smooth`. Arguments as for
-    `compile_plan`; `clock` as for `Guard`; `solver` is `Planner` or `PaperPlanner`. The first plan is made here,
-    since it compiles.
+    `compile_plan`; `clock` and `enforce` (the deadline, for a world that does not wait) as for `Guard`; `solver` is
+    `Planner` or `PaperPlanner`. The first plan is made here, since it compiles.
     """
     chosen = plan or PlanSettings()
     model = compile_plan(
@@ -298,7 +299,7 @@ def planning_controller(
     )
     return PlanningController(
         name=name,
-        guard=Guard(planner=warmed(solver(model)), deadline_s=chosen.deadline_s, clock=clock),
+        guard=Guard(planner=warmed(solver(model)), deadline_s=chosen.deadline_s, clock=clock, enforce=enforce),
         tracker=make_tracker(vehicle, settings),
         backup=wake_aware(vehicle, region, model.wake, settings),
         hold_s=settings.hold_s,
