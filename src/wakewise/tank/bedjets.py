@@ -18,24 +18,27 @@ horizontal momentum is the jet's own; in that sector R becomes R w^(1/4) and A b
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 from scipy.special import i0
 
 from wakewise.arrays import Array, IntArray
+from wakewise.tank.bedjets_sums import (
+    HIGHEST,
+    LOG_WIDTH,
+    REACH,
+    WALL_JET_SPREAD,
+    sum_planes,
+    with_images,
+)
 from wakewise.tank.chunks import over_points
-from wakewise.tank.faces import Face, Room
+from wakewise.tank.faces import LEAST_IMAGE_M_S, Face, Room
 
 WALL_JET_SPEED = 1.16  # u_max r / sqrt(M), Rajaratnam 1976
-WALL_JET_SPREAD = 0.093  # delta over R for which the layer below, entrainment included, is half as fast at 0.09 R
 STRIKE_HEIGHT = 1.75  # of the parcel's sigma: 0.14 H, where the bed's pressure begins to turn the jet (Beltaos 1974)
 _LAYER_CONVECTION = 1 / math.sqrt(2)  # mean of u weighted with u over a Gaussian layer, as a share of u_max
-_LOG_WIDTH = 0.3  # L: neighbouring rings overlap; it sets how sharp a front is, not how fast
-_REACH = 3.3 * _LOG_WIDTH  # beyond it g is below 5e-3
-HIGHEST = 4.0  # radii above the bed: what a ring moves there is below 0.2 % of its crest
-_FARTHEST = 2.1 * math.exp(_REACH)  # radii: as far as the steepest lean allowed, w^(1/4) = 2.1, throws a ring
 # Rings of one jet closer than this share of L become one: then none are more than 2 L apart, where a row of Gaussians
 # still sums to a constant within 1.4 % (Poisson summation, 2 exp(-2 pi^2 / 4)).
 _RING_MERGE = 1.0
@@ -123,16 +126,19 @@ def rings_from_strikes(position_m: Array, impulse_m4_s: Array, sigma_m: Array, s
     return Rings(position_m[:, :2].copy(), STRIKE_HEIGHT * sigma_m, size, heading, lean(share), stream.copy())
 
 
-def ring_velocity(points_W_m: Array, rings: Rings, bed_z_m: float, least_m: float = 0.0) -> Array:
+def ring_velocity(
+    points_W_m: Array, rings: Rings, bed_z_m: float, least_m: float = 0.0, *, exact: bool = False
+) -> Array:
     """Velocity of the rings, shape (n, 3), at points, shape (n, 3); zero if there are none.
 
-    `least_m` is the least thickness delta of a layer, whose momentum stays; see `packed_rings`.
+    `least_m` is the least thickness delta of a layer, whose momentum stays; see `packed_rings`. `exact` sums in double
+    precision.
     """
-    return packed_velocity(points_W_m, packed_rings(rings, least_m), bed_z_m)
+    return packed_velocity(points_W_m, packed_rings(rings, least_m), bed_z_m, exact=exact)
 
 
 def packed_rings(rings: Rings, least_m: float = 0.0, per_height: float = 0.0) -> Array:
-    """One row per ring, as the kernel reads it, for several calls of `packed_velocity`, shape (n, 13).
+    """One row per ring, as the kernel reads it, for several calls of `packed_velocity`, shape (n, 14).
 
     A layer has the thickness hypot(0.093 R, least_m). Where that is more than the law's, it is slower by the square
     root of the ratio, so that it carries the same momentum. `per_height` is one over
@@ -141,9 +147,9 @@ def packed_rings(rings: Rings, least_m: float = 0.0, per_height: float = 0.0) ->
     strength = ring_strength(rings)
     weight = 1 / i0(rings.kappa)
     # Where a ring can be felt at all, whatever the azimuth: w lies between exp(-kappa)/I0 and exp(kappa)/I0.
-    inner = rings.radius_m * (weight * np.exp(-rings.kappa)) ** 0.25 * math.exp(-_REACH)
-    outer = rings.radius_m * (weight * np.exp(rings.kappa)) ** 0.25 * math.exp(_REACH)
-    highest = HIGHEST * outer * math.exp(-_REACH)
+    inner = rings.radius_m * (weight * np.exp(-rings.kappa)) ** 0.25 * math.exp(-REACH)
+    outer = rings.radius_m * (weight * np.exp(rings.kappa)) ** 0.25 * math.exp(REACH)
+    highest = HIGHEST * outer * math.exp(-REACH)
     least, ends = np.full(rings.count, least_m), np.full(rings.count, per_height)
     return np.column_stack(
         [
@@ -158,44 +164,54 @@ def packed_rings(rings: Rings, least_m: float = 0.0, per_height: float = 0.0) ->
             highest,
             least,
             ends,
+            np.log(weight),
         ]
     )
 
 
-def packed_velocity(points_W_m: Array, packed: Array, bed_z_m: float) -> Array:
+def packed_velocity(points_W_m: Array, packed: Array, bed_z_m: float, *, exact: bool = False) -> Array:
     """Velocity of packed rings, shape (n, 3), at points, shape (n, 3)."""
+    flat = np.concatenate([np.zeros(3), np.eye(3).ravel(), [bed_z_m, 0.0]])
+    return planes_velocity(points_W_m, flat[None], np.array([0, len(packed)]), packed, exact=exact)
+
+
+def planes_velocity(points_W_m: Array, planes: Array, starts: IntArray, packed: Array, *, exact: bool = False) -> Array:
+    """Velocity of packed rings on several planes, shape (n, 3), at points, shape (n, 3).
+
+    Parameters
+    ----------
+    points_W_m : ndarray, shape (n, 3)
+    planes : ndarray, shape (k, 14)
+        Of each: origin, the three rows of the turn from the world into its frame, depth there, and 1 if it has the
+        same rings on both sides, else 0.
+    starts : ndarray of int, shape (k + 1,)
+        Plane i has the rings from starts[i] to starts[i + 1].
+    packed : ndarray, shape (m, 14)
+        See `packed_rings`; each in its plane's frame.
+    exact : bool
+        Sum in double precision.
+    """
     out = np.zeros((len(points_W_m), 3))
     if len(packed) and len(points_W_m):
         points = np.ascontiguousarray(points_W_m, dtype=np.float64)
-        cost = 10 * len(points) * len(packed)  # a ring takes as long as ten parcels
-        over_points(lambda some, result: _sum_rings(some, packed, bed_z_m, result), points, out, cost)
+        cost = 4 * len(points) * len(packed)  # a ring takes as long as four parcels
+        kind = np.zeros(0, np.float64 if exact else np.float32)
+        over_points(lambda some, result: sum_planes(some, planes, starts, packed, kind, result), points, out, cost)
     return out
 
 
-def with_ring_images(rings: Rings, face: Face, room: Room) -> Rings:
-    """Rings on a face, and their images in the faces that it meets and they can reach."""
-    depth = np.full(rings.count, face.depth_m)
-    for other in room.faces:
-        if other.axis == face.axis:
-            continue
-        centre = face.world(np.column_stack([rings.centre_m, depth]))
-        near = other.gap_m(centre) < _FARTHEST * rings.radius_m
-        if not near.any():
-            continue
-        some = rings.take(near)
-        heading = face.world(np.column_stack([some.heading, np.zeros(some.count)]))
-        image = replace(
-            some,
-            centre_m=face.local(other.mirrored(centre[near], shift=True))[:, :2],
-            heading=face.local(other.mirrored(heading, shift=False))[:, :2],
-        )
-        rings, depth = rings.joined(image), np.concatenate([depth, depth[near]])
-    return rings
+def with_ring_images(packed: Array, face: Face, room: Room) -> Array:
+    """Packed rings on a face, and their images in the faces across it that they can reach at a speed that matters."""
+    first, second = (face.axis + 1) % 3, (face.axis + 2) % 3
+    walls = [((first, second).index(o.axis), o.at_m, o.side) for o in room.faces if o.axis != face.axis]
+    if not walls or not len(packed):
+        return packed
+    return with_images(packed, np.array(walls, dtype=np.float64), LEAST_IMAGE_M_S)
 
 
 def ring_strength(rings: Rings) -> Array:
     """A of each ring in m2/s, shape (n,): such that rings sent at a steady rate add up to u_max = 1.16 sqrt(M) / r."""
-    scale = _LAYER_CONVECTION * WALL_JET_SPEED**2 / (math.sqrt(2 * math.pi) * _LOG_WIDTH)
+    scale = _LAYER_CONVECTION * WALL_JET_SPEED**2 / (math.sqrt(2 * math.pi) * LOG_WIDTH)
     return scale * rings.impulse_m4_s / rings.radius_m**2
 
 
@@ -254,9 +270,9 @@ def _merge_rings(
         close = (
             not joined_last
             and stream[a] == stream[b]
-            and abs(math.log(radius[a] / radius[b])) < _RING_MERGE * _LOG_WIDTH
+            and abs(math.log(radius[a] / radius[b])) < _RING_MERGE * LOG_WIDTH
             and math.hypot(centre[a, 0] - centre[b, 0], centre[a, 1] - centre[b, 1])
-            < _RING_MERGE * _LOG_WIDTH * radius[a]
+            < _RING_MERGE * LOG_WIDTH * radius[a]
         )
         joined_last = close
         if not close:
@@ -280,52 +296,10 @@ def _sum_layers(centre: Array, radius: Array, strength: Array, stream: IntArray,
         for j in range(radius.shape[0]):
             if stream[i] != stream[j]:
                 continue
-            apart = math.log(radius[i] / radius[j]) / _LOG_WIDTH
+            apart = math.log(radius[i] / radius[j]) / LOG_WIDTH
             dx, dy = centre[i, 0] - centre[j, 0], centre[i, 1] - centre[j, 1]
             wide = 2.0 * (dx * dx + dy * dy) / (radius[i] * radius[i])
             exponent = 0.5 * apart * apart + wide
             if exponent < 12.0:
                 total += strength[j] * math.exp(-exponent)
         out[i] = total / radius[i]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _sum_rings(points: Array, rings: Array, bed: float, out: Array) -> None:
-    """Sum over rings, whose columns are as packed by `ring_velocity`."""
-    root_half_pi = math.sqrt(math.pi / 2)
-    highest = rings[:, 10].max()
-    for p in range(points.shape[0]):
-        height = max(bed - points[p, 2], 0.0)
-        if height > highest:
-            continue
-        u = v = up = 0.0
-        for j in range(rings.shape[0]):
-            dx, dy = points[p, 0] - rings[j, 0], points[p, 1] - rings[j, 1]
-            r2 = dx * dx + dy * dy
-            if r2 < rings[j, 8] or r2 > rings[j, 9] or height > rings[j, 10]:
-                continue
-            r = math.sqrt(r2)
-            root_w, R = 1.0, rings[j, 2]
-            if rings[j, 6] > 0.0:
-                w = rings[j, 7] * math.exp(rings[j, 6] * (dx * rings[j, 4] + dy * rings[j, 5]) / r)
-                root_w = math.sqrt(w)
-                R *= math.sqrt(root_w)
-            t = math.log(r / R)
-            if abs(t) > _REACH or height > HIGHEST * R:
-                continue
-            thin = WALL_JET_SPREAD * R
-            delta = math.hypot(thin, rings[j, 11])
-            root_w *= math.sqrt(thin / delta)
-            layer, slope = delta * root_half_pi, 0.0
-            if height < 4.0 * delta:  # above, erf and Gaussian are 1 and 0 to 6e-5 and 3e-4
-                layer *= math.erf(height / (math.sqrt(2.0) * delta))
-                slope = math.exp(-height * height / (2.0 * delta * delta))
-            left = max(1.0 - height * rings[j, 12], 0.0)
-            a = rings[j, 3] * root_w * math.exp(-t * t / (2.0 * _LOG_WIDTH * _LOG_WIDTH) - height / R) / r
-            radial = a * ((slope - layer / R) * left - layer * rings[j, 12]) / r
-            u += dx * radial
-            v += dy * radial
-            up += a * t * layer * left / (_LOG_WIDTH * _LOG_WIDTH * r)
-        out[p, 0] += u
-        out[p, 1] += v
-        out[p, 2] -= up

@@ -83,11 +83,16 @@ class Blockage:
         strengths: Array = self.response @ np.einsum("ni,ni->n", undisturbed_m_s, self.normals)
         return strengths
 
+    def near(self, points_W_m: Array) -> np.ndarray:
+        """Which points, shape (n, 3), are within four times the body's radius, shape (n,)."""
+        away = points_W_m - self._middle
+        close: np.ndarray = np.einsum("ni,ni->n", away, away) < self._reach_m**2
+        return close
+
     def velocity(self, points_W_m: Array, strengths_m3_s: Array) -> Array:
         """What the sources add, shape (n, 3), at points, shape (n, 3); nothing beyond four times the body's radius."""
         out = np.zeros_like(points_W_m)
-        away = points_W_m - self._middle
-        near = np.einsum("ni,ni->n", away, away) < self._reach_m**2
+        near = self.near(points_W_m)
         if near.any():
             out[near] = self._both.velocity(points_W_m[near], np.concatenate([strengths_m3_s, strengths_m3_s]))
         return out

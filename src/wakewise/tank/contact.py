@@ -34,7 +34,18 @@ class Surroundings:
         self.corners_B_m: Array = self._half * np.array(list(product((-1.0, 1.0), repeat=3)))
         self._target = np.ascontiguousarray(target_W_m, dtype=np.float64)
         self._middle = self._target.mean(axis=0)
+        self._target_at = tuple(float(v) for v in self._middle)
+        self._ball = float(np.linalg.norm(self._half)) + 2 * _TOUCH_M
         self._radius = float(np.linalg.norm(self._target - self._middle, axis=1).max())
+
+    def surely_clear(self, p_W_m: Array) -> bool:
+        """Whether a ball round the hull, about `p_W_m` (the first three numbers), is clear of everything."""
+        x, y, z = float(p_W_m[0]), float(p_W_m[1]), float(p_W_m[2])
+        reach = self._ball
+        if z + reach > self._size[2] or abs(x) + reach > self._size[0] / 2 or abs(y) + reach > self._size[1] / 2:
+            return False
+        a, b, c = self._target_at
+        return (x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2 > (reach + self._radius) ** 2
 
     def touches(self, p_W_m: Array, R_WB: Array) -> str:
         """Name what the hull is in or on: the floor, a wall, the target, or nothing (an empty string)."""

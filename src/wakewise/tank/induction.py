@@ -38,7 +38,7 @@ SHAPE = _FAR * np.array(
 
 # For the kernels, in the precision of their points: p, then the coefficients of dp/dw, then 1, 3/2, 2, 1/_SCALE.
 _CONSTANTS = np.concatenate([SHAPE, SHAPE[1:] * np.arange(1, 10), [1.0, 1.5, 2.0, 1 / _SCALE]])
-_SINGLE = _CONSTANTS.astype(np.float32)
+SINGLE = _CONSTANTS.astype(np.float32)
 
 
 def impulse_velocity(
@@ -79,7 +79,7 @@ def _sum(kernel: Any, points_W_m: Array, rows: list[Any], exact: bool) -> Array:
         kind = np.float64 if exact else np.float32
         points: Any = np.ascontiguousarray(points_W_m, dtype=kind)
         columns = [np.ascontiguousarray(row, dtype=kind) for row in rows]
-        constants = _CONSTANTS if exact else _SINGLE
+        constants = _CONSTANTS if exact else SINGLE
         over_points(
             lambda some, result: kernel(some, *columns, constants, result),
             points,
@@ -93,6 +93,15 @@ def _sum(kernel: Any, points_W_m: Array, rows: list[Any], exact: bool) -> Array:
 def _impulses(
     points: Array, X: Array, Y: Array, Z: Array, MX: Array, MY: Array, MZ: Array, S: Array, K: Array, out: Array
 ) -> None:
+    impulse_sums(points, X, Y, Z, MX, MY, MZ, S, K, out)
+
+
+# Written into its callers: a compiled copy of its own may differ from another in the last bit.
+@njit(inline="always")
+def impulse_sums(
+    points: Array, X: Array, Y: Array, Z: Array, MX: Array, MY: Array, MZ: Array, S: Array, K: Array, out: Array
+) -> None:
+    """Write the velocity of impulses over sigma cubed (MX, MY, MZ), of sizes 1 / S, at each point into `out`."""
     p0, p1, p2, p3, p4, p5, p6, p7, p8, p9 = K[0], K[1], K[2], K[3], K[4], K[5], K[6], K[7], K[8], K[9]
     e0, e1, e2, e3, e4, e5, e6, e7, e8 = K[10], K[11], K[12], K[13], K[14], K[15], K[16], K[17], K[18]
     one, half_more, two, per_scale = K[19], K[20], K[21], K[22]

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from numba import njit
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
@@ -13,7 +16,9 @@ from wakewise.tank.currents import AmbientSum
 from wakewise.tank.settings import ThrusterFailure
 from wakewise.tank.tether import Tether
 from wakewise.tank.thrust_losses import FailingThrusters, inflow_factors
-from wakewise.vehicles import Vehicle, compile_body, saturate, step_rk4, thruster_lag
+from wakewise.vehicles import Vehicle, compile_body, saturate, thruster_lag
+from wakewise.vehicles.kernels import rotate
+from wakewise.vehicles.runge_kutta import rk4_kernel
 
 _GRAVITY_W_M_S2 = np.array([0.0, 0.0, 9.80665])
 
@@ -68,15 +73,23 @@ class VehiclePlant:
         self._failing = FailingThrusters(failures, len(vehicle.thrusters))
         self._tether = tether
         self._time = 0.0
-        self._p, self._q, self._nu = start.X_WB.p_m.copy(), start.X_WB.q.copy(), start.nu_B.copy()
-        self._R = matrix_from_quat(self._q)
-        self._motors_N = np.zeros(len(vehicle.thrusters))
-        self._factors = np.ones(len(vehicle.thrusters))
+        # Position, quaternion and twist in one array, as the kernels take them.
+        self._state = np.concatenate([start.X_WB.p_m, start.X_WB.q, start.nu_B])
+        self._R = matrix_from_quat(start.X_WB.q)
+        n = len(vehicle.thrusters)
+        self._motors_N, self._factors = np.zeros(n), np.ones(n)
+        self._impulse_N_s = np.zeros((n, 2))
+        self._lower_N, self._upper_N = np.array(vehicle.thrust_lower_N), np.array(vehicle.thrust_upper_N)
+        self._lags_s, self._gains = np.array(vehicle.time_constants_s), np.array(vehicle.thrust_gains)
+        self._allocation = np.array(vehicle.allocation_matrix)
+        self._packed = np.array(self._body.packed)
+        self._arms_B, self._axes_B = np.array(vehicle.thruster_positions_B_m), np.array(vehicle.thruster_axes_B)
         self._force_B_m_s2 = -_GRAVITY_W_M_S2 @ start.X_WB.R
-        self._water_W = ambient.velocity(self._p[None], 0.0)[0]
+        self._still = ambient.steady and ambient.uniform
+        self._water_W = ambient.velocity(start.X_WB.p_m[None], 0.0)[0]
         self.contact = ""
         """What the hull was stopped by in the last step, or nothing (an empty string)."""
-        where = ", ".join(f"{v:.2f}" for v in self._p)
+        where = ", ".join(f"{v:.2f}" for v in start.X_WB.p_m)
         if start.X_WB.apply(self._surroundings.corners_B_m)[:, 2].min() < 0.0:
             raise InputError(f"start: hull of {vehicle.name} at ({where}) m rises above the water surface at z = 0")
         touched = self.touches()
@@ -88,12 +101,17 @@ class VehiclePlant:
     @property
     def state(self) -> BodyState:
         """True pose and twist."""
-        return BodyState(X_WB=Pose(self._p, self._q), nu_B=self._nu)
+        return BodyState(X_WB=Pose(self._state[:3], self._state[3:7]), nu_B=self._state[7:])
 
     @property
     def thrusts_N(self) -> Array:
         """Force that each thruster delivers, shape (n,): the motor's answer times its true gain, less what it loses."""
-        return self._motors_N * self.vehicle.thrust_gains * self._factors
+        return self._motors_N * self._gains * self._factors
+
+    def take_impulse_N_s(self) -> Array:
+        """Integral of forward and of reverse thrust since this was last asked for, both positive, shape (n, 2)."""
+        taken, self._impulse_N_s = self._impulse_N_s, np.zeros_like(self._impulse_N_s)
+        return taken
 
     @property
     def force_B_m_s2(self) -> Array:
@@ -111,45 +129,59 @@ class VehiclePlant:
         inflow_W_m_s : ndarray, shape (n, 3), or None
             Velocity of the water at the disks without each thruster's own jet; None leaves inflow losses out.
         """
-        vehicle = self.vehicle
         wanted = self._failing.wanted(self._time, np.asarray(commands_N, dtype=np.float64), self._motors_N)
-        wanted = saturate(wanted, vehicle.thrust_lower_N, vehicle.thrust_upper_N)
-        before = self._motors_N
-        self._motors_N = thruster_lag(before, wanted, vehicle.time_constants_s, dt_s)
-        # The mean of both ends keeps the step's impulse right to second order.
-        thrusts = vehicle.thrust_gains * 0.5 * (before + self._motors_N)
         if inflow_W_m_s is not None:
-            self._factors = self._inflow_factors(thrusts, inflow_W_m_s)
-            thrusts = thrusts * self._factors
-        wrench = vehicle.allocation_matrix @ thrusts
-        water = self._water_W
-        if not (self._ambient.steady and self._ambient.uniform) and dt_s > 0.0:
-            self._water_W = self._ambient.velocity(self._p[None], self._time + dt_s)[0]
+            motors = thruster_lag(self._motors_N, saturate(wanted, self._lower_N, self._upper_N), self._lags_s, dt_s)
+            self._factors = self._inflow_factors(self._gains * 0.5 * (self._motors_N + motors), inflow_W_m_s)
+        water, wrench = self._water_W, np.zeros(6)
+        if not self._still and dt_s > 0.0:
+            self._water_W = self._ambient.velocity(self._state[None, :3], self._time + dt_s)[0]
             water = 0.5 * (water + self._water_W)
             if not self._ambient.steady:
-                wrench = wrench + self._push_of_water(dt_s)
+                wrench += self._push_of_water(dt_s)
         if self._tether is not None:
-            wrench = wrench + self._tether.wrench_B(Pose(self._p, self._q), self._nu, self._ambient, self._time)
-        v_W = self._R @ self._nu[:3]
-        self._p, self._q, self._nu = step_rk4(self._body, self._p, self._q, self._nu, wrench, water, dt_s)
-        self._R = matrix_from_quat(self._q)
-        self._p, self._nu, self.contact = self._surroundings.held(self._p, self._R, self._nu)
+            pose = Pose(self._state[:3], self._state[3:7])
+            wrench += self._tether.wrench_B(pose, self._state[7:], self._ambient, self._time)
+        v_W = self._R @ self._state[7:10]
+        _lag_and_move(
+            self._packed,
+            self._allocation,
+            self._lower_N,
+            self._upper_N,
+            self._lags_s,
+            self._gains,
+            self._factors,
+            wanted,
+            wrench,
+            water,
+            float(dt_s),
+            self._state,
+            self._motors_N,
+            self._impulse_N_s,
+            self._R,
+        )
+        self.contact = ""
+        if not self._surroundings.surely_clear(self._state):
+            p, nu, self.contact = self._surroundings.held(self._state[:3].copy(), self._R, self._state[7:].copy())
+            self._state[:3], self._state[7:] = p, nu
         self._time += dt_s
         if dt_s > 0.0:
-            self._force_B_m_s2 = ((self._R @ self._nu[:3] - v_W) / dt_s - _GRAVITY_W_M_S2) @ self._R
+            self._force_B_m_s2 = ((self._R @ self._state[7:10] - v_W) / dt_s - _GRAVITY_W_M_S2) @ self._R
 
     def disks(self) -> tuple[Array, Array]:
         """Where the disks are and which way positive thrust pushes, shapes (n, 3), in the world."""
         turn = self._R.T
-        return self._p + self.vehicle.thruster_positions_B_m @ turn, self.vehicle.thruster_axes_B @ turn
+        return self._state[:3] + self._arms_B @ turn, self._axes_B @ turn
 
     def touches(self) -> str:
         """Name what the hull, taken as a box, is in or on: the floor, a wall, the target, or nothing."""
-        return self._surroundings.touches(self._p, self._R)
+        if self._surroundings.surely_clear(self._state):
+            return ""
+        return self._surroundings.touches(self._state[:3], self._R)
 
     def _push_of_water(self, dt_s: float) -> Array:
         """Wrench of water that speeds up at a fixed place: its pressure gradient and the added mass."""
-        rate_W = (self._water_W - self._ambient.velocity(self._p[None], self._time)[0]) / dt_s
+        rate_W = (self._water_W - self._ambient.velocity(self._state[None, :3], self._time)[0]) / dt_s
         rate_B = rate_W @ self._R
         pressure = self._density * self.vehicle.displaced_volume_m3 * rate_B
         push: Array = self._body.added_mass[:, :3] @ rate_B
@@ -158,8 +190,49 @@ class VehiclePlant:
     def _inflow_factors(self, thrusts_N: Array, inflow_W_m_s: Array) -> Array:
         vehicle = self.vehicle
         arms = vehicle.thruster_positions_B_m
-        disk_B = self._nu[:3] + np.cross(self._nu[3:], arms)
+        disk_B = self._state[7:10] + np.cross(self._state[10:], arms)
         past_B = inflow_W_m_s @ self._R - disk_B
         jets = -np.sign(thrusts_N)[:, None] * vehicle.thruster_axes_B
         along = np.einsum("ij,ij->i", past_B, jets)
         return inflow_factors(thrusts_N, along, vehicle.disk_areas_m2, self._density)
+
+
+@njit(cache=True)
+def _lag_and_move(
+    packed: Array,
+    allocation: Array,
+    lower_N: Array,
+    upper_N: Array,
+    lags_s: Array,
+    gains: Array,
+    factors: Array,
+    wanted_N: Array,
+    wrench_B: Array,
+    water_W: Array,
+    dt_s: float,
+    state: Array,
+    motors_N: Array,
+    impulse_N_s: Array,
+    R: Array,
+) -> None:
+    """One step of all motors and of the hull in free water; state, motors, impulse and R (3, 3) change in place."""
+    inputs = np.empty(9)
+    for k in range(6):
+        inputs[k] = wrench_B[k]
+    for k in range(3):
+        inputs[6 + k] = water_W[k]
+    for i in range(motors_N.shape[0]):
+        wish = min(max(wanted_N[i], lower_N[i]), upper_N[i])
+        kept = math.exp(-dt_s / lags_s[i]) if lags_s[i] > 0.0 else 0.0
+        after = wish + kept * (motors_N[i] - wish)
+        # The mean of both ends keeps the step's impulse right to second order.
+        thrust = gains[i] * 0.5 * (motors_N[i] + after) * factors[i]
+        motors_N[i] = after
+        impulse_N_s[i, 0] += max(thrust, 0.0) * dt_s
+        impulse_N_s[i, 1] += max(-thrust, 0.0) * dt_s
+        for k in range(6):
+            inputs[k] += allocation[k, i] * thrust
+    rk4_kernel(packed, state, inputs, dt_s)
+    for k in range(3):
+        a, b, c = (1.0 if k == 0 else 0.0), (1.0 if k == 1 else 0.0), (1.0 if k == 2 else 0.0)
+        R[0, k], R[1, k], R[2, k] = rotate(state[3], state[4], state[5], state[6], a, b, c)

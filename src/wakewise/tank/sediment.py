@@ -25,12 +25,15 @@ from wakewise.tank.grains import (
     settling_speed_m_s,
     threshold_stress_Pa,
 )
+from wakewise.tank.sediment_motion import carry, cells_of, mix, shared_among_nodes, stirred_cells
 
 CELL_M = 0.05
 SHEAR_HEIGHT_M = 0.01  # where the log law takes the water's speed from; the wall jets' slip speed stands for it
 BACKGROUND_DIFFUSIVITY_M2_S = 1e-5  # still tank water, low end of 1e-5..1e-4
 MIXING_HEIGHT_M = 0.065  # 0.40 u* h reaches a jet's 0.022 sqrt(T/rho) about here, and grows no more
 SUSPENDED_NEAR_M = 0.8  # particles of grains suspended from the start are finer within this of the target
+# A particle keeps the water's velocity until it has gone this far or this long, whichever is sooner.
+_HELD_M, _HELD_S, _NEVER_S = 0.015, 0.3, 1e9
 _FIRST_HEIGHT_M = 0.005  # silt that leaves the bed starts evenly spread below this
 
 
@@ -110,6 +113,10 @@ class Silt:
         self._star_m_s: Array = np.zeros(self._shape)
         self.position_m: Array = np.zeros((0, 3))
         self.mass_kg: Array = np.zeros(0)
+        self._u_m_s: Array = np.zeros((0, 3))  # of the water at each particle when last looked at
+        self._age_s: Array = np.zeros(0)  # and how long ago that was
+        self._looked: np.ndarray = np.zeros(self._shape, dtype=np.bool_)  # cells whose water was looked at last
+        self._odd = 0
         self._max = max_particles
         self._rng = rng
         # A full set of new particles stands for the load of 0.01 m2; every pairing doubles the mass of the next ones.
@@ -186,15 +193,9 @@ class Silt:
         """Silt in kg/m3 on a grid; each particle is shared among the eight nodes round it (cloud in cell)."""
         values = np.zeros(shape)
         if len(self.mass_kg):
-            at = (self.position_m - origin_W_m) / spacing_m
             # The lowest layer of nodes may lie on the bed: what is below it is counted there, not lost.
-            first = np.floor(at).astype(np.int64)
-            share = at - first
-            for corner in np.ndindex(2, 2, 2):
-                node = first + corner
-                weight = np.prod(np.where(np.array(corner) == 1, share, 1 - share), axis=1)
-                inside = np.all((node >= 0) & (node < shape), axis=1)
-                np.add.at(values, tuple(node[inside].T), (self.mass_kg * weight)[inside])
+            origin = np.array(origin_W_m, dtype=np.float64)
+            shared_among_nodes(self.position_m, self.mass_kg, origin, float(spacing_m), values)
         half = np.ones(shape[2])
         bed = (self._size[2] - origin_W_m[2]) / spacing_m
         # A node on the bed has water only on its upper side.
@@ -202,44 +203,38 @@ class Silt:
             half[round(bed)] = 0.5
         return ScalarGrid(origin_W_m=origin_W_m, spacing_m=spacing_m, values=values / (spacing_m**3 * half))
 
-    def _cells(self, xy_m: Array) -> tuple[IntArray, IntArray]:
-        index = np.floor((xy_m[:, :2] - self._low) / self._cell).astype(np.int64)
-        index = np.clip(index, 0, np.array(self._shape) - 1)
-        return index[:, 0], index[:, 1]
-
-    def _centres(self) -> tuple[Array, Array]:
-        x = self._low[0] + (np.arange(self._shape[0]) + 0.5) * self._cell[0]
-        y = self._low[1] + (np.arange(self._shape[1]) + 0.5) * self._cell[1]
-        return x, y
+    def _cells(self, position_m: Array) -> tuple[IntArray, IntArray]:
+        return cells_of(position_m, self._low, self._cell, *self._shape)
 
     def _shear(self, flow: Flow, stirred_W_m: Array) -> None:
         """Friction velocity of every cell: from the water over it where jets reach, from the current elsewhere."""
-        x, y = self._centres()
         near = np.zeros(self._shape, dtype=np.bool_)
-        for cx, cy, radius in stirred_W_m:
-            near |= (x[:, None] - cx) ** 2 + (y[None, :] - cy) ** 2 < (radius + CELL_M) ** 2
-        depth = self._size[2]
-        far = np.array([[0.0, 0.0, depth]])
-        speed = np.empty(self._shape)
+        stirred_cells(np.ascontiguousarray(stirred_W_m, dtype=np.float64), self._low, self._cell, CELL_M, near)
+        # A cell that stays stirred is looked at every second time, its neighbours in between.
+        self._odd = 1 - self._odd
+        colour = np.add.outer(np.arange(self._shape[0]), np.arange(self._shape[1])) % 2
+        kept = near & self._looked & (colour == self._odd)
+        self._looked = near
+        i, j = np.nonzero(near & ~kept)
         # Away from the jets the water moves as it does in the farthest corner.
-        far[0, :2] = self._low
-        speed[:] = np.linalg.norm(flow.velocity(far)[0, :2])
-        i, j = np.nonzero(near)
-        if len(i):
-            points = np.stack([x[i], y[j], np.full(len(i), depth)], axis=1)
-            speed[i, j] = np.linalg.norm(flow.velocity(points)[:, :2], axis=1)
-        self._star_m_s = friction_velocity_m_s(speed, SHEAR_HEIGHT_M, self.laws.grain_m)
+        points = np.full((len(i) + 1, 3), self._size[2])
+        points[0, :2] = self._low
+        points[1:, 0] = self._low[0] + (i + 0.5) * self._cell[0]
+        points[1:, 1] = self._low[1] + (j + 0.5) * self._cell[1]
+        u = flow.velocity(points)
+        star = friction_velocity_m_s(np.hypot(u[:, 0], u[:, 1]), SHEAR_HEIGHT_M, self.laws.grain_m)
+        self._star_m_s = np.where(kept, self._star_m_s, star[0])
+        self._star_m_s[i, j] = star[1:]
 
     def _erode(self, dt_s: float) -> None:
         """Lift whole particles, drawn so that on average each cell loses what the law says, at once."""
         laws = self.laws
         stress = laws.water_density_kg_m3 * self._star_m_s**2
         area = float(self._cell.prod())
-        rate = laws.lifted_kg_m2_s(stress)
-        i, j = np.nonzero((rate > 0.0) & (self.bed_kg_m2 > 0.0))
+        i, j = np.nonzero((stress > laws.threshold_Pa) & (self.bed_kg_m2 > 0.0))
         if not len(i):
             return
-        worth = rate[i, j] * area * dt_s / self._birth_kg
+        worth = laws.lifted_kg_m2_s(stress[i, j]) * area * dt_s / self._birth_kg
         lifted = np.floor(worth + self._rng.uniform(size=len(i)))
         i, j, lifted = i[lifted > 0], j[lifted > 0], lifted[lifted > 0]
         mass = np.minimum(lifted * self._birth_kg, self.bed_kg_m2[i, j] * area)
@@ -250,56 +245,32 @@ class Silt:
         position[:, 2] = self._size[2] - _FIRST_HEIGHT_M * place[:, 2]
         self.position_m = np.concatenate([self.position_m, position])
         self.mass_kg = np.concatenate([self.mass_kg, mass])
+        self._u_m_s = np.concatenate([self._u_m_s, np.zeros((len(i), 3))])
+        self._age_s = np.concatenate([self._age_s, np.full(len(i), _NEVER_S)])
 
     def _carry(self, flow: Flow, dt_s: float) -> None:
         """Move with the water and sink; what sinks onto the bed stays there."""
-        u = flow.velocity(self.position_m)
-        height = self._size[2] - self.position_m[:, 2]
-        down = np.maximum(u[:, 2], 0.0)
-        # Downward flow vanishes at the bed in proportion to the height, so water alone never carries silt into it.
-        flown = height * np.exp(-down * dt_s / np.maximum(height, 1e-9)) - np.minimum(u[:, 2], 0.0) * dt_s
-        settled = flown - self.laws.settling_m_s * dt_s
-        position = self.position_m + u * dt_s
-        position[:, 2] = self._size[2] - settled
-        position = self._within_walls(position)
-        landed = settled <= 0.0
+        position = self.position_m.copy()
+        if len(self._age_s) != len(position):
+            self._u_m_s, self._age_s = np.zeros_like(position), np.full(len(position), _NEVER_S)
+        u, age = self._u_m_s, self._age_s + dt_s
+        gone = np.sqrt(np.einsum("ni,ni->n", u, u)) * age
+        look = np.flatnonzero((age > _HELD_S - 1e-9) | (gone > _HELD_M))
+        if len(look):
+            u[look], age[look] = flow.velocity(position[look]), 0.0
+        landed = carry(position, u, self.laws.settling_m_s, dt_s, self._low, float(self._size[2]))
         i, j = self._cells(position[landed])
         np.add.at(self.bed_kg_m2, (i, j), self.mass_kg[landed] / float(self._cell.prod()))
         self.position_m, self.mass_kg = position[~landed], self.mass_kg[~landed]
+        self._u_m_s, self._age_s = u[~landed], age[~landed]
 
     def _mix(self, dt_s: float) -> None:
         """Random walk with drift; the bed turns it back, since only sinking deposits (flux w_s C, Krone 1962)."""
-        if not len(self.mass_kg):
-            return
-        i, j = self._cells(self.position_m)
-        star = self._star_m_s[i, j]
-        height = self._size[2] - self.position_m[:, 2]
-        slopes = np.gradient(self._star_m_s, self._cell[0], self._cell[1])
-        mixing = VON_KARMAN * np.minimum(height, MIXING_HEIGHT_M)
-        drift = np.stack(
-            [mixing * slopes[0][i, j], mixing * slopes[1][i, j], -VON_KARMAN * star * (height < MIXING_HEIGHT_M)],
-            axis=1,
-        )
-        # K half a drift step on, as Visser's scheme has it, keeps the mixture even next to the bed.
-        on = np.abs(height - 0.5 * drift[:, 2] * dt_s)
-        K = BACKGROUND_DIFFUSIVITY_M2_S + VON_KARMAN * star * np.minimum(on, MIXING_HEIGHT_M)
-        kick = self._rng.standard_normal(self.position_m.shape) * np.sqrt(2 * K * dt_s)[:, None]
-        self.position_m = self._within_walls(self.position_m + drift * dt_s + kick)
-
-    def _within_walls(self, position_m: Array) -> Array:
-        """Turn back at walls, surface and bed."""
-        half = self._size[:2] / 2
-        position = position_m.copy()
-        position[:, :2] = np.clip(
-            np.where(
-                np.abs(position[:, :2]) > half, np.sign(position[:, :2]) * 2 * half - position[:, :2], position[:, :2]
-            ),
-            -half,
-            half,
-        )
-        z = np.abs(position[:, 2])
-        position[:, 2] = np.clip(np.where(z > self._size[2], 2 * self._size[2] - z, z), 0.0, self._size[2])
-        return position
+        kicks = self._rng.standard_normal(self.position_m.shape)
+        laws = np.array([VON_KARMAN, MIXING_HEIGHT_M, BACKGROUND_DIFFUSIVITY_M2_S])
+        position = self.position_m.copy()
+        mix(position, kicks, self._star_m_s, self._low, self._cell, float(self._size[2]), dt_s, laws)
+        self.position_m = position
 
     def _pair(self) -> None:
         while len(self.mass_kg) > self._max:
@@ -313,5 +284,6 @@ class Silt:
             rest = order[2 * n :]
             self.position_m = np.concatenate([chosen, self.position_m[rest]])
             self.mass_kg = np.concatenate([total, self.mass_kg[rest]])
+            self._age_s = np.zeros(0)
             self._birth_kg *= 2
             self.pairings += 1

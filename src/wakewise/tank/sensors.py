@@ -44,12 +44,13 @@ class Sensors:
             settings.tracking_rate_hz,
         )
         self._taken = [0] * len(self._samplers)
+        self._next_s = self._soonest_s()
         self._under_way: list[tuple[float, int, Measurement]] = []
         self._count = 0
 
     def next_due_s(self) -> float:
         """When the next sample is to be taken; the first ones one period after the start."""
-        return min((n + 1) / rate for n, rate in zip(self._taken, self._rates_hz, strict=True) if rate > 0.0)
+        return self._next_s
 
     def sample(self, time_s: float, state: BodyState, force_B_m_s2: Array, turbidity_per_m: float = 0.0) -> None:
         """Take the samples that are due at `time_s`.
@@ -68,6 +69,10 @@ class Sensors:
             if rate_hz > 0.0 and (self._taken[kind] + 1) / rate_hz <= time_s + _TICK_TOLERANCE_S:
                 self._taken[kind] += 1
                 take(time_s, state, force_B_m_s2, turbidity_per_m)
+        self._next_s = self._soonest_s()
+
+    def _soonest_s(self) -> float:
+        return min((n + 1) / rate for n, rate in zip(self._taken, self._rates_hz, strict=True) if rate > 0.0)
 
     def _pose(self, time_s: float, state: BodyState, _force: Array, turbidity_per_m: float) -> None:
         s = self._settings

@@ -115,7 +115,6 @@ class Tank:
         self._flow_time = 0.0
         self._flow_steps = 0
         self._silt_every = max(1, math.floor(_SILT_STEP_S / settings.flow_step_s + 1e-9))
-        self._impulse_N_s = np.zeros((len(vehicle.thrusters), 2))
         self._disks_before_m = self._plant.disks()[0]
         # The water at the disks is looked at once for each of its own steps.
         self._inflow = self.ambient.velocity(self._disks_before_m, 0.0) if settings.inflow_loss else None
@@ -222,12 +221,8 @@ class Tank:
         return inflow
 
     def _advance(self, commands_N: Array, dt_s: float) -> None:
-        before = self._plant.thrusts_N
         self._plant.step(commands_N, dt_s, self._inflow)
         self._touching = self._touching or self._plant.contact
-        mean = 0.5 * (before + self._plant.thrusts_N)
-        self._impulse_N_s[:, 0] += np.maximum(mean, 0.0) * dt_s
-        self._impulse_N_s[:, 1] += np.maximum(-mean, 0.0) * dt_s
         self._time += dt_s
         if self._sensors.next_due_s() - self._time < _TIME_TOLERANCE_S:
             self._sensors.sample(self._time, self._plant.state, self._plant.force_B_m_s2, self._turbidity_per_m)
@@ -235,9 +230,8 @@ class Tank:
     def _move_water(self) -> None:
         origins, axes = self._plant.disks()
         dt_s = self.settings.flow_step_s
-        self.water.step(dt_s, self._disks_before_m, origins, axes, self._impulse_N_s)
+        self.water.step(dt_s, self._disks_before_m, origins, axes, self._plant.take_impulse_N_s())
         self._disks_before_m = origins
-        self._impulse_N_s = np.zeros_like(self._impulse_N_s)
         self._flow_steps += 1
         if self._inflow is not None:
             self._inflow = self._inflow_W_m_s()

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.tank.bedjets import Rings, coarsened, grown, layer_speed, packed_rings, packed_velocity, with_ring_images
+from wakewise.arrays import Array, IntArray
+from wakewise.tank.bedjets import Rings, coarsened, grown, layer_speed, packed_rings, planes_velocity, with_ring_images
 from wakewise.tank.faces import Face, Room
 from wakewise.tank.meeting import Sheet
 
@@ -24,7 +24,7 @@ class WallJets:
     def __init__(self, room: Room) -> None:
         self._room = room
         self._rings: dict[Plane, Rings] = {}
-        self._seen: list[tuple[Plane, Array]] | None = None  # rings and images, packed for the kernel
+        self._seen: tuple[Array, IntArray, Array] | None = None  # planes, rings and images, packed for the kernel
 
     @property
     def count(self) -> int:
@@ -68,25 +68,24 @@ class WallJets:
 
     def velocity(self, points_W_m: Array) -> Array:
         """Velocity of all of them with their images, shape (n, 3), at points, shape (n, 3)."""
-        u = np.zeros((len(points_W_m), 3))
         if self._seen is None:
-            self._seen = [
-                (
-                    plane,
-                    packed_rings(with_ring_images(rings, plane, self._room), per_height=self._per_height(plane))
-                    if isinstance(plane, Face)
-                    else packed_rings(rings, plane.thickness_m),
-                )
-                for plane, rings in self._rings.items()
-                if rings.count
-            ]
-        for plane, packed in self._seen:
-            local = plane.local(points_W_m)
-            side = np.abs(local[:, 2]) if isinstance(plane, Sheet) else plane.depth_m - local[:, 2]
-            near = side < packed[:, 10].max()
-            if near.any():
-                u[near] += plane.back(_on_plane(plane, local[near], packed))
-        return u
+            self._seen = self._packed()
+        return planes_velocity(points_W_m, *self._seen)
+
+    def _packed(self) -> tuple[Array, IntArray, Array]:
+        planes, rows = [np.zeros((0, 14))], [np.zeros((0, 14))]
+        for plane, rings in self._rings.items():
+            if not rings.count:
+                continue
+            if isinstance(plane, Face):
+                rows.append(with_ring_images(packed_rings(rings, 0.0, self._per_height(plane)), plane, self._room))
+                origin, turn, both = np.zeros(3), plane.turned(np.eye(3)).T, 0.0
+            else:
+                rows.append(packed_rings(rings, plane.thickness_m))
+                origin, turn, both = plane.origin_m, plane.R, 1.0
+            planes.append(np.concatenate([origin, turn.ravel(), [plane.depth_m, both]])[None])
+        starts = np.cumsum([len(row) for row in rows])
+        return np.concatenate(planes), starts, np.concatenate(rows)
 
     def _per_height(self, face: Face) -> float:
         opposite = [other for other in self._room.faces if other.axis == face.axis and other.side != face.side]
@@ -94,14 +93,3 @@ class WallJets:
 
     def _reach_m(self) -> float:
         return 2 * max((abs(face.at_m) for face in self._room.faces if face.axis != 2), default=np.inf)
-
-
-def _on_plane(plane: Plane, points_m: Array, packed: Array) -> Array:
-    """Velocity in the plane's frame; a sheet has the same rings on its other side, mirrored."""
-    if isinstance(plane, Face):
-        return packed_velocity(points_m, packed, plane.depth_m)
-    beyond = points_m[:, 2] > plane.depth_m
-    points_m[beyond, 2] = 2 * plane.depth_m - points_m[beyond, 2]
-    u = packed_velocity(points_m, packed, plane.depth_m)
-    u[beyond, 2] *= -1.0
-    return u

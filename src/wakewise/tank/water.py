@@ -26,10 +26,10 @@ from wakewise.arrays import Array
 from wakewise.tank.bedjets import STRIKE_HEIGHT, Rings, layer_speed, rings_from_strikes
 from wakewise.tank.blockage import Blockage
 from wakewise.tank.closure import PLAIN, Spreading, bent_spread, carried_share, disk_share, first_sigma_m, travel
+from wakewise.tank.clusters import ImpulseField, in_space
 from wakewise.tank.faces import Face, Room
-from wakewise.tank.induction import impulse_velocity
 from wakewise.tank.meeting import Meetings
-from wakewise.tank.parcels import Parcels, confined_velocity, merged, merged_across, parcel_velocity
+from wakewise.tank.parcels import GUST_PER_TURBULENCE, Parcels, merged, merged_across
 from wakewise.tank.walljets import WallJets
 
 _EMISSION_SPACING = 0.6  # of the first sigma: Gaussians this close add up to a smooth row (ripple below 1e-6)
@@ -121,7 +121,7 @@ class Water:
         self._bed = bed_z_m
         self._ambient = ambient or _Uniform(np.zeros(3) if current_W_m_s is None else np.array(current_W_m_s, float))
         self._room = Room.of(bed_z_m, half_size_m, surface=math.isfinite(bed_z_m))
-        self._gust_scale = turbulence * _GUST_PER_TURBULENCE
+        self._gust_scale = turbulence * GUST_PER_TURBULENCE
         self._rest_speed = rest_speed_m_s
         self._max_parcels = max_parcels
         self._spreading = spreading
@@ -136,7 +136,7 @@ class Water:
         self._waiting_slug_m = np.zeros(streams)  # length of the jet's core that it stands for
         self._retired = self._struck = self._met = 0.0
         self._forced_merges = 0
-        self._sources: tuple[Array, Array, Array] | None = None
+        self._field: ImpulseField | None = None
         self._answers: list[Array] | None = None
 
     @property
@@ -173,19 +173,21 @@ class Water:
 
     def velocity(self, points_W_m: Array) -> Array:
         """Velocity of the water in m/s, shape (n, 3), at points, shape (n, 3)."""
-        return self.excess_velocity(points_W_m) + self.ambient_velocity(points_W_m)
+        points = np.atleast_2d(np.asarray(points_W_m, dtype=np.float64))
+        u = self._jets(points) + self._ambient.velocity(points, self._time)
+        return self._turned_aside(points, u, jets=True, ambient=True)
 
     def ambient_velocity(self, points_W_m: Array) -> Array:
         """Velocity of the same water without thrusters, shape (n, 3), at points, shape (n, 3)."""
         points = np.atleast_2d(np.asarray(points_W_m, dtype=np.float64))
         u = self._ambient.velocity(points, self._time)
-        return u if self._body is None else u + self._body.velocity(points, self._answers_of(self._body)[1])
+        return self._turned_aside(points, u, jets=False, ambient=True)
 
     def excess_velocity(self, points_W_m: Array) -> Array:
         """Velocity less that of the same water without thrusters, shape (n, 3), at points, shape (n, 3)."""
         points = np.atleast_2d(np.asarray(points_W_m, dtype=np.float64))
         u = self._jets(points)
-        return u if self._body is None else u + self._body.velocity(points, self._answers_of(self._body)[0])
+        return self._turned_aside(points, u, jets=True, ambient=False)
 
     def stirred_bed(self, least_speed_m_s: float) -> Array:
         """Circles (x, y, radius), shape (n, 3), round the bed where jets may be faster than a speed."""
@@ -225,16 +227,34 @@ class Water:
         self._strike()
         self._thin()
         self._time += dt_s
-        self._sources = self._answers = None
+        self._field = self._answers = None
 
     def _jets(self, points: Array) -> Array:
         """Free jets and wall jets with their images, without the body's answer."""
-        if self._sources is None:
+        if self._field is None:
             moved = self._parcels
-            self._sources = self._room.with_images(moved.position_m, self._gusty_impulse(moved), moved.sigma_m)
-        u = impulse_velocity(points, *self._sources)
-        u[points[:, 2] == self._bed, 2] = 0.0  # there is only rounding
-        return u + self._walls.velocity(points)
+            sources = self._room.with_images(moved.position_m, self._gusty_impulse(moved), moved.sigma_m)
+            self._field = ImpulseField.of(*sources)
+        return self._sum_of(self._field, points)
+
+    def _sum_of(self, field: ImpulseField, points: Array) -> Array:
+        """Velocity of impulses and wall jets; points are taken in an order that suits both."""
+        order = in_space(points)
+        sorted_points = points[order]
+        sums = field.velocity(sorted_points)
+        sums[sorted_points[:, 2] == self._bed, 2] = 0.0  # there is only rounding
+        sums += self._walls.velocity(sorted_points)
+        u = np.empty_like(sums)
+        u[order] = sums
+        return u
+
+    def _turned_aside(self, points: Array, u: Array, *, jets: bool, ambient: bool) -> Array:
+        """Add the body's answer to the jets and to the ambient water, if any point is near enough to feel it."""
+        body = self._body
+        if body is None or not body.near(points).any():
+            return u
+        to_jets, to_ambient = self._answers_of(body)
+        return u + body.velocity(points, jets * to_jets + ambient * to_ambient)
 
     def _answers_of(self, body: Blockage) -> list[Array]:
         """Strengths of the body's sources against the jets and against the ambient water."""
@@ -263,9 +283,9 @@ class Water:
         if parcels.count:
             X = parcels.position_m
             # Gusts are heard everywhere but do not carry parcels: the growth of sigma stands for that mixing already.
-            u = confined_velocity(X, X, parcels.impulse_m4_s, parcels.sigma_m, self._room) + self._walls.velocity(X)
-            if self._body is not None:
-                u += self._body.velocity(X, self._answers_of(self._body)[0])
+            field = ImpulseField.of(*self._room.with_images(X, parcels.impulse_m4_s, parcels.sigma_m))
+            u = self._sum_of(field, X)
+            u = self._turned_aside(X, u, jets=True, ambient=False)
             ambient = self.ambient_velocity(X)
             speed = np.sqrt(np.einsum("ni,ni->n", u, u))
             own = carried_share(parcels.sigma_m, parcels.diameter_m)[:, None] * u
@@ -378,18 +398,3 @@ class Water:
 
 _CENTRE_SPEED = 2 / (3 * (2 * math.pi) ** 1.5)
 """Speed at the centre of a parcel of unit impulse and size: two thirds of its impulse's density there."""
-
-
-def _gust_per_turbulence() -> float:
-    """Impulse fluctuation per parcel for a given relative fluctuation on the axis of a row of parcels.
-
-    Parcels d = 1.05 sigma apart (rows lie between 0.7 and 1.4) fluctuate independently; on the axis one adds 2 A, so
-    u'/u = a sqrt(sum (2A)^2) / sum 2A.
-    """
-    x = 1.05 * np.arange(-200, 201)[:, None] * np.array([0.0, 0.0, 1.0]) + np.array([0.0, 0.0, 0.2])
-    one = np.array([[0.0, 0.0, 1.0]])
-    along = parcel_velocity(x, np.zeros((1, 3)), one, np.ones(1), math.inf)[:, 2]
-    return float(along.sum() / np.sqrt((along**2).sum()))
-
-
-_GUST_PER_TURBULENCE = _gust_per_turbulence()

@@ -1,0 +1,133 @@
+"""Compiled loops of the silt: which cells jets stir, how particles move and settle, and what they make of a grid.
+
+The laws are those told in `wakewise.tank.sediment`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from wakewise.arrays import Array, IntArray
+
+
+@njit(cache=True)
+def stirred_cells(circles: Array, low: Array, cell: Array, margin_m: float, near: np.ndarray) -> None:
+    """Mark the cells of a grid, shape (nx, ny), whose centres lie in circles (x, y, radius) widened by a margin."""
+    nx, ny = near.shape
+    for c in range(circles.shape[0]):
+        reach = circles[c, 2] + margin_m
+        first = max(math.floor((circles[c, 0] - reach - low[0]) / cell[0]), 0)
+        last = min(math.floor((circles[c, 0] + reach - low[0]) / cell[0]), nx - 1)
+        for i in range(first, last + 1):
+            dx = low[0] + (i + 0.5) * cell[0] - circles[c, 0]
+            left = reach * reach - dx * dx
+            if left <= 0.0:
+                continue
+            half = math.sqrt(left)
+            start = max(math.floor((circles[c, 1] - half - low[1]) / cell[1]), 0)
+            stop = min(math.floor((circles[c, 1] + half - low[1]) / cell[1]), ny - 1)
+            for j in range(start, stop + 1):
+                dy = low[1] + (j + 0.5) * cell[1] - circles[c, 1]
+                if dy * dy < left:
+                    near[i, j] = True
+
+
+@njit(cache=True)
+def carry(position: Array, u: Array, settling_m_s: float, dt_s: float, low: Array, depth: float) -> np.ndarray:
+    """Move particles, shape (n, 3), in place with the water and down; return which of them reached the bed.
+
+    Downward flow vanishes at the bed in proportion to the height, so water alone never carries silt into it.
+    """
+    n = position.shape[0]
+    landed = np.zeros(n, np.bool_)
+    for k in range(n):
+        height = depth - position[k, 2]
+        down, up = max(u[k, 2], 0.0), -min(u[k, 2], 0.0)
+        settled = height * math.exp(-down * dt_s / max(height, 1e-9)) + up * dt_s - settling_m_s * dt_s
+        landed[k] = settled <= 0.0
+        position[k, 0] = _turned_back(position[k, 0] + u[k, 0] * dt_s, -low[0])
+        position[k, 1] = _turned_back(position[k, 1] + u[k, 1] * dt_s, -low[1])
+        position[k, 2] = _between(depth - settled, depth)
+    return landed
+
+
+@njit(cache=True)
+def mix(
+    position: Array, kicks: Array, star: Array, low: Array, cell: Array, depth: float, dt_s: float, laws: Array
+) -> None:
+    """Random walk with drift, in place; `kicks` are standard normal, shape (n, 3).
+
+    `star`, shape (nx, ny), is the friction velocity of the cells; `laws` are von Karman's constant, the height up to
+    which mixing grows and the background diffusivity.
+    """
+    karman, highest, background = laws[0], laws[1], laws[2]
+    nx, ny = star.shape
+    for k in range(position.shape[0]):
+        i = min(max(math.floor((position[k, 0] - low[0]) / cell[0]), 0), nx - 1)
+        j = min(max(math.floor((position[k, 1] - low[1]) / cell[1]), 0), ny - 1)
+        height = depth - position[k, 2]
+        mixing = karman * min(height, highest)
+        i0, i1, j0, j1 = max(i - 1, 0), min(i + 1, nx - 1), max(j - 1, 0), min(j + 1, ny - 1)
+        drift_x = mixing * (star[i1, j] - star[i0, j]) / ((i1 - i0) * cell[0])
+        drift_y = mixing * (star[i, j1] - star[i, j0]) / ((j1 - j0) * cell[1])
+        drift_z = -karman * star[i, j] if height < highest else 0.0
+        # K half a drift step on, as Visser's scheme has it, keeps the mixture even next to the bed.
+        on = abs(height - 0.5 * drift_z * dt_s)
+        size = math.sqrt(2 * (background + karman * star[i, j] * min(on, highest)) * dt_s)
+        position[k, 0] = _turned_back(position[k, 0] + drift_x * dt_s + size * kicks[k, 0], -low[0])
+        position[k, 1] = _turned_back(position[k, 1] + drift_y * dt_s + size * kicks[k, 1], -low[1])
+        position[k, 2] = _between(position[k, 2] + drift_z * dt_s + size * kicks[k, 2], depth)
+
+
+@njit(cache=True)
+def shared_among_nodes(position: Array, mass: Array, origin: Array, spacing: float, values: Array) -> None:
+    """Add each particle's mass to the eight nodes round it, with weights linear in the distance (cloud in cell)."""
+    for k in range(mass.shape[0]):
+        x = (position[k, 0] - origin[0]) / spacing
+        y = (position[k, 1] - origin[1]) / spacing
+        z = (position[k, 2] - origin[2]) / spacing
+        i, j, h = math.floor(x), math.floor(y), math.floor(z)
+        a, b, c = x - i, y - j, z - h
+        for di in range(2):
+            if not 0 <= i + di < values.shape[0]:
+                continue
+            for dj in range(2):
+                if not 0 <= j + dj < values.shape[1]:
+                    continue
+                for dh in range(2):
+                    if 0 <= h + dh < values.shape[2]:
+                        weight = (a if di else 1 - a) * (b if dj else 1 - b) * (c if dh else 1 - c)
+                        values[i + di, j + dj, h + dh] += mass[k] * weight
+
+
+@njit(cache=True)
+def cells_of(position: Array, low: Array, cell: Array, nx: int, ny: int) -> tuple[IntArray, IntArray]:
+    """Indices of the cells that places, shape (n, 2 or 3), are in or nearest to."""
+    n = position.shape[0]
+    i, j = np.empty(n, np.int64), np.empty(n, np.int64)
+    for k in range(n):
+        i[k] = min(max(math.floor((position[k, 0] - low[0]) / cell[0]), 0), nx - 1)
+        j[k] = min(max(math.floor((position[k, 1] - low[1]) / cell[1]), 0), ny - 1)
+    return i, j
+
+
+@njit(cache=True)
+def _turned_back(x: float, half: float) -> float:
+    """Mirrored into -half to half if it is beyond."""
+    if x > half:
+        x = 2 * half - x
+    elif x < -half:
+        x = -2 * half - x
+    return min(max(x, -half), half)
+
+
+@njit(cache=True)
+def _between(z: float, depth: float) -> float:
+    """Mirrored into 0 to depth if it is beyond."""
+    z = abs(z)
+    if z > depth:
+        z = 2 * depth - z
+    return min(max(z, 0.0), depth)
