@@ -92,7 +92,7 @@ def test_station_is_held_within_millimetres_without_ringing(name, method, trim_N
 def test_the_loop_keeps_its_gain_margin_in_flight():
     """With every thruster twice as strong as believed (6 dB) the station is still held without growth."""
     errors, _ = hold("paper", "dp", trim_N=0.0, current_m_s=0.0, gain=2.0, seconds=30.0)
-    assert rms(errors[750:]) < 0.008
+    assert rms(errors[750:]) < 0.01
     assert rms(errors[1125:]) < 1.5 * rms(errors[750:1125])
 
 
