@@ -2,8 +2,10 @@
 
 import numpy as np
 
-from wakewise.control.plan_problem import PlanProblem, PlanSettings, Surroundings, reference_of
+from wakewise.control.plan_problem import PlanProblem, PlanSettings
 from wakewise.control.planner import compile_plan
+from wakewise.control.reference import reference_of
+from wakewise.control.surroundings import Surroundings
 from wakewise.geometry import Pose, quat_from_euler
 from wakewise.interfaces import Goal
 from wakewise.targets import Region

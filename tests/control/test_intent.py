@@ -5,7 +5,7 @@ import pytest
 
 from wakewise.control import PlanSettings
 from wakewise.control.intent import LEASH_M, Intent, goal_of, moved_on, obeying, slewed
-from wakewise.control.plan_problem import reference_of
+from wakewise.control.reference import reference_of
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_from_euler
 from wakewise.interfaces import BodyState

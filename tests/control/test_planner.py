@@ -9,9 +9,11 @@ from pydantic import ValidationError
 
 from wakewise.control.guard import check_start
 from wakewise.control.paper_planner import PaperPlanner
-from wakewise.control.plan_problem import PlanSettings, Surroundings, reference_of
+from wakewise.control.plan_problem import PlanSettings
 from wakewise.control.planner import Planner, compile_plan, shifted
 from wakewise.control.receding import quiet_stages
+from wakewise.control.reference import reference_of
+from wakewise.control.surroundings import Surroundings
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_from_euler
 from wakewise.interfaces import Goal
@@ -165,7 +167,7 @@ def test_infeasible_starts_are_refused():
         check_start(VEHICLE, surface, inside, Surroundings())
     low = np.array(good)
     low[2] = 1.45
-    with pytest.raises(InputError, match="plane"):
+    with pytest.raises(InputError, match="the floor"):
         check_start(VEHICLE, REGION, low, AROUND)
     with pytest.raises(InputError, match="sphere"):
         check_start(VEHICLE, REGION, inside, Surroundings(spheres=AROUND.spheres))

@@ -65,6 +65,17 @@ def test_a_floating_vehicle_blows_upwards():
     assert np.all(np.diff(down) <= 1e-9) and down[-1] == pytest.approx(0.0, abs=1e-9)
 
 
+def test_advice_is_of_least_effort_and_never_worse_by_the_wake_model():
+    """No ballast that is as gentle needs less; what the wake model alone would take is at least as gentle."""
+    for pitch in (0.0, 20.0, 40.0):
+        found = advise(orbit(pitch))
+        assert found.best.speed_m_s <= found.now.speed_m_s and found.best.effort_N2 <= found.now.effort_N2
+        assert all(row.effort_N2 >= found.best.effort_N2 for row in found.rows if row.speed_m_s <= found.now.speed_m_s)
+        least = min(row.speed_m_s for row in found.rows)
+        assert found.gentlest.speed_m_s <= 1.25 * least
+        assert "floats did " in found.wake_words
+
+
 @pytest.mark.parametrize(
     ("poses", "unknown", "words"),
     [((), 1.0, "no poses"), (orbit(0.0), -1.0, "unknown_N"), (orbit(0.0), np.nan, "unknown_N")],

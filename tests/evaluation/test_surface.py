@@ -1,5 +1,6 @@
 """Laws of the surface score, on shapes whose distances are known in closed form."""
 
+import dataclasses
 import os
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,7 +10,18 @@ import pytest
 import trimesh
 
 from wakewise.errors import InputError, StageError
-from wakewise.evaluation import Crop, count_views, evaluate_surface, sample_surface, thin
+from wakewise.evaluation import (
+    SURFACE_DEFINITIONS,
+    Crop,
+    SurfaceScore,
+    compare_surface,
+    count_views,
+    error_colours,
+    evaluate_surface,
+    sample_surface,
+    suspicious_scale,
+    thin,
+)
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[3] / "shared" / "data"))
 RADIUS = 0.06
@@ -71,7 +83,9 @@ def test_sand_at_the_foot_does_not_count():
     sand = np.column_stack([rng.uniform(-0.07, 0.07, (50_000, 2)), np.full(50_000, RADIUS - 0.005)])
     cloud = shell(200_000, RADIUS, rng)
     with_sand = evaluate_surface(np.concatenate([cloud, sand]), ball(), crop=crop, icp=False)
-    assert with_sand == evaluate_surface(cloud, ball(), crop=crop, icp=False)
+    clean = evaluate_surface(cloud, ball(), crop=crop, icp=False)
+    assert with_sand.outside_pct > clean.outside_pct + 10.0
+    assert dataclasses.replace(with_sand, outside_pct=clean.outside_pct) == clean
 
 
 def test_icp_takes_out_a_shift_and_reports_it():
@@ -132,3 +146,35 @@ def test_what_cannot_be_scored_is_refused():
         )
     with pytest.raises(InputError, match="above the bed"):
         sample_surface(ball(), Crop(bed_z_m=-1.0), np.random.default_rng(0))
+
+
+def test_a_cloud_of_something_else_is_a_failure_not_a_figure():
+    """Points spread evenly through the truth's box do not lie on its surface: ICP's own check says so."""
+    box = np.random.default_rng(0).uniform(-RADIUS, RADIUS, (5_000, 3))
+    with pytest.raises(StageError, match=r"ICP: .* at least 50 % must"):
+        evaluate_surface(box, ball(), samples=20_000)
+
+
+@pytest.mark.parametrize("factor", [1000.0, 39.37, 0.001])
+def test_a_reference_in_other_units_is_told(factor):
+    """Millimetres or inches taken for metres end as one line with both extents; a factor of three does not."""
+    cloud = shell(2000, RADIUS, np.random.default_rng(0))
+    other = ball(factor * RADIUS)
+    assert suspicious_scale(cloud, ball(3 * RADIUS)) is None
+    with pytest.raises(StageError, match="suspicious scale") as caught:
+        evaluate_surface(cloud, other)
+    assert "metres" in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_each_point_has_its_error_and_its_colour():
+    """Errors of single points are those that the median is of; blue is 0, green half of 3 mm, red 3 mm and more."""
+    found = compare_surface(shell(50_000, RADIUS + 0.0005, np.random.default_rng(0)), ball(), icp=False)
+    assert len(found.points_W_m) == len(found.error_mm) == found.score.cloud_points
+    assert np.median(found.error_mm) == pytest.approx(found.score.accuracy_median_mm)
+    assert np.allclose(error_colours(np.array([0.0, 1.5, 3.0, 9.0])), [[0, 0, 1], [0, 1, 0], [1, 0, 0], [1, 0, 0]])
+
+
+def test_every_figure_is_defined():
+    """Each field of a score has a unit and a definition, and each definition a field."""
+    assert set(SURFACE_DEFINITIONS) == set(SurfaceScore.__dataclass_fields__)
+    assert all(text for _, text in SURFACE_DEFINITIONS.values())

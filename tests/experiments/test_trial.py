@@ -1,21 +1,13 @@
-"""Trials: which photographs are matched, what a folder belongs to."""
+"""Trials: every figure of a model that is handed on is defined."""
 
-import numpy as np
-from hypothesis import given
-from hypothesis import strategies as st
-
-from wakewise.experiments.trial import nearby_pairs
+from wakewise.evaluation import SURFACE_DEFINITIONS, SurfaceScore
+from wakewise.experiments import DEFINITIONS, UNITS
+from wakewise.experiments.trial import _SURFACE_FIGURES
 
 
-@given(st.integers(2, 12), st.integers(0, 1000))
-def test_photographs_are_paired_when_their_axes_are_within_45_degrees(count: int, seed: int) -> None:
-    """Each pair listed is near, each pair not listed is not, and none is listed twice or with itself."""
-    axes = np.random.default_rng(seed).normal(size=(count, 3))
-    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    names = [f"{i}.png" for i in range(count)]
-    pairs = nearby_pairs(names, axes)
-    assert len(set(pairs)) == len(pairs)
-    for i in range(count):
-        for j in range(i + 1, count):
-            angle = np.degrees(np.arccos(np.clip(axes[i] @ axes[j], -1, 1)))
-            assert ((names[i], names[j]) in pairs) == (angle < 45.0)
+def test_every_figure_of_the_surface_is_one_and_is_defined() -> None:
+    """What a trial takes over from the score is a field of it, and has a unit and a definition in both places."""
+    fields = set(SurfaceScore.__dataclass_fields__)
+    assert fields == set(SURFACE_DEFINITIONS)
+    assert set(_SURFACE_FIGURES) <= fields
+    assert set(_SURFACE_FIGURES) <= set(DEFINITIONS) == set(UNITS)

@@ -73,3 +73,17 @@ def test_negative_silt_is_refused():
     """A negative concentration raises InputError."""
     with pytest.raises(InputError, match="silt"):
         take(silt=cloud(-0.1))
+
+
+@pytest.mark.parametrize("lens", [{"distortion": (-0.11, 0.1, 0.0, 0.0)}, {"fov_deg": 75.0, "port_air_m": 0.01}])
+def test_a_lens_takes_the_whole_picture(lens):
+    """Through distortion and port a moving camera in silt takes a picture without holes, and blur shows."""
+    settings = ImagingSettings(width=320, height=240, **lens)
+    middle = view(40, centre=coral_scene()[1].centre_W_m)
+    moving = [middle @ Pose(np.array([x, 0.0, 0.0])) for x in (-0.01, 0.0, 0.01)]
+    still = take([middle], cloud(0.01), settings=settings)
+    moved = take(moving, cloud(0.01), settings=settings)
+    assert moved.sharpness < 0.7 * still.sharpness
+    assert np.abs(moved.image.mean() - still.image.mean()) < 3.0
+    assert still.image.min(axis=2).mean() > 20
+    assert still.turbidity_per_m == pytest.approx(0.01 * SiltOptics().attenuation_m2_kg, rel=1e-3)

@@ -6,21 +6,26 @@ import pytest
 from imaging_helpers import BED_Z, box, box_scene, coral_scene, view
 
 from wakewise.errors import InputError
-from wakewise.imaging import Lights, PinholeCamera, render, texture
-from wakewise.imaging.renderer import _needs_more
+from wakewise.imaging import FlatPort, LensCamera, Lights, PinholeCamera, render, texture
+from wakewise.imaging.shading import needs_more
 
 LIGHTS = Lights(lamps_C_m=np.array([[-0.2, -0.1, 0.0], [0.2, -0.1, 0.0]]))
 CAMERA = PinholeCamera(480, 360, np.deg2rad(90))
 
 
-def test_depth_is_the_distance_to_the_plane():
+LENS = LensCamera(480, 360, np.deg2rad(90), (-0.11, 0.10, 0.0014, 0.0005))
+PORT = LensCamera(480, 360, np.deg2rad(75), port=FlatPort(air_m=0.02))
+
+
+@pytest.mark.parametrize("camera", [CAMERA, LENS, PORT])
+def test_depth_is_the_distance_to_the_plane(camera):
     """On the box's flat top the depth is that of the plane along each pixel's centre ray, within 0.02 mm."""
     X_WC = view(60)
-    seen = render(box_scene(), CAMERA, X_WC, LIGHTS)
+    seen = render(box_scene(), camera, X_WC, LIGHTS)
     pixels = np.stack(np.meshgrid(np.arange(480) + 0.5, np.arange(360) + 0.5), axis=-1).reshape(-1, 2)
-    rays_W = CAMERA.rays(pixels) @ X_WC.R.T
-    depth = (BED_Z - 0.08 - X_WC.p_m[2]) / rays_W[:, 2]
-    hit = X_WC.p_m + depth[:, None] * rays_W
+    near, far = (X_WC.apply(camera.unproject(pixels, np.full(len(pixels), d))) for d in (1.0, 2.0))
+    depth = 1.0 + (BED_Z - 0.08 - near[:, 2]) / (far - near)[:, 2]
+    hit = near + (depth - 1.0)[:, None] * (far - near)
     on_top = (depth > 0) & (np.abs(hit[:, 0]) < 0.0595) & (np.abs(hit[:, 1]) < 0.0495)
     assert on_top.sum() > 1000
     assert np.abs(seen.depth_m.ravel()[on_top] - depth[on_top]).max() < 2e-5
@@ -44,6 +49,32 @@ def test_edges_are_where_the_vertices_project():
                 errors.append(inside - rows[:inside].sum() - top)
     assert len(errors) > 150
     assert abs(np.mean(errors)) < 0.01
+    assert np.sqrt(np.mean(np.square(errors))) < 0.05
+
+
+@pytest.mark.parametrize("camera", [LENS, PORT])
+def test_edges_bend_as_the_lens_bends_them(camera):
+    """Through distortion and through a port the box's upper outline is that of its projected edges, 0.05 px rms."""
+    ends = [(a, b) for a in range(8) for b in range(a + 1, 8) if (a ^ b) in (1, 2, 4)]
+    along = np.linspace(0.0, 1.0, 6001)[:, None]
+    vertices = box().mesh.vertices_m
+    edges_W = np.concatenate([vertices[a] + along * (vertices[b] - vertices[a]) for a, b in ends])
+    errors = []
+    for elevation, azimuth in ((25, 10), (45, 75)):
+        X_WC = view(elevation, azimuth, 0.35)
+        seen = render(box_scene(), camera, X_WC, LIGHTS, samples=8)
+        pixels = camera.project(X_WC.inverse().apply(edges_W))
+        corners = camera.project(X_WC.inverse().apply(vertices))[:, 0]
+        for column in range(int(corners.min()) + 2, int(corners.max()) - 2):
+            if np.abs(corners - column - 0.5).min() < 1.0:
+                continue
+            inside = pixels[(pixels[:, 0] >= column) & (pixels[:, 0] < column + 1)]
+            slots = ((inside[:, 0] - column) * 8).astype(int)
+            top = np.mean([inside[slots == k, 1].min() for k in range(8)])
+            rows = seen.target_fraction[:, column]
+            full = int(np.argmax(rows > 0.999))
+            errors.append(full - rows[:full].sum() - top)
+    assert len(errors) > 60
     assert np.sqrt(np.mean(np.square(errors))) < 0.05
 
 
@@ -151,7 +182,10 @@ def test_where_one_ray_is_not_enough():
     expected = np.zeros((5, 7), bool)
     expected[1:4, 0:3] = True
     expected[:, 4:6] = True
-    assert np.array_equal(_needs_more(kind, depth), expected)
+    found = np.ones((5, 7), bool)
+    for first, last in ((0, 2), (2, 5)):  # bands look across their borders
+        needs_more(kind, depth, first, last, found)
+    assert np.array_equal(found, expected)
 
 
 def test_threads_do_not_change_a_byte():

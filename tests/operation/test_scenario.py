@@ -31,6 +31,23 @@ def test_overrides_lie_over_files_and_files_over_presets(tmp_path: Path) -> None
     assert scenario.mission.views == (20, 16, 12)
 
 
+def test_a_kind_of_water_replaces_what_lies_below_and_yields_to_what_lies_beside_and_above(tmp_path: Path) -> None:
+    """Over a scenario that spells out silt and grains, --set tank.water sets them anew, unless they are set, too."""
+    path = tmp_path / "scenario.yaml"
+    path.write_text(dump_scenario(load_scenario("quick", None, {"tank.water": "caco3-50mg"})))
+    assert load_scenario(None, path, {}).tank.grain_m == 3e-4
+    clear = load_scenario(None, path, {"tank.water": "clear"}).tank
+    assert (clear.silt, clear.suspended_mg_l) == (0.0, 0.0)
+    silty = load_scenario(None, path, {"tank.water": "silt"}).tank
+    assert (silty.silt, silty.suspended_mg_l, silty.grain_m) == (0.1, 0.0, 20e-6)
+    for changes in ({"tank.silt": 0.4, "tank.water": "silt"}, {"tank.water": "silt", "tank.silt": 0.4}):
+        assert load_scenario(None, path, changes).tank.silt == 0.4
+    assert load_scenario(None, path, {"tank.silt": 0.3}).tank.suspended_mg_l == 50.0
+    path.write_text("tank: {water: clear, silt: 0.2}\n")
+    assert load_scenario(None, path, {}).tank.silt == 0.2
+    assert load_scenario(None, path, {"tank": {"water": "caco3-50mg"}}).tank.silt == 0.0
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [

@@ -1,14 +1,14 @@
 """Points and stamps survive the disk, and damage is noticed."""
 
+import errno
+
 import numpy as np
 import pytest
 
 from wakewise.errors import InputError, StageError
 from wakewise.reconstruction import Cloud, read_cloud, write_cloud, write_mesh
 from wakewise.reconstruction.colmap import call, no_stderr
-from wakewise.reconstruction.features import default_pairs
-from wakewise.reconstruction.settings import ReconstructionSettings
-from wakewise.reconstruction.stages import fingerprint, run_stage
+from wakewise.reconstruction.stages import fingerprint, need_room, run_stage
 
 
 def test_cloud_comes_back(tmp_path):
@@ -77,20 +77,31 @@ def test_failed_stage_leaves_no_stamp(tmp_path):
     assert not run_stage(tmp_path, "s", "a", (product,), dict).skipped
 
 
+def test_a_full_disk_is_told_and_what_was_done_before_is_kept(tmp_path):
+    """A write that finds no room ends as one line that names the folder; the stage before keeps its stamp."""
+    run_stage(tmp_path, "first", "a", (), dict)
+
+    def fill():
+        raise OSError(errno.ENOSPC, "No space left on device", str(tmp_path / "x"))
+
+    with pytest.raises(StageError, match=r"second: the disk of .* is full; the stages before it are kept") as caught:
+        run_stage(tmp_path, "second", "b", (), fill)
+    assert "\n" not in str(caught.value)
+    assert run_stage(tmp_path, "first", "a", (), dict).skipped
+    assert not (tmp_path / "stages" / "second.json").exists()
+
+
+def test_a_stage_that_could_not_bear_a_full_disk_is_not_begun(tmp_path):
+    """More than there is on any disk is refused with what is left and what is needed; little is let pass."""
+    need_room(tmp_path, 1.0, "match")
+    with pytest.raises(StageError, match=r"match: the disk of .* is full, .* MB are left"):
+        need_room(tmp_path, 1e18, "match")
+
+
 def test_fingerprint_tells_inputs_apart():
     """Order of keys does not matter, values do."""
     assert fingerprint({"a": 1, "b": 2}) == fingerprint({"b": 2, "a": 1})
     assert fingerprint({"a": 1}) != fingerprint({"a": 2})
-
-
-def test_small_sets_match_all_pairs_large_ones_neighbours():
-    """80 photos make 3160 pairs; 200 make far fewer, with no pair twice and everyone within reach of the next."""
-    settings = ReconstructionSettings()
-    assert len(default_pairs([f"{k}" for k in range(80)], settings)) == 80 * 79 // 2
-    names = [f"{k:03d}" for k in range(200)]
-    pairs = default_pairs(names, settings)
-    assert len(set(pairs)) == len(pairs) < 200 * 15
-    assert ("000", "010") in pairs and ("000", "128") in pairs and ("000", "050") not in pairs
 
 
 def test_a_failing_call_is_a_stage_error_in_one_line():

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from wakewise.errors import InputError
 from wakewise.reconstruction import match_references, read_photos, read_reference_cameras
-from wakewise.reconstruction.photos import decode
+from wakewise.reconstruction.photos import decode, jpeg_is_whole, without_duplicates
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[3] / "shared" / "data"))
 
@@ -40,7 +40,7 @@ def test_what_is_no_folder_of_photos_is_named(tmp_path, what, capfd):
         "file": "is a file",
         "empty": "is empty",
         "none": "notes.txt is none",
-        "few": "holds 2 photos, at least 3",
+        "few": "holds 1 photos, at least 2",
         "broken": "b.png: is no image",
         "cut": "b.png: is no image",
     }[what]
@@ -51,7 +51,7 @@ def test_what_is_no_folder_of_photos_is_named(tmp_path, what, capfd):
     if what == "none":
         (folder / "notes.txt").write_text("x")
     if what == "few":
-        put(folder, "a.png", "b.png")
+        put(folder, "a.png")
     if what in ("broken", "cut"):
         put(folder, "a.png", "b.png", "c.png")
         whole = (folder / "b.png").read_bytes()
@@ -62,12 +62,47 @@ def test_what_is_no_folder_of_photos_is_named(tmp_path, what, capfd):
     assert capfd.readouterr().err == ""
 
 
+def test_a_jpeg_cut_short_is_told_and_one_with_a_tail_is_not(tmp_path):
+    """Any cut that loses the end marker is seen, whatever decoders make of it; bytes after the end do no harm."""
+    rng = np.random.default_rng(0)
+    picture = rng.integers(0, 255, (40, 60, 3), dtype=np.uint8)
+    for progressive in (0, 1):
+        data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_PROGRESSIVE, progressive])[1].tobytes()
+        assert jpeg_is_whole(data)
+        assert jpeg_is_whole(data + b"maker's own")
+        assert not any(jpeg_is_whole(data[:n]) for n in range(2, len(data) - 1))
+    put(tmp_path, "a.jpg", "c.jpg")
+    (tmp_path / "b.jpg").write_bytes(data[: len(data) // 2])
+    with pytest.raises(InputError, match=r"b\.jpg: is cut short"):
+        read_photos(tmp_path)
+
+
+def test_a_wrong_suffix_is_told_with_the_right_one(tmp_path):
+    """A PNG called .jpg is named with what it should be called."""
+    put(tmp_path, "a.png", "b.png")
+    (tmp_path / "b.png").rename(tmp_path / "b.jpg")
+    with pytest.raises(InputError, match=r"b\.jpg: holds a PNG image, so its name must end in \.png"):
+        read_photos(tmp_path)
+
+
+def test_copies_of_a_photo_are_left_out(tmp_path):
+    """Of photos with the same bytes the first stays; copies alone are refused."""
+    put(tmp_path, "a.png", "b.png")
+    cv2.imwrite(str(tmp_path / "c.png"), np.zeros((20, 30, 3), np.uint8))
+    kept, copies = without_duplicates(read_photos(tmp_path))
+    assert [photo.name for photo in kept] == ["a.png", "c.png"] and copies == 1
+    (tmp_path / "c.png").unlink()
+    with pytest.raises(InputError, match=r"all 2 are copies of a\.png"):
+        without_duplicates(read_photos(tmp_path))
+
+
 @settings(max_examples=60, deadline=None)
 @given(st.binary(max_size=200))
 def test_no_bytes_crash_the_decoder(data):
     """Any bytes are an image or None."""
     image = decode(data)
     assert image is None or (image.ndim == 3 and image.dtype == np.uint8)
+    assert jpeg_is_whole(b"\xff\xd8" + data) in (True, False)
 
 
 def test_csv_of_cameras(tmp_path):

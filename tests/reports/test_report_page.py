@@ -61,8 +61,8 @@ def test_the_page_holds_every_figure_with_its_definition_or_reason(made_up: Path
 
 
 def test_every_photograph_is_inside_and_two_are_marked(report_text: str) -> None:
-    """All photographs are embedded as JPEGs; exactly one is the sharpest and one the least sharp."""
-    assert report_text.count("data:image/jpeg;base64,") == 14
+    """All photographs are embedded as JPEGs, three of them again in pairs; one is the sharpest, one the least sharp."""
+    assert report_text.count("data:image/jpeg;base64,") == 14 + 2 * 3
     assert report_text.count('<span class="tag">sharpest') == report_text.count('<span class="tag worst">') == 1
 
 

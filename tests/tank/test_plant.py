@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from wakewise.errors import InputError
-from wakewise.geometry import Pose
+from wakewise.geometry import Pose, matrix_from_quat
 from wakewise.interfaces import BodyState
 from wakewise.tank import VehiclePlant
 from wakewise.tank.currents import AmbientSum, SteadyCurrent
-from wakewise.vehicles import load_vehicle, perturbed
+from wakewise.vehicles import compile_body, load_vehicle, perturbed, saturate, step_rk4, thruster_lag
 
 VEHICLE = load_vehicle("paper")
 SIZE_M = (6.0, 5.0, 1.5)
@@ -57,6 +57,36 @@ def test_true_gains_make_true_thrust():
         plant.step(np.full(8, 0.5), 0.02)
     assert plant.thrusts_N == pytest.approx(0.5 * own.thrust_gains, rel=1e-6)
     assert np.ptp(plant.thrusts_N) > 0.01
+
+
+def test_a_compiled_step_is_its_readable_twin():
+    """Clipped commands, the exact lag, gains, the mean of both ends, and Runge-Kutta with the public functions."""
+    rng = np.random.default_rng(3)
+    own = perturbed(VEHICLE, rng, mass_pct=5, damping_pct=30, added_mass_pct=20, thrust_pct=5, trim_N=0.5)
+    current = np.array([0.03, 0.02, 0.0])
+    plant = _plant(p=(-1.5, 0.2, 0.7), vehicle=own, current=current, nu=(0.1, -0.05, 0.02, 0.1, 0.0, 0.2))
+    body, motors, impulse = compile_body(own), np.zeros(8), np.zeros((8, 2))
+    p, q, nu = plant.state.X_WB.p_m, plant.state.X_WB.q, plant.state.nu_B
+    for dt in (0.005, 0.003, 0.01, 0.02):
+        commands = rng.normal(size=8) * 2.0
+        commands[0] = 1e4
+        plant.step(commands, dt)
+        before = motors
+        motors = thruster_lag(
+            before, saturate(commands, own.thrust_lower_N, own.thrust_upper_N), own.time_constants_s, dt
+        )
+        thrusts = own.thrust_gains * 0.5 * (before + motors)
+        impulse += dt * np.stack([np.maximum(thrusts, 0.0), np.maximum(-thrusts, 0.0)], axis=1)
+        v_W = matrix_from_quat(q) @ nu[:3]
+        p, q, nu = step_rk4(body, p, q, nu, own.allocation_matrix @ thrusts, current, dt)
+        R = matrix_from_quat(q)
+        np.testing.assert_allclose(plant.state.X_WB.p_m, p, atol=1e-12)
+        np.testing.assert_allclose(plant.state.X_WB.q, q, atol=1e-12)
+        np.testing.assert_allclose(plant.state.nu_B, nu, atol=1e-12)
+        np.testing.assert_allclose(plant.thrusts_N, own.thrust_gains * motors, atol=1e-12)
+        felt = R.T @ ((R @ nu[:3] - v_W) / dt - [0.0, 0.0, 9.80665])
+        np.testing.assert_allclose(plant.force_B_m_s2, felt, atol=1e-8)
+    np.testing.assert_allclose(plant.take_impulse_N_s(), impulse, atol=1e-12)
 
 
 def test_jets_leave_from_the_disks_of_the_moved_vehicle():

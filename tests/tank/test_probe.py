@@ -168,3 +168,23 @@ def test_no_text_breaks_the_reader(tmp_path, text):
             read(path)
         except InputError as fault:
             assert "\n" not in str(fault)
+
+
+def test_a_hull_in_the_floor_is_refused():
+    """Though all its thrusters are above the floor; and so is a floor that is no number."""
+    points = np.array([[0.5, 0.0, 0.5]])
+    with pytest.raises(InputError, match=r"hull of paper reaches down to z = 1\.040 m, the floor is at 1 m"):
+        probe(VEHICLE, Pose(np.array([0.0, 0.0, 0.9])), _one(4, 1.0), points, floor_z_m=1.0)
+    with pytest.raises(InputError, match="floor: nan m"):
+        probe(VEHICLE, AT_REST, _one(4, 1.0), points, floor_z_m=float("nan"))
+
+
+def test_what_a_table_lacks_is_named(tmp_path):
+    """A column too few is named, and so are semicolons."""
+    path = tmp_path / "T.csv"
+    path.write_text("time_s," + NAMES.removesuffix(",thrust_8_N") + "\n")
+    with pytest.raises(InputError, match="7 thrust columns, paper has 8 thrusters, no column thrust_8_N"):
+        read_thrusts(path, VEHICLE)
+    path.write_text("time_s;thrust_1_N\n0;1\n")
+    with pytest.raises(InputError, match="semicolons, commas are needed"):
+        read_thrusts(path, VEHICLE)

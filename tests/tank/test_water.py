@@ -10,6 +10,7 @@ import math
 import numpy as np
 import pytest
 
+from wakewise.tank import chunks
 from wakewise.tank.closure import travel
 from wakewise.tank.grains import friction_velocity_m_s
 from wakewise.tank.parcels import Parcels, merged
@@ -221,6 +222,24 @@ def test_the_same_seed_gives_the_same_bytes():
         water = _run(_water(seed=seed, turbulence=0.25, bed_z_m=1.5), 4.0, [1.0], jets=[[0, 0, 1]])
         fields.append(water.velocity(np.random.default_rng(0).uniform(0, 1.4, (50, 3))).tobytes())
     assert fields[0] == fields[1] != fields[2]
+
+
+def test_threads_do_not_change_a_byte(monkeypatch):
+    """Free jets and wall jets together give the same velocities on one thread and on four."""
+    water = _run(
+        _water(2, turbulence=0.25, bed_z_m=1.5, half_size_m=(1.0, 1.0)),
+        10.0,
+        [1.0, 0.7],
+        origins=[[0, 0, 1.0], [0.3, 0.2, 0.7]],
+        jets=[[0.3, 0.1, 0.95], [-0.6, 0.0, 0.8]],
+    )
+    points = np.random.default_rng(2).uniform([-0.9, -0.9, 0.4], [0.9, 0.9, 1.5], (1501, 3))
+    monkeypatch.setattr(chunks, "_THREADED_PAIRS", 10**12)
+    alone = water.velocity(points)
+    monkeypatch.setattr(chunks, "_THREADED_PAIRS", 1)
+    monkeypatch.setattr("os.cpu_count", lambda: 4)
+    assert water.velocity(points).tobytes() == alone.tobytes()
+    assert water.rings.count > 0
 
 
 def test_travel_is_the_integral_of_the_closure():

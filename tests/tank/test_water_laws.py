@@ -169,10 +169,13 @@ def test_swirl_makes_a_jet_wide_and_keeps_its_momentum():
     water = _push(_water(spreading=SWIRLING), 12.0, [1.0])
     x = 0.6
     r = np.linspace(0, 0.6 * x, 300)
-    u = water.velocity(np.column_stack([np.full(300, x), r, 0 * r]))[:, 0]
+    points = np.column_stack([np.full(300, x), r, 0 * r])
+    instants = [_push(water, 0.1, [1.0]).velocity(points)[:, 0] for _ in range(20)]
+    u = np.mean(instants, axis=0)
     sigma = D_M / 2 + 0.15 * (x - 2.6 * D_M)
     assert np.interp(-0.5 * u[0], -u, r) == pytest.approx(sigma * math.sqrt(2 * math.log(2)), rel=0.10)
-    assert np.trapezoid(DENSITY * u**2 * 2 * np.pi * r, r) == pytest.approx(1.0, rel=0.10)
+    flux = np.mean([np.trapezoid(DENSITY * v**2 * 2 * np.pi * r, r) for v in instants])
+    assert flux == pytest.approx(1.0, rel=0.10)
 
 
 def test_nothing_flows_through_walls_and_surface():
@@ -206,8 +209,8 @@ def test_away_from_the_tail_cuts_nothing_is_created():
 def test_cost_stays_bounded_over_ten_minutes():
     """Two thrusters that turn and push for ten minutes: parcels and rings level off.
 
-    Minutes 8 to 10 have at most 10 % more of them than 6 to 8. Measured: 474 after 4 minutes, 567 after 7, 641 at
-    most; growth slows and has not quite ended.
+    Minutes 8 to 10 have at most 10 % more of them than 6 to 8. Measured: 451 after 4 minutes, 498 after 7, 545 at
+    most.
     """
     water = _water(2, bed_z_m=1.5, half_size_m=(3.0, 2.5), turbulence=0.25)
     rng = np.random.default_rng(0)

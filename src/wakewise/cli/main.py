@@ -8,7 +8,23 @@ from collections.abc import Sequence
 import typer
 
 from wakewise import __version__
-from wakewise.cli import allocate, bench, compare, evaluate, reconstruct, scan, tank, target, vehicle, wake
+from wakewise.cli import (
+    allocate,
+    bench,
+    calibrate,
+    colour,
+    compare,
+    degrade,
+    evaluate,
+    film,
+    nerf,
+    reconstruct,
+    scan,
+    tank,
+    target,
+    vehicle,
+    wake,
+)
 from wakewise.errors import InputError, WakewiseError
 
 app = typer.Typer(
@@ -23,6 +39,11 @@ app.command("scan")(scan.scan)
 app.command("compare")(compare.compare)
 app.command("reconstruct")(reconstruct.reconstruct_photos)
 app.command("evaluate")(evaluate.evaluate)
+app.command("calibrate")(calibrate.calibrate)
+app.command("degrade")(degrade.degrade)
+app.command("film")(film.film)
+app.command("colour")(colour.colour)
+app.command("nerf")(nerf.nerf)
 app.command("allocate")(allocate.allocate)
 app.command("bench")(bench.bench)
 app.add_typer(vehicle.app, name="vehicle")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -23,6 +24,16 @@ References = Annotated[
 Focal = Annotated[
     float | None, typer.Option("--focal-px", help="Focal length in pixels; from EXIF if not given.", show_default=False)
 ]
+Sets = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="FIELD=VALUE", help="Change one setting of the reconstruction, such as "
+                 "matching=sequential (docs/scenario.md lists them); may be repeated."),
+]  # fmt: skip
+Region = Annotated[
+    tuple[float, float, float, float] | None,
+    typer.Option("--region", metavar="X Y Z R", help="Dense points only within R of this place, m, in the references' "
+                 "frame.", show_default=False),
+]  # fmt: skip
 NoMesh = Annotated[bool, typer.Option("--no-mesh", help="Stop at the dense cloud.")]
 
 
@@ -31,6 +42,8 @@ def reconstruct_photos(
     out: Out = Path("runs/photos"),
     reference_cameras: References = None,
     focal_px: Focal = None,
+    region: Region = None,
+    sets: Sets = None,
     no_mesh: NoMesh = False,
     json: Json = False,
 ) -> None:
@@ -38,13 +51,39 @@ def reconstruct_photos(
 
     Stages that are done are skipped. Without reference cameras the model has no scale.
     """
-    from wakewise.reconstruction import ReconstructionSettings, read_reference_cameras, reconstruct
+    import numpy as np
 
+    from wakewise.operation.scenario import check_scenario, parse_overrides
+    from wakewise.reconstruction import read_reference_cameras, reconstruct
+
+    changes = ({"mesh": False} if no_mesh else {}) | parse_overrides(sets or [])
+    settings = check_scenario({"reconstruction": changes}, "--set").reconstruction
     references = read_reference_cameras(reference_cameras) if reference_cameras else None
-    settings = ReconstructionSettings(mesh=not no_mesh)
     with Bars().stage("reconstruct") as progress:
-        model = reconstruct(photos, out, settings, focal_px=focal_px, reference_positions=references, progress=progress)
+        model = reconstruct(
+            photos,
+            out,
+            settings,
+            focal_px=focal_px,
+            reference_positions=references,
+            region=(np.array(region[:3]), region[3]) if region else None,
+            progress=progress,
+        )
     figures = model.summary()
+    if settings.mesh:
+        from wakewise.errors import StageError
+        from wakewise.experiments.textured import write_textured
+
+        with Bars().stage("colours") as progress, suppress(StageError):
+            write_textured(out, photos, out / "mesh.glb", progress=progress)
+    if model.duplicates:
+        typer.echo(f"wakewise: {model.duplicates} photos are copies of others and were left out", err=True)
+    if model.registered_images < model.images:
+        left = model.images - model.registered_images
+        typer.echo(f"wakewise: {left} of {model.images} photos found no place: they show something else or too little",
+                   err=True)  # fmt: skip
+    if model.suspicion is not None:
+        typer.echo(f"wakewise: {model.suspicion}", err=True)
     if json:
         print_json(figures)
         return

@@ -20,7 +20,8 @@ ScenarioFile = Annotated[
 def trim(vehicle: Vehicle = "paper", scenario: ScenarioFile = None, json: Json = False) -> None:
     """Advise on ballast: D and thrust of holding a mission's poses by net buoyancy and centre of gravity.
 
-    Bed points and the floor's wall jets count, since that is where jets that go down end up.
+    Advised is the least effort that is not worse by D, which is what the simulated tank bears out; the least D by the
+    wake model, bed points and wall jets included, is told beside it.
     """
     import numpy as np
 
@@ -49,6 +50,7 @@ def trim(vehicle: Vehicle = "paper", scenario: ScenarioFile = None, json: Json =
                 "rows": [asdict(row) for row in advice.rows],
                 "now": asdict(advice.now),
                 "best": asdict(advice.best),
+                "gentlest": asdict(advice.gentlest),
                 "advice": advice.words,
             }
         )
@@ -71,4 +73,4 @@ def trim(vehicle: Vehicle = "paper", scenario: ScenarioFile = None, json: Json =
         table.add_row(f"{float_N:+.1f}", *cells, f"{np.mean([row.down_N for row in rows]):.2f}")
     print_table(table)
     typer.echo(f"advice: {advice.words}")
-    typer.echo("in the simulated tank the centre of gravity's part held, the float's did not (docs/decisions/0013)")
+    typer.echo(advice.wake_words)

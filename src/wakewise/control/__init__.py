@@ -28,10 +28,11 @@ from wakewise.control.baselines import (
     smooth,
     unaware,
 )
+from wakewise.control.guard import check_start
 from wakewise.control.levers import LeverSettings, watched
 from wakewise.control.loop import ControllerState, TrackingController
 from wakewise.control.paper_planner import PaperPlanner
-from wakewise.control.plan_problem import Horizon, PlanProblem, PlanSettings, Surroundings
+from wakewise.control.plan_problem import Horizon, PlanProblem, PlanSettings, state_of
 from wakewise.control.planner import Planner, compile_plan
 from wakewise.control.receding import PlanningController, planning_controller
 from wakewise.control.settings import ControlSettings
@@ -45,6 +46,7 @@ from wakewise.control.stability import (
     vehicle_axes,
     wished_gains,
 )
+from wakewise.control.surroundings import Surroundings, covering_spheres
 from wakewise.control.tracker import Tracker, TrackerState, make_tracker
 from wakewise.control.view import WakeView
 from wakewise.control.wake_aware import vehicle_layout, wake_aware
@@ -54,15 +56,23 @@ from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
 
 
-def _planner(vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings) -> PlanningController:
-    return planning_controller(vehicle, region, wake, settings, settings.plan)
+def _planner(
+    vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings, around: Surroundings | None
+) -> PlanningController:
+    return planning_controller(vehicle, region, wake, settings, settings.plan, surroundings=around)
 
 
-def _paper_planner(vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings) -> PlanningController:
-    return planning_controller(vehicle, region, wake, settings, name="planner-paper", solver=PaperPlanner)
+def _paper_planner(
+    vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings, around: Surroundings | None
+) -> PlanningController:
+    return planning_controller(
+        vehicle, region, wake, settings, settings.plan, name="planner-paper", solver=PaperPlanner, surroundings=around
+    )
 
 
-_MAKERS: dict[str, Callable[[Vehicle, Region, WakeModel, ControlSettings], Controller[Any]]] = {
+Maker = Callable[[Vehicle, Region, WakeModel, ControlSettings, Surroundings | None], Controller[Any]]
+
+_MAKERS: dict[str, Maker] = {
     "dp": dynamic_positioning,
     "pseudo-inverse": planned_pseudo_inverse,
     "unaware": unaware,
@@ -79,9 +89,16 @@ METHODS: tuple[str, ...] = tuple(_MAKERS)
 
 
 def make_controller(
-    method: str, vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings | None = None
+    method: str,
+    vehicle: Vehicle,
+    region: Region,
+    wake: WakeModel,
+    settings: ControlSettings | None = None,
+    surroundings: Surroundings | None = None,
 ) -> Controller[Any]:
     """Controller of that name for a nominal vehicle, a region to spare and a wake model.
+
+    The methods that plan keep clear of `surroundings`; without them, of the sphere round the region's surface alone.
 
     Raises
     ------
@@ -90,7 +107,7 @@ def make_controller(
     """
     if method not in _MAKERS:
         raise InputError(f"method '{method}': unknown, allowed: {', '.join(METHODS)}")
-    return _MAKERS[method](vehicle, region, wake, settings or ControlSettings())
+    return _MAKERS[method](vehicle, region, wake, settings or ControlSettings(), surroundings)
 
 
 __all__ = [
@@ -115,8 +132,10 @@ __all__ = [
     "TrackingController",
     "WakeView",
     "Weights",
+    "check_start",
     "compile_layout",
     "compile_plan",
+    "covering_spheres",
     "disturbance_of",
     "dynamic_positioning",
     "gentle_allocation",
@@ -133,6 +152,7 @@ __all__ = [
     "pseudo_inverse",
     "smooth",
     "stable_gain_scale",
+    "state_of",
     "unaware",
     "vehicle_axes",
     "vehicle_layout",

@@ -114,3 +114,14 @@ def add_barrier(  # type: ignore[no-untyped-def]
                 for c in range(6):
                     hessian[r, c] += weight * second * slope[r] * slope[c]
     return total, closest
+
+
+@njit(cache=True, error_model="numpy")
+def least_gap(p: Array, R: Array, half: Array, planes: Array, spheres: Array) -> float:
+    """Least clearance to planes and spheres; infinite where there are none."""
+    closest, slope = np.inf, np.empty(6)
+    for i in range(planes.shape[0]):
+        closest = min(closest, plane_gap(p, R, half, planes[i], slope))
+    for i in range(spheres.shape[0]):
+        closest = min(closest, sphere_gap(p, R, half, spheres[i], slope))
+    return closest

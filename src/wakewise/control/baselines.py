@@ -19,11 +19,12 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.control.allocation import Allocation, Layout, least_thrusts
-from wakewise.control.levers import Early, watched
+from wakewise.control.levers import Early, levelled, watched
 from wakewise.control.loop import TrackingController
-from wakewise.control.plan_problem import PlanSettings
 from wakewise.control.receding import planning_controller
 from wakewise.control.settings import ControlSettings
+from wakewise.control.spare import meeting_view, respared
+from wakewise.control.surroundings import Surroundings
 from wakewise.control.tracker import make_tracker
 from wakewise.control.view import WakeView
 from wakewise.control.wake_aware import vehicle_layout, wake_aware
@@ -38,7 +39,11 @@ stage; filtering over the horizon of 2 s asks for w_change / (w_effort h) = (2 s
 
 
 def dynamic_positioning(
-    vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings
+    vehicle: Vehicle,
+    region: Region,
+    wake: WakeModel,
+    settings: ControlSettings,
+    around: Surroundings | None = None,  # noqa: ARG001
 ) -> TrackingController:
     """`dp`: the tracker with the least thrusts; the wake model is only asked what D they cause."""
     layout = vehicle_layout(vehicle)
@@ -55,36 +60,68 @@ def dynamic_positioning(
     )
 
 
-def instant(vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings) -> TrackingController:
+def instant(
+    vehicle: Vehicle,
+    region: Region,
+    wake: WakeModel,
+    settings: ControlSettings,
+    around: Surroundings | None = None,  # noqa: ARG001
+) -> Controller[Any]:
     """`instant`: the tracker, and the gentlest thrusts for its wrench, one instant at a time."""
     levers = settings.levers
     chosen = settings
     if levers.incoherent:
         chosen = settings.model_copy(update={"wake": settings.wake.model_copy(update={"sum": "incoherent"})})
-    return replace(wake_aware(vehicle, watched(region, levers, _bed_of(wake)), wake, chosen), name="instant")
+    controller = wake_aware(vehicle, watched(region, levers, _bed_of(wake)), wake, chosen)
+    view = meeting_view(controller.view, vehicle_layout(vehicle)) if levers.meet else controller.view
+    return levelled(replace(controller, name="instant", view=view), levers)
 
 
-def planned(vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings) -> Controller[Any]:
+def planned(
+    vehicle: Vehicle,
+    region: Region,
+    wake: WakeModel,
+    settings: ControlSettings,
+    around: Surroundings | None = None,
+) -> Controller[Any]:
     """`wake-aware`: the receding-horizon planner with the levers of the settings."""
-    return _planned("wake-aware", vehicle, region, wake, settings, settings.plan)
+    return _planned("wake-aware", vehicle, region, wake, settings, around)
 
 
-def linear(vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings) -> Controller[Any]:  # noqa: ARG001
+def linear(
+    vehicle: Vehicle,
+    region: Region,
+    wake: WakeModel,  # noqa: ARG001
+    settings: ControlSettings,
+    around: Surroundings | None = None,
+) -> Controller[Any]:
     """`linear`: as `wake-aware`, believing in the `linear` wake model, whatever the settings say."""
-    return _planned("linear", vehicle, region, wake_model("linear"), settings, settings.plan)
+    return _planned("linear", vehicle, region, wake_model("linear"), settings, around)
 
 
-def unaware(vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings) -> Controller[Any]:
+def unaware(
+    vehicle: Vehicle,
+    region: Region,
+    wake: WakeModel,
+    settings: ControlSettings,
+    around: Surroundings | None = None,
+) -> Controller[Any]:
     """`unaware`: the planner without a disturbance term."""
     plan = settings.plan.model_copy(update={"w_disturbance": 0.0})
-    return planning_controller(vehicle, region, _free(wake), settings, plan, name="unaware")
+    return planning_controller(vehicle, region, _free(wake), settings, plan, name="unaware", surroundings=around)
 
 
-def smooth(vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings) -> Controller[Any]:
+def smooth(
+    vehicle: Vehicle,
+    region: Region,
+    wake: WakeModel,
+    settings: ControlSettings,
+    around: Surroundings | None = None,
+) -> Controller[Any]:
     """`smooth`: the planner without a disturbance term and with a price on change of thrust."""
     change = max(settings.plan.w_change, W_CHANGE_PER_N2)
     plan = settings.plan.model_copy(update={"w_disturbance": 0.0, "w_change": change})
-    return planning_controller(vehicle, region, _free(wake), settings, plan, name="smooth")
+    return planning_controller(vehicle, region, _free(wake), settings, plan, name="smooth", surroundings=around)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -110,37 +147,55 @@ class LeastThrusts:
 
 
 def planned_pseudo_inverse(
-    vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings
+    vehicle: Vehicle,
+    region: Region,
+    wake: WakeModel,
+    settings: ControlSettings,
+    around: Surroundings | None = None,
 ) -> Controller[Any]:
     """`pseudo-inverse`: the wrenches of `wake-aware`, levers included, made with the least thrusts."""
     return LeastThrusts(
         name="pseudo-inverse",
-        inner=planned(vehicle, region, wake, settings),
+        inner=planned(vehicle, region, wake, settings, around),
         layout=vehicle_layout(vehicle),
         view=WakeView.of(vehicle, region, wake, settings.wake.sum),
     )
 
 
 def _planned(
-    name: str, vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings, plan: PlanSettings
+    name: str,
+    vehicle: Vehicle,
+    region: Region,
+    wake: WakeModel,
+    settings: ControlSettings,
+    around: Surroundings | None,
 ) -> Controller[Any]:
-    levers = settings.levers
+    levers, plan = settings.levers, settings.plan
     changes: dict[str, Any] = {}
-    if levers.incoherent or settings.wake.sum == "incoherent":
+    # Wall jets that cancel on paper give the coherent sum many minima within 2 % of one another, and plans jump between
+    # them (docs/decisions/0014); the sum of squares is convex, and plans stay.
+    floor_in_plan = isinstance(wake, FloorJet) and not levers.spare
+    if levers.incoherent or settings.wake.sum == "incoherent" or floor_in_plan:
         changes["superposition"] = "incoherent"
     if levers.tilt_deg > 0.0:
         changes["attitude_tolerance_rad"] = float(np.radians(levers.tilt_deg))
     if levers.quiet:
         changes |= {"quiet_gain": levers.quiet_gain, "exposure_s": plan.exposure_s + levers.quiet_lead_s}
+    seen = watched(region, levers, _bed_of(wake))
     controller: Controller[Any] = planning_controller(
         vehicle,
-        watched(region, levers, _bed_of(wake)),
-        wake,
+        seen,
+        _free(wake) if levers.spare else wake,
         settings,
         plan.model_copy(update=changes),
         name=name,
+        surroundings=around,
     )
-    return Early(inner=controller, lead_s=levers.quiet_lead_s) if levers.quiet else controller
+    if levers.quiet:
+        controller = Early(inner=controller, lead_s=levers.quiet_lead_s)
+    if levers.spare:
+        controller = respared(controller, vehicle, seen, wake, settings)
+    return levelled(controller, levers)
 
 
 def _bed_of(wake: WakeModel) -> float | None:

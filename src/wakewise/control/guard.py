@@ -14,8 +14,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.control.plan_problem import Horizon, PlanProblem, Surroundings
-from wakewise.control.planner import PlanModel, Planner, shifted
+from wakewise.control.plan_problem import Horizon, PlanProblem
+from wakewise.control.planner import Planner, holding_thrusts, shifted
+from wakewise.control.surroundings import Surroundings
 from wakewise.errors import InputError, WakewiseError
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
@@ -111,21 +112,17 @@ class Guard:
         return None
 
 
-def holding_thrusts(model: PlanModel, problem: PlanProblem) -> Array:
-    """Least thrusts, shape (n,), that carry the load where the vehicle is: a first guess for every stage."""
-    q = problem.state[3:7]
-    t = 2.0 * np.cross(-q[1:], problem.force_W_N)
-    force_B = problem.force_W_N + q[0] * t + np.cross(-q[1:], t)
-    wanted = -np.concatenate([force_B, problem.moment_B_Nm])
-    return np.asarray(np.clip(model.layout.inverse @ wanted, model.table.lower, model.table.upper))
-
-
 def check_start(
-    vehicle: Vehicle, region: Region, state: Array, surroundings: Surroundings, clearance_m: float = 0.0
+    vehicle: Vehicle,
+    region: Region,
+    state: Array,
+    surroundings: Surroundings,
+    clearance_m: float = 0.0,
+    what: str = "start",
 ) -> None:
     """Refuse a start from which no plan can be good, before the loop begins.
 
-    `state` is position, quaternion, twist, shape (13,).
+    `state` is position, quaternion, twist, shape (13,); `what` it is called in the message.
 
     Raises
     ------
@@ -138,7 +135,7 @@ def check_start(
 
     x = np.array(state, dtype=np.float64)
     if x.shape != (13,) or not np.isfinite(x).all():
-        raise InputError("start: must be 13 finite numbers (position, quaternion, twist)")
+        raise InputError(f"{what}: must be 13 finite numbers (position, quaternion, twist)")
     if len(region.points_W_m) == 0:
         raise InputError("region: no points, the target is empty")
     if np.any(region.weights < 0.0) or not np.sum(region.weights) > 0.0:
@@ -148,13 +145,14 @@ def check_start(
     half = 0.5 * np.array(vehicle.size_m)
     inside = np.all(np.abs((region.points_W_m - x[:3]) @ R) < half, axis=1) & (region.distance_m == 0.0)
     if np.any(inside):
-        raise InputError(f"start: {int(inside.sum())} points of the target lie inside the vehicle, it must be outside")
+        raise InputError(f"{what}: {int(inside.sum())} points of the target lie inside the vehicle, it must be outside")
     slope = np.empty(6)
-    for what, gap, rows in (("plane", plane_gap, surroundings.planes), ("sphere", sphere_gap, surroundings.spheres)):
-        for number, row in enumerate(rows):
-            clear = gap(x[:3], R, half, np.array(row), slope)
-            if clear < clearance_m:
-                raise InputError(
-                    f"start: {clear:.3f} m clear of {what} {number + 1} of the surroundings, "
-                    f"allowed is {clearance_m:g} m or more"
-                )
+    planes = len(surroundings.planes)
+    for number, row in enumerate((*surroundings.planes, *surroundings.spheres)):
+        gap = plane_gap if number < planes else sphere_gap
+        clear = gap(x[:3], R, half, np.array(row), slope)
+        if clear < clearance_m:
+            raise InputError(
+                f"{what}: the hull comes within {clear:.3f} m of {surroundings.name(number)}, "
+                f"allowed is {clearance_m:g} m or more"
+            )

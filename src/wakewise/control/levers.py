@@ -8,15 +8,19 @@ simulated world's truth.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
 
+from wakewise.geometry import Pose, euler_from_quat, quat_from_euler
 from wakewise.interfaces import BodyState, Command, Controller, Goal
 from wakewise.settings import Settings
 from wakewise.targets import Region
 from wakewise.wake import arrival_time_s
+
+DECAY = 1.5
+"""Power of time with which the square of the speed of a jet's remains falls."""
 
 BED_HEIGHTS_M = (0.01, 0.03)
 """Bed points lie between these heights: where a wall jet half a metre from its strike point is fastest."""
@@ -25,6 +29,9 @@ GOLDEN_RAD = float(np.pi * (3.0 - np.sqrt(5.0)))
 
 KRONECKER = 1.2207440846057596 ** -np.arange(1.0, 4.0)
 """Steps of a Kronecker sequence that fills a box evenly: powers of the root of x^4 = x + 1."""
+
+
+Component = Annotated[float, Field(ge=-1.0, le=1.0)]
 
 
 class LeverSettings(Settings):
@@ -60,6 +67,32 @@ class LeverSettings(Settings):
         description="roll and pitch that the camera tolerates and the planner may use (deg)",
         ge=0.0,
         le=20.0,
+    )
+    level_deg: float = Field(
+        default=0.0,
+        description="fly this much nearer to level than asked, as far as the camera tolerates it (deg)",
+        ge=0.0,
+        le=20.0,
+    )
+    spare: bool = Field(
+        default=False, description="share out the plan's wrench anew at every step by the exact allocator"
+    )
+    meet: bool = Field(
+        default=False, description="count what jets become that meet: they join and run on between them; needs spare"
+    )
+    drift: bool = Field(
+        default=False, description="also keep the water still that the current will bring to the target"
+    )
+    drift_m_s: tuple[Component, Component, Component] = Field(
+        default=(0.0, 0.0, 0.0), description="that current as measured before the flight: north, east, down"
+    )
+    drift_s: float = Field(default=25.0, description="how long before it arrives that begins", gt=0.0, le=120.0)
+    drift_spread_m_s: float = Field(
+        default=0.02, description="how fast what a jet leaves grows wider on the way (m/s)", ge=0.0, le=0.2
+    )
+    drift_points: int = Field(default=160, description="how many points of that water", ge=4, le=2000)
+    drift_weight: float = Field(
+        default=0.5, description="weight of all of it together, over that of the region", gt=0.0, le=100.0
     )
 
 
@@ -123,9 +156,42 @@ def with_halo(region: Region, levers: LeverSettings, bed_z_m: float | None = Non
     )
 
 
+def with_drift(region: Region, levers: LeverSettings) -> Region:
+    """The region and, if the lever is on, the water that the current will bring to the target within `drift_s`.
+
+    A weak jet that passes the target at a third of a metre is carried on to it by a current of 3 cm/s in ten seconds,
+    by when its water has slowed but not stopped. The water at the target in t seconds is now upstream by t times the
+    current, so the points are those of the target's surface, moved there, t spread evenly, and farther apart the
+    farther they are, since what a jet leaves grows wider meanwhile (a front runs as 2.57 M^(1/4) t^(1/2): for 0.1 N
+    at 15 s with 3 cm/s, its sides with about two thirds of that). Their weight falls with the
+    square of the speed of a patch of water that a jet has left, (1 + t)^(-3/2) with t in s: the front of a jet's
+    remains goes as t^(1/4) when momentum is kept, their speed as t^(-3/4).
+    """
+    current = np.array(levers.drift_m_s, dtype=np.float64)
+    if not levers.drift or not np.any(current):
+        return region
+    near = np.flatnonzero(region.distance_m <= 0.0)
+    near = near if len(near) else np.arange(len(region.weights))
+    steps = np.arange(1, levers.drift_points + 1)
+    ages_s = levers.drift_s * ((0.5 + steps * KRONECKER[0]) % 1.0)
+    chosen = near[((0.5 + steps * KRONECKER[1]) % 1.0 * len(near)).astype(np.int64)]
+    weights = region.weights[chosen] * (1.0 + ages_s) ** -DECAY
+    weights *= levers.drift_weight * float(region.weights.sum()) / float(weights.sum())
+    aside = region.points_W_m[chosen] - region.points_W_m[near].mean(axis=0)
+    aside[:, 2] = 0.0
+    aside /= max(float(np.linalg.norm(aside, axis=1).max()), 1e-9)
+    upstream = region.points_W_m[chosen] + ages_s[:, None] * (levers.drift_spread_m_s * aside - current)
+    return Region(
+        points_W_m=np.concatenate([region.points_W_m, upstream]),
+        weights=np.concatenate([region.weights, weights]),
+        distance_m=np.concatenate([region.distance_m, np.maximum(ages_s * float(np.linalg.norm(current)), 1e-3)]),
+    )
+
+
 def watched(region: Region, levers: LeverSettings, bed_z_m: float | None = None) -> Region:
     """The region with what the levers add to it."""
-    return with_halo(with_bed_points(region, levers, bed_z_m), levers, bed_z_m)
+    with_drift_and_bed = with_bed_points(with_drift(region, levers), levers, bed_z_m)
+    return with_halo(with_drift_and_bed, levers, bed_z_m)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -151,6 +217,47 @@ class Early:
     def step(self, state: Any, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[Any, Command]:
         """Decide the thrusts for the next `dt_s` seconds."""
         return self.inner.step(state, dt_s, estimate, replace(goal, exposure_in_s=goal.exposure_in_s - self.lead_s))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Level:
+    """A controller whose goal is nearer to level by up to `level_rad`: it need not hold so much righting moment.
+
+    Implements `wakewise.interfaces.Controller`. Where the body is asked to be stays; the camera then looks past the
+    middle of the target, and stands up to its lever arm times the angle aside.
+    """
+
+    inner: Controller[Any]
+    level_rad: float
+
+    @property
+    def name(self) -> str:
+        """Method name of the controller within."""
+        return self.inner.name
+
+    def init(self) -> Any:
+        """State before the first step."""
+        return self.inner.init()
+
+    def step(self, state: Any, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[Any, Command]:
+        """Decide the thrusts for the next `dt_s` seconds."""
+        return self.inner.step(state, dt_s, estimate, nearer_level(goal, self.level_rad))
+
+
+def levelled(controller: Controller[Any], levers: LeverSettings) -> Controller[Any]:
+    """The controller, flown nearer to level if that lever is on."""
+    return (
+        Level(inner=controller, level_rad=float(np.radians(levers.level_deg))) if levers.level_deg > 0.0 else controller
+    )
+
+
+def nearer_level(goal: Goal, by_rad: float) -> Goal:
+    """The goal with roll and pitch reduced by up to an angle each; position, heading and velocities in W stay."""
+    roll, pitch, yaw = euler_from_quat(goal.X_WB.q)
+    less = [float(np.sign(a)) * max(abs(float(a)) - by_rad, 0.0) for a in (roll, pitch)]
+    X_WB = Pose(goal.X_WB.p_m, quat_from_euler(less[0], less[1], float(yaw)))
+    turn = X_WB.R.T @ goal.X_WB.R
+    return replace(goal, X_WB=X_WB, nu_B=np.concatenate([turn @ goal.nu_B[:3], turn @ goal.nu_B[3:]]))
 
 
 def lead_of(distance_m: float, thrust_N: float, area_m2: float) -> float:

@@ -129,17 +129,17 @@ class PaperPlanner(Planner):
         table, work, case = self.model.table, self._work, self._case
         horizon(table, self.model.wake_table, self._scratch, case, U, work, True)
         if self._well_coded:
-            taylor_blocks(self.model.wake_table, self._scratch, work.X, work.T, self._blocks)
+            taylor_blocks(self.model.wake_table, self._scratch, work.X, work.jets, self._blocks)
         else:
             for k in range(len(U)):
-                taylor_block(self.model.wake_table, self._scratch, work.X[k], work.T[k], True, self._blocks[k])
+                taylor_block(self.model.wake_table, self._scratch, work.X[k], work.jets[k], True, self._blocks[k])
         blocks = 0.5 * (self._blocks + np.swapaxes(self._blocks, 1, 2))
         values, vectors = np.linalg.eigh(blocks)
         blocks = (vectors * np.maximum(values, 0.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
         blocks *= (table.stage_s * case.quiet)[:, None, None]
         # `horizon` left Gauss-Newton (and tracking) in the pose blocks: exchange the part that is D's.
         self._exchange(blocks)
-        condense(table, work, self._room)
+        condense(table, case, work, self._room)
         add_commands(table, case.command, U, self._room, self._steps)
         return self._room.H, self._room.g
 
@@ -151,7 +151,9 @@ class PaperPlanner(Planner):
             if case.quiet[k] > 0.0:
                 state = work.X[k]
                 rotation(state, R)
-                stage_disturbance(self.model.wake_table, self._scratch, state[:3], state[3:7], R, work.T[k], True, g, H)
+                stage_disturbance(
+                    self.model.wake_table, self._scratch, state[:3], state[3:7], R, work.jets[k], True, g, H
+                )
                 work.Q[k] += blocks[k, :6, :6] - table.stage_s * case.quiet[k] * H[:6, :6]
                 work.S[k], work.R[k] = blocks[k, 6:, :6], blocks[k, 6:, 6:]
 

@@ -8,7 +8,9 @@ The problem, over N stages of h seconds (the paper: T = 2 s in 20 stages of 0.1 
 
 with thrust limits on u_k hard. u_k are the commands and T_k the mean thrusts over a stage behind the thrusters' lag.
 D is divided by the sum of the region's weights (a mean square speed, (m/s)^2), so that weights do not depend on how
-many points sample it. p_target is the last pose of the reference: p_now + v_des T for an operator's command.
+many points sample it. With `persistence`, D is that of jets which follow the thrusts with the lag of the wash on its
+way to the target, so that what lasts weighs more than what is over soon. p_target is the last pose of the reference:
+p_now + v_des T for an operator's command.
 """
 
 from __future__ import annotations
@@ -20,9 +22,7 @@ import numpy as np
 from pydantic import Field
 
 from wakewise.arrays import Array, freeze
-from wakewise.errors import InputError
-from wakewise.geometry import quat_from_rotvec, quat_multiply
-from wakewise.interfaces import BodyState, Goal
+from wakewise.interfaces import BodyState
 from wakewise.settings import Settings
 
 
@@ -64,8 +64,18 @@ class PlanSettings(Settings):
     )
     exposure_s: float = Field(default=0.1, description="how long the shutter stays open (s)", ge=0.0)
     travel: bool = Field(default=False, description="count wash when it arrives at the target, not when it leaves")
+    persistence: float = Field(
+        default=0.0,
+        description="lag of the jets that the disturbance is made of, in travel times to the target; 0 for none",
+        ge=0.0,
+        le=3.0,
+    )
     clearance_m: float = Field(default=0.05, description="clearance at which the barrier becomes steep (m)", gt=0.0)
-    barrier_reach_m: float = Field(default=0.25, description="clearance from which nothing is felt (m)", gt=0.0)
+    barrier_reach_m: float = Field(
+        default=0.25,
+        description="clearance from which nothing is felt (m); less where the goal itself is nearer",
+        gt=0.0,
+    )
     iterations: int = Field(default=5, description="most iterations per plan; 1 is the fast mode", ge=1, le=50)
     tolerance: float = Field(default=1e-3, description="relative decrease that ends the iterations", gt=0.0, le=0.1)
     second_start_every: int = Field(
@@ -77,36 +87,6 @@ class PlanSettings(Settings):
     def horizon_s(self) -> float:
         """T, in seconds."""
         return self.stages * self.stage_s
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Surroundings:
-    """What the hull must not touch.
-
-    Parameters
-    ----------
-    planes : ndarray, shape (n, 4)
-        Unit normal into the free water and offset: free where normal . p > offset.
-    spheres : ndarray, shape (n, 4)
-        Centre in W and radius: the target and other obstacles.
-    """
-
-    planes: Array = field(default_factory=lambda: np.zeros((0, 4)))
-    spheres: Array = field(default_factory=lambda: np.zeros((0, 4)))
-
-    def __post_init__(self) -> None:
-        freeze(self, planes=(None, 4), spheres=(None, 4))
-        if self.spheres.size and np.any(self.spheres[:, 3] < 0.0):
-            raise InputError(f"obstacle: radius {self.spheres[:, 3].min():g} m, must not be negative")
-        if self.planes.size and np.any(np.abs(np.linalg.norm(self.planes[:, :3], axis=1) - 1.0) > 1e-6):
-            raise InputError("plane: its normal is not of unit length")
-
-    @classmethod
-    def tank(cls, low_W_m: Array, high_W_m: Array, spheres: Array | None = None) -> Surroundings:
-        """Walls, surface and floor of a box from `low_W_m` to `high_W_m`, shape (3,) each."""
-        eye = np.eye(3)
-        planes = np.vstack([np.column_stack([eye, low_W_m]), np.column_stack([-eye, -np.asarray(high_W_m)])])
-        return cls(planes=planes, spheres=np.zeros((0, 4)) if spheres is None else spheres)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -126,6 +106,8 @@ class PlanProblem:
         Wished states at the ends of the stages, the first one for now.
     quiet : ndarray, shape (N,)
         Factor of w_D per stage.
+    jets_N, jet_lags_s : ndarray, shape (n,), optional
+        Thrusts that the jets stand for now, and the lags with which they follow the thrusters; None for no lag.
     """
 
     state: Array
@@ -136,6 +118,8 @@ class PlanProblem:
     force_W_N: Array = field(default_factory=lambda: np.zeros(3))
     moment_B_Nm: Array = field(default_factory=lambda: np.zeros(3))
     current_W_m_s: Array = field(default_factory=lambda: np.zeros(3))
+    jets_N: Array | None = None
+    jet_lags_s: Array | None = None
 
     def __post_init__(self) -> None:
         n, stages = len(self.thrusts_N), len(self.quiet)
@@ -150,6 +134,8 @@ class PlanProblem:
             moment_B_Nm=(3,),
             current_W_m_s=(3,),
         )
+        if self.jets_N is not None and self.jet_lags_s is not None:
+            freeze(self, jets_N=(n,), jet_lags_s=(n,))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -184,27 +170,6 @@ class Horizon:
     curvature: Array
 
 
-def reference_of(goal: Goal, stages: int, stage_s: float) -> Array:
-    """Wished states, shape (stages + 1, 13): the goal carried on with its own twist, constant in its body frame."""
-    reference = np.empty((stages + 1, 13))
-    p, q = np.array(goal.X_WB.p_m), np.array(goal.X_WB.q)
-    nu = goal.nu_B
-    turn = quat_from_rotvec(nu[3:] * stage_s)
-    half = quat_from_rotvec(nu[3:] * (0.5 * stage_s))
-    for k in range(stages + 1):
-        reference[k, :3], reference[k, 3:7], reference[k, 7:] = p, q, nu
-        # The chord of an arc: along the velocity half way, shortened by sin(a)/a.
-        angle = 0.5 * stage_s * float(np.linalg.norm(nu[3:]))
-        p = p + stage_s * float(np.sinc(angle / np.pi)) * _rotated(quat_multiply(q, half), nu[:3])
-        q = quat_multiply(q, turn)
-    return reference
-
-
 def state_of(body: BodyState) -> Array:
     """Position, quaternion and twist in one array, shape (13,)."""
     return np.concatenate([body.X_WB.p_m, body.X_WB.q, body.nu_B])
-
-
-def _rotated(q: Array, v: Array) -> Array:
-    t = 2.0 * np.cross(q[1:], v)
-    return np.asarray(v + q[0] * t + np.cross(q[1:], t))

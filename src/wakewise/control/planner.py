@@ -9,7 +9,7 @@ cost.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,10 +24,11 @@ from wakewise.control.condensing import (
     motion_gradient,
 )
 from wakewise.control.plan_disturbance import wake_scratch
-from wakewise.control.plan_kernels import CLOSEST, RATE_N, PlanCase, PlanTable, horizon, plan_work
-from wakewise.control.plan_problem import Horizon, PlanProblem, PlanSettings, Surroundings
+from wakewise.control.plan_kernels import CLOSEST, RATE_N, PlanCase, PlanTable, horizon, lag_jets, plan_work, set_reach
+from wakewise.control.plan_problem import Horizon, PlanProblem, PlanSettings
 from wakewise.control.plan_wake import WakeTable, wake_table, with_smooth_edge
 from wakewise.control.qp import BoxQP
+from wakewise.control.surroundings import Surroundings
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.interfaces import WakeModel
@@ -161,8 +162,13 @@ class Planner:
             current_W=np.zeros(3),
             reference=np.zeros((N + 1, 13)),
             quiet=np.zeros(N),
-            barrier=np.array([BARRIER_RANGE[0]]),
+            barrier=np.array([BARRIER_RANGE[0], model.settings.barrier_reach_m]),
+            jets=np.zeros(n),
+            jet_keep=np.zeros(n),
+            jet_mean=np.zeros(n),
+            jet_map=np.array(model.table.mean_map),
         )
+        self._jet_lags = np.zeros(n)
         self._lower = np.tile(model.table.lower, N)
         self._upper = np.tile(model.table.upper, N)
         self._predicted: Array | None = None
@@ -178,7 +184,7 @@ class Planner:
         """Gradient of the objective, shape (N n,), a view that the next call overwrites."""
         table = self.model.table
         horizon(table, self.model.wake_table, self._scratch, self._case, U, self._work, True)
-        motion_gradient(table, self._work, self._room.g)
+        motion_gradient(table, self._case, self._work, self._room.g)
         add_commands(table, self._case.command, U, self._room, self._steps)
         add_rate_gradient(table, self._steps, U.shape[1], self._room.g)
         return self._room.g
@@ -188,7 +194,7 @@ class Planner:
         table = self.model.table
         self._predicted = U
         J = horizon(table, self.model.wake_table, self._scratch, self._case, U, self._work, True)
-        condense(table, self._work, self._room)
+        condense(table, self._case, self._work, self._room)
         add_commands(table, self._case.command, U, self._room, self._steps)
         return float(J), self._room.g, self._room.H
 
@@ -208,6 +214,13 @@ class Planner:
         case.current_W[:] = problem.current_W_m_s
         case.reference[:] = problem.reference
         np.multiply(problem.quiet, settings.w_disturbance, out=case.quiet)
+        set_reach(self.model.table, case)
+        lagged = problem.jets_N is not None and problem.jet_lags_s is not None
+        case.jets[:] = problem.jets_N if lagged else problem.thrusts_N
+        lags = problem.jet_lags_s if lagged else 0.0
+        if np.any(self._jet_lags != lags):
+            self._jet_lags[:] = lags
+            lag_jets(self.model.table, case, self._jet_lags)
 
     def plan(
         self,
@@ -227,17 +240,32 @@ class Planner:
         U = np.clip(start_N, self.model.table.lower, self.model.table.upper)
         U, J, done, converged, solver = self._descend(U, settings.iterations)
         self._since_second += 1
-        if self._since_second >= settings.second_start_every > 0 and settings.iterations > 1 and not self._late():
+        for other, iterations in self._other_starts(problem, U, J, done):
+            V, J_other, more, other_converged, other_solver = self._descend(other, iterations, J)
+            done += more
+            if J_other < J:
+                U, J, converged, solver = V, J_other, other_converged, other_solver
+        return self._answer(U, J, done, converged, solver)
+
+    def _other_starts(self, problem: PlanProblem, U: Array, J: float, done: int) -> Iterator[tuple[Array, int]]:
+        """Starts that may lead to a better minimum than U, and how many iterations each may take.
+
+        Another sign pattern now and then, with the iterations that the plan has left over. And the thrusts that hold
+        the load, where the plan would touch something: it is caught behind the target, as no push of the barrier's
+        brings it back through.
+        """
+        settings = self.model.settings
+        if settings.second_start_every == 0 or settings.iterations == 1 or self._late():
+            return
+        if self._predicted is not U:
+            self.cost(U)
+        if self._work.parts[CLOSEST] < 0.0:
+            yield np.tile(holding_thrusts(self.model, problem), (settings.stages, 1)), max(settings.iterations, 3)
+        elif self._since_second >= settings.second_start_every and done + 2 <= settings.iterations:
             self._since_second = 0
             other = self._other_pattern(U)
             if other is not None and self.cost(other) < 2.0 * J:
-                V, J_other, more, other_converged, other_solver = self._descend(
-                    other, max(settings.iterations // 2, 3), J
-                )
-                done += more
-                if J_other < J:
-                    U, J, converged, solver = V, J_other, other_converged, other_solver
-        return self._answer(U, J, done, converged, solver)
+                yield other, settings.iterations - done
 
     def _descend(self, U: Array, iterations: int, rival: float = float("inf")) -> tuple[Array, float, int, bool, str]:
         """Iterate from U; gives up where an iteration leaves it a fifth worse than a `rival` cost."""
@@ -296,8 +324,8 @@ class Planner:
         weights = Weights(disturbance=model.settings.w_disturbance, effort=max(model.settings.w_effort, 1e-6))
         shifts, before = np.zeros_like(U), None
         for k, mean in enumerate(np.array(self._work.T)):
-            # Every other stage is enough: poses of neighbours are alike.
-            if k % 2:
+            # Every fourth stage is enough: poses of neighbours are alike.
+            if k % 4:
                 shifts[k] = shifts[k - 1]
                 continue
             X_WB = Pose(self._work.X[k, :3], self._work.X[k, 3:7])
@@ -332,7 +360,8 @@ class Planner:
             iterations=done,
             converged=converged,
             solver=solver,
-            curvature=self._work.R[0].copy(),
+            # Of a passing correction the jets of this stage see only what their lag lets through.
+            curvature=self._work.R[0] * np.outer(1.0 - self._case.jet_mean, 1.0 - self._case.jet_mean),
         )
 
 
@@ -340,3 +369,12 @@ def shifted(plan: Horizon, stages: int) -> Array:
     """Commands of a plan, moved on by whole stages; the last one is held."""
     by = min(max(stages, 0), len(plan.commands_N))
     return np.vstack([plan.commands_N[by:], np.repeat(plan.commands_N[-1:], by, axis=0)])
+
+
+def holding_thrusts(model: PlanModel, problem: PlanProblem) -> Array:
+    """Least thrusts, shape (n,), that carry the load where the vehicle is: a first guess for every stage."""
+    q = problem.state[3:7]
+    t = 2.0 * np.cross(-q[1:], problem.force_W_N)
+    force_B = problem.force_W_N + q[0] * t + np.cross(-q[1:], t)
+    wanted = -np.concatenate([force_B, problem.moment_B_Nm])
+    return np.asarray(np.clip(model.layout.inverse @ wanted, model.table.lower, model.table.upper))

@@ -24,16 +24,21 @@ import numpy as np
 from wakewise.arrays import Array, freeze
 from wakewise.control.guard import Guard
 from wakewise.control.loop import ControllerState, TrackingController
-from wakewise.control.plan_problem import Horizon, PlanProblem, PlanSettings, Surroundings, reference_of, state_of
+from wakewise.control.plan_problem import Horizon, PlanProblem, PlanSettings, state_of
 from wakewise.control.planner import PlanModel, Planner, compile_plan
+from wakewise.control.reference import between, reference_of
 from wakewise.control.settings import ControlSettings
+from wakewise.control.surroundings import Surroundings
 from wakewise.control.tracker import Tracker, TrackerState, make_tracker
 from wakewise.control.wake_aware import wake_aware
-from wakewise.geometry import Pose, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
+from wakewise.geometry import Pose, quat_conjugate, quat_multiply, rotvec_from_quat
 from wakewise.interfaces import BodyState, Command, Goal, WakeModel
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
 from wakewise.wake import arrival_time_s
+
+IDLE_N = 0.5
+"""Thrust that stands for less: wash of a thruster that idles would take for ever, and is not worth a delay."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,18 +56,22 @@ class PlanState:
 
     `thrusts_N`, shape (n,), are the last commands; `nominal_N`, shape (n,), what the planned commands alone would
     make the thrusters give at the plan's start; `share`, shape (n, 6), shares corrections out; `backup` is the state
-    of PID and allocator.
+    of PID and allocator; `goal_nu`, shape (6,), is the twist of the last goal; `jets_N`, `jet_lags_s`, shape (n,), are
+    thrusts as the jets on their way stand for them, and how they lag behind (None: they do not).
     """
 
     tracker: TrackerState
     thrusts_N: Array
     nominal_N: Array
+    jets_N: Array
     backup: ControllerState
     plan: Horizon | None = None
     share: Array | None = None
     age_s: float = 0.0
     trouble: str | None = None
     saturated: bool = False
+    goal_nu: Array | None = None
+    jet_lags_s: Array | None = None
 
     def __post_init__(self) -> None:
         freeze(self, thrusts_N=(None,), nominal_N=(None,))
@@ -91,8 +100,16 @@ class PlanningController:
         """State before the first step."""
         n = self.model.thrusters
         return PlanState(
-            tracker=self.tracker.init(), thrusts_N=np.zeros(n), nominal_N=np.zeros(n), backup=self.backup.init()
+            tracker=self.tracker.init(),
+            thrusts_N=np.zeros(n),
+            nominal_N=np.zeros(n),
+            backup=self.backup.init(),
+            jets_N=np.zeros(n),
         )
+
+    def expected(self, state: PlanState) -> Array | None:
+        """State that the plan expects now, shape (13,); None where there is no plan."""
+        return None if state.plan is None else _at(state.plan, state.age_s, self.model.settings.stage_s)
 
     def step(self, state: PlanState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[PlanState, Command]:
         """Decide the thrusts for the next `dt_s` seconds."""
@@ -101,11 +118,14 @@ class PlanningController:
             thrusts = state.thrusts_N * np.exp(-dt_s / self.hold_s)
             state = replace(state, plan=None, thrusts_N=thrusts, nominal_N=thrusts, trouble=None)
             return state, Command(thrusts_N=thrusts, wrench_B=np.zeros(6), fallback=trouble)
+        change_B = self._change(state, dt_s, goal)
+        if state.jet_lags_s is not None:
+            state = _blown_on(state, state.jet_lags_s, dt_s)
         if state.plan is None or state.age_s >= 1.0 / self.model.settings.plan_hz - 1e-6:
-            state = self._replan(state, estimate, goal)
+            state = self._replan(state, estimate, goal, change_B)
         if state.plan is None or state.share is None:
-            return self._fall_back(state, dt_s, estimate, goal)
-        return self._follow(state, state.plan, state.share, dt_s, estimate)
+            return self._fall_back(replace(state, goal_nu=goal.nu_B), dt_s, estimate, goal)
+        return self._follow(state, state.plan, state.share, dt_s, estimate, goal.nu_B)
 
     def _unusable(self, estimate: BodyState, goal: Goal) -> str | None:
         count = self.guard.count
@@ -120,7 +140,15 @@ class PlanningController:
                 return count("lost", f"pose lost ({spread:.2f} m unsure): holding the last thrusts, fading")
         return None
 
-    def _replan(self, state: PlanState, estimate: BodyState, goal: Goal) -> PlanState:
+    def _change(self, state: PlanState, dt_s: float, goal: Goal) -> Array:
+        """How fast the goal's twist changes, shape (6,); a goal that jumps has no acceleration worth following."""
+        if state.goal_nu is None or not dt_s > 0.0:
+            return np.zeros(6)
+        change = (goal.nu_B - state.goal_nu) / dt_s
+        push = self.tracker.body.mass_matrix @ change
+        return change if np.all(np.abs(push) <= self.tracker.integral_limit) else np.zeros(6)
+
+    def _replan(self, state: PlanState, estimate: BodyState, goal: Goal, change_B: Array) -> PlanState:
         settings = self.model.settings
         nominal, thrusts = state_of(estimate), state.thrusts_N
         before = state.thrusts_N
@@ -136,15 +164,19 @@ class PlanningController:
                     "off the path", f"off the planned path by {away:.2f} m: planned anew from the estimate"
                 )
 
+        lags_s = self._jet_lags_s(nominal, state.jets_N)
+
         def make() -> PlanProblem:
             return PlanProblem(
                 state=nominal,
                 thrusts_N=thrusts,
                 command_N=before,
-                reference=reference_of(goal, settings.stages, settings.stage_s),
+                reference=reference_of(goal, settings.stages, settings.stage_s, change_B),
                 quiet=quiet_stages(settings, goal.exposure_in_s, self._delay_s(nominal, thrusts)),
                 force_W_N=estimate.X_WB.R @ estimate.load_B[:3],
                 moment_B_Nm=estimate.load_B[3:],
+                jets_N=state.jets_N,
+                jet_lags_s=lags_s,
             )
 
         found = self.guard.ask(make, state.plan, state.age_s)
@@ -160,6 +192,7 @@ class PlanningController:
             age_s=0.0,
             nominal_N=thrusts,
             trouble=None,
+            jet_lags_s=lags_s,
         )
 
     def _delay_s(self, nominal: Array, thrusts_N: Array) -> float:
@@ -168,9 +201,17 @@ class PlanningController:
             return 0.0
         table = self.model.wake_table
         distance_m = float(np.linalg.norm(table.middle - nominal[:3]))
-        # A thruster that idles would take for ever: half a newton is the least that is worth a delay.
-        thrust_N = max(float(np.sqrt(np.mean(thrusts_N**2))), 0.5)
+        thrust_N = max(float(np.sqrt(np.mean(thrusts_N**2))), IDLE_N)
         return float(arrival_time_s(distance_m, thrust_N, float(np.mean(table.areas)), "steady"))
+
+    def _jet_lags_s(self, nominal: Array, jets_N: Array) -> Array | None:
+        """Lags of the jets, shape (n,), with the lever `persistence`: so many times distance over speed; else None."""
+        share, table = self.model.settings.persistence, self.model.wake_table
+        if share == 0.0:
+            return None
+        distance_m = np.linalg.norm(Pose(nominal[:3], nominal[3:7]).apply(table.positions) - table.middle, axis=1)
+        thrust_N = np.maximum(np.abs(jets_N), IDLE_N)
+        return np.asarray(share * arrival_time_s(distance_m, thrust_N, table.areas, "steady"))
 
     def _nominal_thrusts(self, state: PlanState) -> Array:
         """What the planned commands alone would make the thrusters give now."""
@@ -185,23 +226,16 @@ class PlanningController:
         return np.asarray(keep * thrusts + (1.0 - keep) * state.plan.commands_N[whole])
 
     def _follow(
-        self, state: PlanState, plan: Horizon, share: Array, dt_s: float, estimate: BodyState
+        self, state: PlanState, plan: Horizon, share: Array, dt_s: float, estimate: BodyState, goal_nu: Array
     ) -> tuple[PlanState, Command]:
         model = self.model
         stage_s = model.settings.stage_s
         nominal = _at(plan, state.age_s, stage_s)
         path = Goal(X_WB=Pose(nominal[:3], nominal[3:7]), nu_B=nominal[7:])
-        tracker, wrench = self.tracker.wrench(state.tracker, dt_s, estimate, path, saturated=state.saturated)
-        # The same tracker on the path itself, with nothing to correct, is its feed-forward alone: the plan has that.
-        _, feed = self.tracker.wrench(
-            self.tracker.init(),
-            0.0,
-            BodyState(X_WB=path.X_WB, nu_B=path.nu_B, load_B=estimate.load_B),
-            path,
-            saturated=False,
-        )
+        # All feed-forward, acceleration and load included, is in the plan; given twice it would run ahead of it.
+        tracker, correction = self.tracker.correction(state.tracker, dt_s, estimate, path, saturated=state.saturated)
         planned = plan.commands_N[_stage(plan, state.age_s, stage_s)]
-        wished = planned + share @ (wrench - feed)
+        wished = planned + share @ correction
         thrusts = np.clip(wished, model.table.lower, model.table.upper)
         if not np.isfinite(thrusts).all():
             state = replace(state, plan=None, trouble=self.guard.count("not finite", "correction not finite"))
@@ -212,11 +246,18 @@ class PlanningController:
             trouble = self.guard.count("saturated", f"thrusters saturated: {over:.1f} N cut off")
         command = Command(
             thrusts_N=thrusts,
-            wrench_B=model.table.allocation @ planned + wrench - feed,
+            wrench_B=model.table.allocation @ planned + correction,
             disturbance=plan.disturbance * float(np.sum(model.region.weights)),
             fallback=trouble,
         )
-        state = replace(state, tracker=tracker, thrusts_N=thrusts, age_s=state.age_s + dt_s, saturated=over > 1e-9)
+        state = replace(
+            state,
+            tracker=tracker,
+            thrusts_N=thrusts,
+            age_s=state.age_s + dt_s,
+            saturated=over > 1e-9,
+            goal_nu=goal_nu,
+        )
         return state, command
 
     def _fall_back(self, state: PlanState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[PlanState, Command]:
@@ -232,6 +273,12 @@ class PlanningController:
             plan=None,
         )
         return state, replace(command, fallback=words or None)
+
+
+def _blown_on(state: PlanState, lags_s: Array, dt_s: float) -> PlanState:
+    """Let the jets follow what the thrusters were last told."""
+    keep = np.exp(-dt_s / lags_s)
+    return replace(state, jets_N=keep * state.jets_N + (1.0 - keep) * state.thrusts_N)
 
 
 def quiet_stages(settings: PlanSettings, exposure_in_s: float, delay_s: float = 0.0) -> Array:
@@ -262,14 +309,10 @@ def _stage(plan: Horizon, age_s: float, stage_s: float) -> int:
 
 
 def _at(plan: Horizon, age_s: float, stage_s: float) -> Array:
-    """State that a plan expects at an age, shape (13,): between stages, the pose along the turn, the rest straight."""
+    """State that a plan expects at an age, shape (13,)."""
     k = _stage(plan, age_s, stage_s)
-    s = min(max(age_s / stage_s - k, 0.0), 1.0)
-    a, b = plan.states[k], plan.states[k + 1]
-    state = (1.0 - s) * a + s * b
-    turn = rotvec_from_quat(quat_multiply(quat_conjugate(a[3:7]), b[3:7]))
-    state[3:7] = quat_multiply(a[3:7], quat_from_rotvec(s * turn))
-    return state
+    share = min(max(age_s / stage_s - k, 0.0), 1.0)
+    return np.asarray(between(plan.states[k], plan.states[k + 1], share))
 
 
 def planning_controller(

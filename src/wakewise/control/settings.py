@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from pydantic import Field
 
 from wakewise.control.levers import LeverSettings
 from wakewise.control.plan_problem import PlanSettings
 from wakewise.settings import Settings
 from wakewise.wake import WakeSettings
+
+Coordinate = Annotated[float, Field(ge=-100.0, le=100.0)]
+Radius = Annotated[float, Field(gt=0.0, le=10.0)]
 
 
 class ControlSettings(Settings):
@@ -61,5 +66,10 @@ class ControlSettings(Settings):
     )
     w_effort: float = Field(default=1e-3, description="weight of squared thrust (per N^2)", gt=0.0)
     w_previous: float = Field(default=5e-3, description="weight of squared change of thrust per step (per N^2)", ge=0.0)
+    obstacles: tuple[tuple[Coordinate, Coordinate, Coordinate, Radius], ...] = Field(
+        default=(),
+        max_length=20,
+        description="spheres that plans keep clear of besides tank and target: x, y, z in the world (NED), radius (m)",
+    )
     plan: PlanSettings = Field(default=PlanSettings(), description="horizon and weights of the methods that plan")
     levers: LeverSettings = Field(default=LeverSettings(), description="what `wake-aware` uses beyond the free jet")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -12,6 +12,8 @@ from wakewise.control.settings import ControlSettings
 from wakewise.control.stability import Gains, stable_gain_scale, vehicle_axes, wished_gains
 from wakewise.interfaces import BodyState, Goal
 from wakewise.vehicles import RigidBody, Vehicle, compile_body, coriolis_wrench, damping_wrench, restoring_wrench
+
+_NO_FEED = np.zeros(6)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,6 +67,27 @@ class Tracker:
         wrench (`saturated`), the integral does not grow.
         """
         feed = -restoring_wrench(self.body, goal.X_WB.q)
+        integral, wrench, twist_B = self._pid(state, dt_s, estimate, goal, feed, saturated)
+        wrench -= damping_wrench(self.body, twist_B) + coriolis_wrench(self.body, twist_B)
+        wrench -= np.clip(estimate.load_B, -self.integral_limit, self.integral_limit)
+        if state.goal_nu is not None and dt_s > 0.0:
+            push = self.body.mass_matrix @ (goal.nu_B - state.goal_nu) / dt_s
+            # A goal that jumps has no acceleration worth following.
+            if np.all(np.abs(push) <= self.integral_limit):
+                wrench += push
+        return replace(integral, goal_nu=goal.nu_B), wrench
+
+    def correction(
+        self, state: TrackerState, dt_s: float, estimate: BodyState, goal: Goal, *, saturated: bool = False
+    ) -> tuple[TrackerState, Array]:
+        """The same without feed-forward, for a goal on a path whose thrusts are known; wrench in B, shape (6,)."""
+        integral, wrench, _ = self._pid(state, dt_s, estimate, goal, _NO_FEED, saturated)
+        return integral, wrench
+
+    def _pid(
+        self, state: TrackerState, dt_s: float, estimate: BodyState, goal: Goal, feed: Array, saturated: bool
+    ) -> tuple[TrackerState, Array, Array]:
+        """New integral, wrench, and the goal's twist in B."""
         wrench = np.empty(6)
         force_W, moment_B = np.empty(3), np.empty(3)
         twist_B = np.empty(6)
@@ -89,14 +112,7 @@ class Tracker:
             force_W,
             moment_B,
         )
-        wrench -= damping_wrench(self.body, twist_B) + coriolis_wrench(self.body, twist_B)
-        wrench -= np.clip(estimate.load_B, -self.integral_limit, self.integral_limit)
-        if state.goal_nu is not None and dt_s > 0.0:
-            push = self.body.mass_matrix @ (goal.nu_B - state.goal_nu) / dt_s
-            # A goal that jumps has no acceleration worth following.
-            if np.all(np.abs(push) <= self.integral_limit):
-                wrench += push
-        return TrackerState(force_W_N=force_W, moment_B_Nm=moment_B, goal_nu=goal.nu_B), wrench
+        return TrackerState(force_W_N=force_W, moment_B_Nm=moment_B, goal_nu=state.goal_nu), wrench, twist_B
 
 
 def make_tracker(vehicle: Vehicle, settings: ControlSettings) -> Tracker:

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from wakewise.arrays import Array
-from wakewise.control.guard import holding_thrusts
-from wakewise.control.plan_problem import Horizon, PlanProblem, PlanSettings, Surroundings, state_of
-from wakewise.control.planner import Planner, compile_plan
+from wakewise.control.plan_problem import Horizon, PlanProblem, PlanSettings, state_of
+from wakewise.control.planner import Planner, compile_plan, holding_thrusts
+from wakewise.control.surroundings import Surroundings
 from wakewise.errors import InputError
 from wakewise.interfaces import BodyState, Goal, WakeModel
 from wakewise.targets import Region

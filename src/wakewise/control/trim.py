@@ -5,8 +5,11 @@ rights itself, shared out as gently as can be; buoyancy and the place of the cen
 The mean is taken over the trim that nobody knows beforehand, so that advice is not made for a vehicle that is exactly
 as written. Steady jets only: what moving costs does not depend on ballast.
 
-Floating is never the worse for the target (jets go up), so the least D lies at the largest float looked at. The advice
-is therefore the ballast of least effort among those that come near to it (`NEAR`).
+The advice is the ballast of least effort that is not worse by D than the vehicle as it is. Least D is another one and
+is told beside it (`gentlest`, of least effort among those near to the least D): D always asks for floats, since jets
+then go up, but a float is a load that thrusters must hold all the time, and the water that they draw in and send to
+the surface comes round. In the simulated tank, which knows this, the centre of gravity of the advice made the target's
+water slower and floats of 1.2 N did not (docs/decisions/0013, 0014).
 """
 
 from __future__ import annotations
@@ -55,10 +58,11 @@ class TrimRow:
 
 @dataclass(frozen=True, kw_only=True)
 class TrimAdvice:
-    """All ballasts looked at, the best of them, and the vehicle as it is."""
+    """All ballasts looked at; the one advised, the one that the wake model alone would take, the vehicle as it is."""
 
     rows: tuple[TrimRow, ...]
     best: TrimRow
+    gentlest: TrimRow
     now: TrimRow
 
     @property
@@ -73,10 +77,20 @@ class TrimAdvice:
         if self.best.shift_mm != self.now.shift_mm:
             where = "forward" if self.best.shift_mm > self.now.shift_mm else "aft"
             parts.append(f"move the centre of gravity {abs(self.best.shift_mm - self.now.shift_mm):.0f} mm {where}")
-        now, best = 1e3 * self.now.speed_m_s, 1e3 * self.best.speed_m_s
+        now, best = self.now, self.best
         return (
-            f"{' and '.join(parts)}: {now:.2f} to {best:.2f} mm/s at the target by the wake model, "
-            f"{self.now.down_N:.2f} to {self.best.down_N:.2f} N of thrust blown downwards"
+            f"{' and '.join(parts)}: {now.thrust_N:.2f} to {best.thrust_N:.2f} N of thrust to hold its poses, "
+            f"{1e3 * now.speed_m_s:.1f} to {1e3 * best.speed_m_s:.1f} mm/s at the target by the wake model"
+        )
+
+    @property
+    def wake_words(self) -> str:
+        """What the wake model alone would do, in one sentence."""
+        row = self.gentlest
+        return (
+            f"least by the wake model alone: {1e3 * row.speed_m_s:.1f} mm/s with {row.float_N:+.1f} N and the centre "
+            f"of gravity {row.shift_mm:+.0f} mm, at {row.thrust_N:.2f} N of thrust; in the simulated tank floats did "
+            "not make the water slower (docs/decisions/0014)"
         )
 
 
@@ -115,7 +129,7 @@ def trim_advice(
     floats_N: tuple[float, ...] = FLOATS_N,
     shifts_mm: tuple[float, ...] = SHIFTS_MM,
 ) -> TrimAdvice:
-    """Ballast of least mean D over poses and unknown loads, and of least effort among those that come near to it.
+    """Ballast of least effort over poses and unknown loads that is not worse by D, and the one of least D beside it.
 
     Parameters
     ----------
@@ -154,8 +168,17 @@ def trim_advice(
     )
     now = next(row for row in rows if row.float_N == round(own, 6) and row.shift_mm == 0.0)
     least = min(row.speed_m_s for row in rows)
-    best = min((row for row in rows if row.speed_m_s <= NEAR * least), key=lambda row: (row.effort_N2, row.speed_m_s))
-    return TrimAdvice(rows=rows, best=best, now=now)
+    return TrimAdvice(
+        rows=rows,
+        best=_easiest(rows, max(now.speed_m_s, least)),
+        gentlest=_easiest(rows, NEAR * least),
+        now=now,
+    )
+
+
+def _easiest(rows: tuple[TrimRow, ...], most_m_s: float) -> TrimRow:
+    """The row of least effort among those up to a speed."""
+    return min((row for row in rows if row.speed_m_s <= most_m_s), key=lambda row: (row.effort_N2, row.speed_m_s))
 
 
 def _row(

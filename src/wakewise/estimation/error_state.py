@@ -2,8 +2,15 @@
 
 An error-state Kalman filter (J. Sola, Quaternion kinematics for the error-state Kalman filter, arXiv:1711.02508,
 section 5, for the error of attitude in the body): the mean moves by the vehicle's own equations under the commanded
-thrusts, with a force and a moment that these do not explain (trim, current, wrong drag) and the inertial unit's biases
-as further unknowns; the covariance moves by the Jacobian of the very same step.
+thrusts; the covariance moves by the Jacobian of the very same step.
+
+**What is not known** stays so for longer than a sample, so it is no white noise: the gains of the thrusters, drag,
+inertia and the current are states with a stated spread, next to a force and a moment that nothing explains (trim,
+tether) and the inertial unit's biases. While a vehicle hovers these cannot be told apart and need not be; when the
+camera is lost and the vehicle sets off, they carry it away from its estimate, and the covariance knows it.
+
+**A camera's slow error** (calibration, map, refraction), if its spread is stated, is a state, too: it does not average
+out, and the covariance then says so.
 
 **Late measurements** are taken in the order in which they were made. The filter lives `settle_s` behind the present,
 where nothing is missing any more; for the answer of each step a copy of it runs on to now with what has arrived so
@@ -27,11 +34,20 @@ import numpy as np
 from scipy.stats import chi2
 
 from wakewise.arrays import Array, freeze
-from wakewise.estimation.kernels import ERRORS, STATES, correct, predict, turn, turn_between
+from wakewise.estimation.kernels import (
+    GAINS,
+    GYRO,
+    correct,
+    felt,
+    predict,
+    turn_between,
+    turned_by,
+    unexplained,
+)
 from wakewise.estimation.settings import FilterSettings
-from wakewise.geometry import Pose, matrix_from_quat, skew
+from wakewise.geometry import Pose, matrix_from_quat
 from wakewise.interfaces import BodyState, Measurement
-from wakewise.vehicles import Vehicle, acceleration, compile_body
+from wakewise.vehicles import Vehicle, compile_body
 
 _GRAVITY_M_S2 = 9.80665
 _TICK_S = 1e-9
@@ -47,7 +63,7 @@ _NOISIEST = 300.0
 class FilterState:
     """Everything that the filter remembers.
 
-    `mean`, shape (25,), and `covariance`, shape (24, 24), as laid out in `kernels`, hold at `settled_s`; so do
+    `mean`, shape (E + 1,), and `covariance`, shape (E, E), as laid out in `kernels`, hold at `settled_s`; so do
     `thrusts_N`, shape (n,), what the thrusters are believed to give, behind their commands. `time_s` is now, on the
     clock of the measurements. `commands` (from when, thrusts) and `waiting` measurements are what lies between.
     """
@@ -67,7 +83,8 @@ class FilterState:
     late: int = 0
 
     def __post_init__(self) -> None:
-        freeze(self, mean=(STATES,), covariance=(ERRORS, ERRORS), thrusts_N=(None,), leaning=(6,))
+        errors = len(self.mean) - 1
+        freeze(self, mean=(None,), covariance=(errors, errors), thrusts_N=(None,), leaning=(6,))
 
     @property
     def unmodelled_force_W_N(self) -> Array:
@@ -108,6 +125,7 @@ class ErrorStateFilter:
                 s.moment_walk_N_m,
                 s.gyro_bias_walk_rad_s2,
                 s.accelerometer_bias_walk_m_s3,
+                s.moment_share,
             ]
         )
         self._gate = {n: float(chi2.isf(s.gate, n)) if s.gate > 0.0 else np.inf for n in (1, 3, 6)}
@@ -121,12 +139,22 @@ class ErrorStateFilter:
             s.gyro_bias_std_rad_s,
             s.accelerometer_bias_std_m_s2,
         )
-        self._start_covariance = np.diag(np.repeat(np.square(spread), 3))
-        self._push_to_motion = np.linalg.inv(self._body.mass_matrix)[:3, :3]
+        n = self._B.shape[1]
+        slow = (s.pose_slow_std_m, s.pose_slow_std_rad)
+        self._camera = GAINS + n if any(slow) else None
+        """Where the camera's slow error begins among the errors, if there is one."""
+        lasting = np.repeat([s.current_std_m_s, s.drag_std, s.inertia_std, s.gain_std], [3, 6, 6, n])
+        lasts_s = np.full(len(lasting), s.lasting_s)
+        if self._camera is not None:
+            lasting = np.concatenate([lasting, np.repeat(slow, 3)])
+            lasts_s = np.concatenate([lasts_s, np.full(6, s.pose_slow_s)])
+        self._lasting, self._lasts_s = lasting, lasts_s
+        self._start_covariance = np.diag(np.square(np.concatenate([np.repeat(spread, 3), lasting])))
+        self._errors = len(self._start_covariance)
 
     def init(self, start: BodyState) -> FilterState:
         """State at the start, from a first guess; thrusters still, no bias, nothing unmodelled."""
-        mean = np.zeros(STATES)
+        mean = np.zeros(self._errors + 1)
         mean[:3], mean[3:7], mean[7:13] = start.X_WB.p_m, start.X_WB.q, start.nu_B
         return FilterState(
             time_s=self._start_s,
@@ -178,7 +206,7 @@ class ErrorStateFilter:
             self._take(walk, measured)
         self._advance(walk, now_s)
         mean = walk.mean
-        load_B = np.concatenate([turn(mean[3:7], mean[13:16], -1.0), mean[16:19]])
+        load_B = unexplained(self._packed, self._B, mean, walk.thrusts_N)
         return BodyState(X_WB=Pose(mean[:3], mean[3:7]), nu_B=mean[7:13], load_B=load_B, covariance=walk.P[:12, :12])
 
     def _advance(self, walk: _Walk, until_s: float) -> None:
@@ -192,38 +220,47 @@ class ErrorStateFilter:
             push = command + (walk.thrusts_N - command) * (self._lag_s / dt_s) * (1.0 - kept)
             noise = self._noise.copy()
             noise[:4] *= walk.noise_scale
-            predict(self._packed, walk.mean, walk.P, self._B @ push, dt_s, noise)
+            predict(self._packed, self._B, walk.mean, walk.P, push, dt_s, noise, self._lasting, self._lasts_s)
             walk.thrusts_N = command + kept * (walk.thrusts_N - command)
             walk.time_s = end_s
 
     def _take(self, walk: _Walk, measured: Measurement) -> None:
         s = self.settings
         if measured.X_WB is not None and np.isfinite(measured.X_WB.p_m.sum() + measured.X_WB.q.sum()):
-            H, residual = np.zeros((6, ERRORS)), np.empty(6)
-            H[:, :6] = np.eye(6)
-            residual[:3] = measured.X_WB.p_m - walk.mean[:3]
-            residual[3:] = turn_between(walk.mean[3:7], measured.X_WB.q)
             if walk.refused_in_a_row >= s.gate_patience:
-                walk.P[np.diag_indices(ERRORS)] += np.diag(self._start_covariance)
-            std = np.repeat([s.position_std_m, s.attitude_std_rad], 3)
-            self._heed(walk, residual / np.sqrt(np.diag(walk.P)[:6] + std**2))
+                walk.P[np.diag_indices(self._errors)] += np.diag(self._start_covariance)
+            H, residual, std = self._pose_rows(walk, measured.X_WB)
+            self._heed(walk, residual / np.sqrt(np.einsum("ij,jk,ik->i", H, walk.P, H) + std**2))
             distance = self._correct(walk, H, residual, std)
             walk.refused_in_a_row = 0 if distance <= self._gate[6] else walk.refused_in_a_row + 1
         if measured.p_WB_m is not None and np.isfinite(measured.p_WB_m).all():
-            H = np.zeros((3, ERRORS))
+            H = np.zeros((3, self._errors))
             H[:, :3] = np.eye(3)
             self._correct(walk, H, measured.p_WB_m - walk.mean[:3], np.full(3, s.tracking_std_m))
         if measured.depth_m is not None and np.isfinite(measured.depth_m):
-            H = np.zeros((1, ERRORS))
+            H = np.zeros((1, self._errors))
             H[0, 2] = 1.0
             self._correct(walk, H, np.array([measured.depth_m - walk.mean[2]]), np.array([s.depth_std_m]))
         if measured.omega_B_rad_s is not None and np.isfinite(measured.omega_B_rad_s).all():
-            H = np.zeros((3, ERRORS))
-            H[:, 9:12] = H[:, 18:21] = np.eye(3)
+            H = np.zeros((3, self._errors))
+            H[:, 9:12] = H[:, GYRO : GYRO + 3] = np.eye(3)
             expected = walk.mean[10:13] + walk.mean[19:22]
             self._correct(walk, H, measured.omega_B_rad_s - expected, np.full(3, s.gyro_std_rad_s))
         if measured.force_B_m_s2 is not None and np.isfinite(measured.force_B_m_s2).all():
             self._take_force(walk, measured.force_B_m_s2, measured.time_s)
+
+    def _pose_rows(self, walk: _Walk, seen: Pose) -> tuple[Array, Array, Array]:
+        """Jacobian (6, E), residual (6,) and noise (6,) of a camera pose, its slow error included."""
+        H, residual, q = np.zeros((6, self._errors)), np.empty(6), walk.mean[3:7]
+        H[:, :6] = np.eye(6)
+        residual[:3] = seen.p_m - walk.mean[:3]
+        if self._camera is not None:
+            k = self._camera
+            H[:, k:] = np.eye(6)
+            residual[:3] -= walk.mean[k + 1 : k + 4]
+            q = turned_by(q, walk.mean[k + 4 : k + 7])
+        residual[3:] = turn_between(q, seen.q)
+        return H, residual, np.repeat([self.settings.position_std_m, self.settings.attitude_std_rad], 3)
 
     @staticmethod
     def _heed(walk: _Walk, innovation: Array) -> None:
@@ -241,15 +278,8 @@ class ErrorStateFilter:
         mean = walk.mean
         R_WB = matrix_from_quat(mean[3:7])
         down_B = R_WB.T @ np.array([0.0, 0.0, _GRAVITY_M_S2])
-        wrench = self._B @ walk.thrusts_N
-        wrench[:3] += R_WB.T @ mean[13:16]
-        wrench[3:] += mean[16:19]
-        rate = acceleration(self._body, mean[3:7], mean[7:13], wrench, np.zeros(3))
-        expected = rate[:3] + np.cross(mean[10:13], mean[7:10]) - down_B + mean[22:25]
-        H = np.zeros((3, ERRORS))
-        H[:, 3:6] = -skew(down_B)
-        H[:, 12:15] = self._push_to_motion @ R_WB.T
-        H[:, 21:24] = np.eye(3)
+        H = np.empty((3, self._errors))
+        expected = felt(self._packed, self._B, mean, walk.thrusts_N, down_B, H)
         period_s = max(time_s - walk.force_s, 1e-3) if walk.force_s is not None else 0.02
         walk.force_s = time_s
         s = self.settings

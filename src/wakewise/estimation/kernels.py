@@ -1,9 +1,11 @@
 """Compiled steps of the error-state filter; see `error_state` for what they mean.
 
-`mean`, shape (25,): position in W (0:3), quaternion q_WB (3:7), twist in B (7:13), unmodelled force in W (13:16),
-unmodelled moment in B (16:19), gyro bias (19:22), accelerometer bias (22:25).
-`P`, shape (24, 24), is the covariance of the error: position in W (0:3), turn, a rotation vector in B (3:6), twist
-(6:12), force (12:15), moment (15:18), gyro bias (18:21), accelerometer bias (21:24).
+`mean`, shape (41 + n [+ 6],) for n thrusters: position in W (0:3), quaternion q_WB (3:7), twist in B (7:13),
+unmodelled force in W (13:16), unmodelled moment in B (16:19), gyro bias (19:22), accelerometer bias (22:25), current in
+W (25:28); then by how much of itself the truth differs from the nominal in drag (28:34) and inertia (34:40) per degree
+of freedom and in each thruster's gain (40:40 + n); last, if asked for, the camera's slow error: shift in W, turn in B.
+`P` is the covariance of the error, which has one entry less: position in W (0:3), turn, a rotation vector in B (3:6),
+then as in `mean`, each place one lower.
 """
 
 from __future__ import annotations
@@ -12,10 +14,11 @@ import numpy as np
 from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.vehicles.kernels import INVERSE, LINEAR, QUADRATIC, coriolis, damping, rate_kernel, rotate
 from wakewise.vehicles.runge_kutta import rk4_jacobian_kernel
 
-STATES, ERRORS, MOVING = 25, 24, 12
-"""Entries of `mean`, of its error, and of the part of the error that the equations of motion move."""
+MOVING, FORCE, MOMENT, GYRO, FELT, CURRENT, DRAG, INERTIA, GAINS = 12, 12, 15, 18, 21, 24, 27, 33, 39
+"""Where each block of the error begins; the first is how many entries the equations of motion move."""
 
 
 @njit(cache=True)
@@ -59,60 +62,227 @@ def turn_between(q: Array, other: Array) -> Array:
 
 
 @njit(cache=True)
-def _inputs(mean: Array, wrench_B: Array, inputs: Array) -> Array:
-    """Fill what the equations of motion are given, and return the unmodelled force as seen from B, shape (3,)."""
-    load_B = turn(mean[3:7], mean[13:16], -1.0)
-    for i in range(3):
-        inputs[i] = wrench_B[i] + load_B[i]
-        inputs[3 + i] = wrench_B[3 + i] + mean[16 + i]
-        inputs[6 + i] = 0.0
-    return load_B
+def believed(packed: Array, mean: Array) -> Array:
+    """The vehicle's packed numbers with the drag and the inertia that the mean now believes in, shape (20, 6)."""
+    own = packed.copy()
+    for i in range(6):
+        drag, root = 1.0 + mean[1 + DRAG + i], np.sqrt(1.0 + mean[1 + INERTIA + i])
+        for j in range(6):
+            own[i, j] *= root
+            own[j, i] *= root
+            own[INVERSE + i, j] /= root
+            own[INVERSE + j, i] /= root
+            own[LINEAR + i, j] *= drag
+        own[QUADRATIC, i] *= drag
+    return own
 
 
 @njit(cache=True)
-def predict(packed: Array, mean: Array, P: Array, wrench_B: Array, dt_s: float, noise: Array) -> None:
-    """Advance mean and covariance in place by dt_s.
+def pushed(allocation: Array, mean: Array, thrusts_N: Array) -> Array:
+    """Wrench in B of thrusts, with the gains believed in, and of what the model does not explain, shape (6,)."""
+    wrench = np.empty(6)
+    load_B = turn(mean[3:7], mean[13:16], -1.0)
+    for i in range(3):
+        wrench[i] = load_B[i]
+        wrench[3 + i] = mean[16 + i]
+    for k in range(thrusts_N.shape[0]):
+        thrust = (1.0 + mean[1 + GAINS + k]) * thrusts_N[k]
+        for i in range(6):
+            wrench[i] += allocation[i, k] * thrust
+    return wrench
 
-    `noise`, shape (6,), are spectral densities (amplitudes) of the errors of the modelled linear and angular
-    acceleration, and of the random walks of force, moment, gyro bias and accelerometer bias.
-    """
+
+@njit(cache=True)
+def _past(mean: Array) -> tuple[float, float, float, float, float, float]:
+    """Twist relative to the water, in B."""
+    x, y, z = rotate(-mean[3], mean[4], mean[5], mean[6], mean[25], mean[26], mean[27])
+    return mean[7] - x, mean[8] - y, mean[9] - z, mean[10], mean[11], mean[12]
+
+
+@njit(cache=True)
+def unexplained(packed: Array, allocation: Array, mean: Array, thrusts_N: Array) -> Array:
+    """Wrench in B, shape (6,), that the nominal vehicle in still water lacks to move as the mean has it."""
+    wrench = pushed(allocation, mean, thrusts_N)
+    own = damping(believed(packed, mean), _past(mean))
+    still = damping(packed, (mean[7], mean[8], mean[9], mean[10], mean[11], mean[12]))
+    for i in range(6):
+        for k in range(thrusts_N.shape[0]):
+            wrench[i] -= allocation[i, k] * thrusts_N[k]
+        wrench[i] += still[i] - own[i]
+    return wrench
+
+
+@njit(cache=True)
+def _inputs(allocation: Array, mean: Array, thrusts_N: Array) -> Array:
     inputs = np.empty(9)
-    load_B = _inputs(mean, wrench_B, inputs)
-    q = mean[3:7].copy()
+    inputs[:6] = pushed(allocation, mean, thrusts_N)
+    inputs[6:] = mean[25:28]
+    return inputs
+
+
+@njit(cache=True)
+def _effects(own: Array, mean: Array, inputs: Array) -> Array:
+    """Wrench, shape (6, 12), by the relative change of drag and of inertia in each degree of freedom."""
+    rate = np.empty(13)
+    rate_kernel(own, mean[:13], inputs, rate)
+    past, w = _past(mean), mean[10:13]
+    b = (mean[7] - past[0], mean[8] - past[1], mean[9] - past[2])
+    # Acceleration relative to the water, which in B turns against the body.
+    a = rate[7:].copy()
+    a[0] += w[1] * b[2] - w[2] * b[1]
+    a[1] += w[2] * b[0] - w[0] * b[2]
+    a[2] += w[0] * b[1] - w[1] * b[0]
+    drag = damping(own, past)
+    effect = np.zeros((6, 12))
+    for i in range(6):
+        effect[i, i] = -drag[i] / (1.0 + mean[1 + DRAG + i])
+        # What the momentum h = M n and the force M a change by, with M = S M S and S the roots of the factors.
+        share = 0.5 / (1.0 + mean[1 + INERTIA + i])
+        h, force = np.zeros(6), np.zeros(6)
+        for j in range(6):
+            h[i] += share * own[i, j] * past[j]
+            h[j] += share * own[j, i] * past[i]
+            force[i] += share * own[i, j] * a[j]
+            force[j] += share * own[j, i] * a[i]
+        for k in range(3):
+            m, n = (k + 1) % 3, (k + 2) % 3
+            force[k] += w[m] * h[n] - w[n] * h[m]
+            force[3 + k] += w[m] * h[3 + n] - w[n] * h[3 + m] + past[m] * h[n] - past[n] * h[m]
+        for j in range(6):
+            effect[j, 6 + i] = -force[j]
+    return effect
+
+
+@njit(cache=True)
+def _add_current(F: Array, A: Array, mean: Array, dt_s: float) -> None:
+    """Fill F's columns of the current: it acts as a velocity the other way, and turns in B."""
+    q, w = mean[3:7], mean[10:13]
+    for j in range(3):
+        axis = np.zeros(3)
+        axis[j] = 1.0
+        seen = turn(q, axis, -1.0)
+        change = np.zeros(6)
+        for i in range(6):
+            for k in range(3):
+                change[i] -= (A[6 + i, 6 + k] - (1.0 if i == k else 0.0)) * seen[k]
+        change[0] -= dt_s * (w[1] * seen[2] - w[2] * seen[1])
+        change[1] -= dt_s * (w[2] * seen[0] - w[0] * seen[2])
+        change[2] -= dt_s * (w[0] * seen[1] - w[1] * seen[0])
+        moved = turn(q, change[:3].copy(), 1.0)
+        for i in range(3):
+            F[i, CURRENT + j] = 0.5 * dt_s * moved[i]
+            F[3 + i, CURRENT + j] = 0.5 * dt_s * change[3 + i]
+            F[6 + i, CURRENT + j] = change[i]
+            F[9 + i, CURRENT + j] = change[3 + i]
+
+
+@njit(cache=True)
+def moved(packed: Array, allocation: Array, mean: Array, thrusts_N: Array, dt_s: float, errors: int) -> Array:
+    """Advance the mean's motion in place by dt_s, some hundredths at most; return its Jacobian, shape (12, errors).
+
+    Drag and inertia enter the Jacobian as they act half-way, the current as it does at the start of the step.
+    """
+    own = believed(packed, mean)
+    inputs = _inputs(allocation, mean, thrusts_N)
+    load_B = turn(mean[3:7], mean[13:16], -1.0)
+    before = mean[:28].copy()
     A, B = np.empty((MOVING, MOVING)), np.empty((MOVING, 6))
-    rk4_jacobian_kernel(packed, mean[:13], inputs, dt_s, A, B)
-    # F = [[A + dB, E], [0, 1]]: E takes force (from W to B) and moment to the motion; a turn of the body turns the
-    # force that it sees by S(load_B).
-    F = np.zeros((MOVING, 18))
+    rk4_jacobian_kernel(own, mean[:13], inputs, dt_s, A, B)
+    halfway = mean.copy()
+    halfway[:13] = 0.5 * (before[:13] + mean[:13])
+    halfway[3:7] /= np.sqrt(np.dot(halfway[3:7], halfway[3:7]))
+    effect = _effects(own, halfway, inputs)
+    F = np.zeros((MOVING, errors))
+    F[:, :MOVING] = A
+    _add_current(F, A, before, dt_s)
+    F[:, DRAG:GAINS] = B @ effect
+    by_gain = B @ allocation
     for i in range(MOVING):
-        for j in range(MOVING):
-            F[i, j] = A[i, j]
+        # A turn of the body turns the force that it sees by S(load_B).
         b0, b1, b2 = B[i, 0], B[i, 1], B[i, 2]
         F[i, 3] += b1 * load_B[2] - b2 * load_B[1]
         F[i, 4] += b2 * load_B[0] - b0 * load_B[2]
         F[i, 5] += b0 * load_B[1] - b1 * load_B[0]
-        row = turn(q, B[i, :3].copy(), 1.0)
+        row = turn(before[3:7], B[i, :3].copy(), 1.0)
         for j in range(3):
-            F[i, 12 + j] = row[j]
-            F[i, 15 + j] = B[i, 3 + j]
-    top = np.zeros((MOVING, ERRORS))
+            F[i, FORCE + j] = row[j]
+            F[i, MOMENT + j] = B[i, 3 + j]
+        for k in range(thrusts_N.shape[0]):
+            F[i, GAINS + k] = by_gain[i, k] * thrusts_N[k]
+    return F
+
+
+@njit(cache=True)
+def felt(packed: Array, allocation: Array, mean: Array, thrusts_N: Array, down_B: Array, H: Array) -> Array:
+    """Specific force at the body origin as an accelerometer tells it, bias included, shape (3,).
+
+    dv/dt + omega x v - down_B, with gravity `down_B` in B; writes its Jacobian to H, shape (3, E).
+    """
+    after, instant_s = mean.copy(), 1e-7
+    F = moved(packed, allocation, after, thrusts_N, instant_s, H.shape[1])
+    v, w = mean[7:10], mean[10:13]
+    force = np.empty(3)
+    for i in range(3):
+        a, b = (i + 1) % 3, (i + 2) % 3
+        force[i] = (after[7 + i] - mean[7 + i]) / instant_s + w[a] * v[b] - w[b] * v[a] - down_B[i] + mean[22 + i]
+        for j in range(H.shape[1]):
+            H[i, j] = (F[6 + i, j] - (1.0 if j == 6 + i else 0.0)) / instant_s
+        H[i, 6 + b] += w[a]
+        H[i, 6 + a] -= w[b]
+        H[i, 9 + a] += v[b]
+        H[i, 9 + b] -= v[a]
+        H[i, 3 + a] += down_B[b]
+        H[i, 3 + b] -= down_B[a]
+        H[i, FELT + i] += 1.0
+    return force
+
+
+@njit(cache=True)
+def predict(
+    packed: Array,
+    allocation: Array,
+    mean: Array,
+    P: Array,
+    thrusts_N: Array,
+    dt_s: float,
+    noise: Array,
+    spread: Array,
+    lasts_s: Array,
+) -> None:
+    """Advance mean and covariance in place by dt_s, some hundredths at most.
+
+    `noise`, shape (7,), are spectral densities (amplitudes) of the errors of the modelled linear and angular
+    acceleration, of the random walks of force, moment, gyro bias and accelerometer bias, and last of what is added to
+    the moment's walk per moment of Coriolis and Munk: gyros are so exact that they would otherwise turn products of two
+    unknowns, of which a linear filter knows nothing, into knowledge. What comes after the accelerometer's bias is a
+    first-order Gauss-Markov process each, of standard deviation `spread` and time `lasts_s`, both of shape (E - 24,).
+    """
+    q = mean[3:7].copy()
+    strays = noise.copy()
+    turning = coriolis(believed(packed, mean), _past(mean))
+    strays[3] = np.hypot(noise[3], noise[6] * np.sqrt(turning[3] ** 2 + turning[4] ** 2 + turning[5] ** 2))
+    F = moved(packed, allocation, mean, thrusts_N, dt_s, P.shape[0])
+    top = F @ P
+    block = top @ F.T
     for i in range(MOVING):
-        for k in range(18):
-            f = F[i, k]
-            if f != 0.0:
-                for j in range(ERRORS):
-                    top[i, j] += f * P[k, j]
-    for i in range(MOVING):
-        for j in range(i + 1):
-            total = 0.0
-            for k in range(18):
-                total += top[i, k] * F[j, k]
-            P[i, j] = total
-            P[j, i] = total
-        for j in range(MOVING, ERRORS):
+        for j in range(MOVING):
+            P[i, j] = 0.5 * (block[i, j] + block[j, i])
+        for j in range(MOVING, P.shape[0]):
             P[i, j] = top[i, j]
             P[j, i] = top[i, j]
-    _add_noise(P, q, dt_s, noise)
+    _add_noise(P, q, dt_s, strays)
+    _fade(mean, P, dt_s, spread, lasts_s)
+
+
+@njit(cache=True)
+def _fade(mean: Array, P: Array, dt_s: float, spread: Array, lasts_s: Array) -> None:
+    for k in range(spread.shape[0]):
+        i, kept = CURRENT + k, np.exp(-dt_s / lasts_s[k])
+        mean[1 + i] *= kept
+        for j in range(P.shape[0]):
+            P[i, j] *= kept
+            P[j, i] *= kept
+        P[i, i] += spread[k] ** 2 * (1.0 - kept * kept)
 
 
 @njit(cache=True)
@@ -133,13 +303,13 @@ def _add_noise(P: Array, q: Array, dt_s: float, noise: Array) -> None:
             P[6 + i, j] += column[j] * linear * dt_s**2 / 2.0
     for block in range(4):
         for i in range(3):
-            k = 12 + 3 * block + i
+            k = FORCE + 3 * block + i
             P[k, k] += noise[2 + block] ** 2 * dt_s
 
 
 @njit(cache=True)
 def correct(mean: Array, P: Array, H: Array, residual: Array, R: Array, gate: float) -> float:
-    """Kalman update in place by a measurement with rows H (m, 24), residual (m,) and covariance R (m, m).
+    """Kalman update in place by a measurement with rows H (m, E), residual (m,) and covariance R (m, m).
 
     Returns the squared Mahalanobis distance of the residual; where it exceeds `gate` nothing is changed.
     """
@@ -151,15 +321,16 @@ def correct(mean: Array, P: Array, H: Array, residual: Array, R: Array, gate: fl
         return distance
     change = PH @ weighted
     P -= PH @ np.linalg.solve(S, np.ascontiguousarray(PH.T))
-    for i in range(ERRORS):
+    for i in range(P.shape[0]):
         for j in range(i):
             P[i, j] = 0.5 * (P[i, j] + P[j, i])
             P[j, i] = P[i, j]
     for i in range(3):
         mean[i] += change[i]
     mean[3:7] = turned_by(mean[3:7], change[3:6])
-    for i in range(6):
-        mean[7 + i] += change[6 + i]
-    for i in range(12):
-        mean[13 + i] += change[12 + i]
+    for i in range(6, P.shape[0]):
+        mean[1 + i] += change[i]
+    # No vehicle has a tenth, or ten times, of the drag and inertia that it is believed to have.
+    for i in range(DRAG, GAINS):
+        mean[1 + i] = min(max(mean[1 + i], -0.9), 9.0)
     return distance

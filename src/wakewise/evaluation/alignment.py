@@ -120,7 +120,11 @@ def _near(similarity: Similarity, points_B: Array, points_A: Array) -> BoolArray
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Refinement:
-    """What ICP did. `displacement_mm` is the mean way that the points moved: a large one means a bad first guess."""
+    """What ICP did. `displacement_mm` is the mean way that the points moved: a large one means a bad first guess.
+
+    `accepted` is False, and nothing moved, where the cloud fitted no better after than before. `matched_pct` is the
+    share of the cloud within the last round's distance of the surface.
+    """
 
     R: Array
     t_m: Array
@@ -128,6 +132,7 @@ class Refinement:
     turn_deg: float
     residual_mm: float
     matched_pct: float
+    accepted: bool
 
     def __post_init__(self) -> None:
         freeze(self, R=(3, 3), t_m=(3,))
@@ -144,6 +149,7 @@ def refine_icp(
     distances_m: tuple[float, ...] = (0.008, 0.004),
     voxel_m: float = 0.002,
     limit_m: float = 0.02,
+    least_matched_pct: float = 50.0,
 ) -> Refinement:
     """Rigid point-to-plane ICP of a cloud onto samples of the true surface, coarse to fine.
 
@@ -159,11 +165,14 @@ def refine_icp(
         Largest distance of a match in each round.
     limit_m : float
         Largest mean displacement that counts as a refinement.
+    least_matched_pct : float
+        Share of the cloud that must lie within the last distance in the end.
 
     Raises
     ------
     StageError
-        If too few points match or the cloud would move farther than `limit_m`: the alignment before it was wrong.
+        If too few points match or the cloud would move farther than `limit_m`: the alignment before it was wrong, or
+        this is no model of that surface.
     """
     target = small_gicp.PointCloud(np.asarray(surface_m, dtype=np.float64))
     # Estimating makes room for normals; the true ones then take their place.
@@ -200,15 +209,31 @@ def refine_icp(
         raise StageError(
             f"ICP: moved the cloud by {displacement * 1e3:.1f} mm, at most {limit_m * 1e3:g} mm is allowed"
         )
-    turn = float(np.degrees(np.arccos(np.clip((np.trace(T[:3, :3]) - 1) / 2, -1, 1))))
+    before_index, before = tree.batch_nearest_neighbor_search(points, num_threads=1)
     index, squared = tree.batch_nearest_neighbor_search(moved, num_threads=1)
+    accepted = _misfit(squared, distances_m[-1]) <= _misfit(before, distances_m[-1])
+    if not accepted:
+        T, moved, displacement, index, squared = np.eye(4), points, 0.0, before_index, before
+    turn = float(np.degrees(np.arccos(np.clip((np.trace(T[:3, :3]) - 1) / 2, -1, 1))))
     offset = np.einsum("ij,ij->i", moved - np.asarray(surface_m)[index], np.asarray(normals)[index])
     near = np.asarray(squared) < distances_m[-1] ** 2
+    matched_pct = 100.0 * float(near.mean())
+    if matched_pct < least_matched_pct:
+        raise StageError(
+            f"ICP: {matched_pct:.0f} % of the model lies within {distances_m[-1] * 1e3:g} mm of the true surface, "
+            f"at least {least_matched_pct:g} % must for the two to be the same thing"
+        )
     return Refinement(
         R=T[:3, :3],
         t_m=T[:3, 3],
         displacement_mm=1e3 * displacement,
         turn_deg=turn,
         residual_mm=1e3 * float(np.sqrt((offset[near] ** 2).mean())) if near.any() else float("inf"),
-        matched_pct=100.0 * float(near.mean()),
+        matched_pct=matched_pct,
+        accepted=accepted,
     )
+
+
+def _misfit(squared_m2: Array, limit_m: float) -> float:
+    """Mean squared distance, each capped at the limit: what robust ICP makes smaller."""
+    return float(np.minimum(np.asarray(squared_m2), limit_m**2).mean())

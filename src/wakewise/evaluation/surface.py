@@ -9,20 +9,22 @@ al., ACM TOG 36(4), 2017, doi 10.1145/3072959.3073599).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
 from scipy.spatial import KDTree
 
-from wakewise.arrays import Array, BoolArray, IntArray
+from wakewise.arrays import Array, BoolArray, IntArray, freeze
 from wakewise.errors import InputError, StageError
 from wakewise.evaluation.alignment import Refinement, refine_icp
 from wakewise.targets import MeshDistance
 
 SUCCESS_RMSE_MM = 3.0
 SUCCESS_COMPLETENESS_PCT = 85.0
+# Between a millimetre or an inch taken for a metre and a scene with much around its target.
+MAX_SCALE_RATIO = 20.0
 
 
 class Mesh(Protocol):
@@ -73,7 +75,7 @@ class SurfaceScore:
     accuracy_*mm_pct: share of the cloud nearer than that (precision). completeness_*: share of the true surface that
     has a cloud point nearer than that (recall); `completeness_pct` is at 3 mm. `_visible`: only over truth that at
     least `visible_views` cameras saw; None where visibility was not given. f_score: harmonic mean of precision and
-    recall at 3 mm, 0 to 100. success: rmse_mm < 3 and completeness_pct > 85.
+    recall at 3 mm, 0 to 100. success: rmse_mm < 3 and completeness_pct > 85. `DEFINITIONS` says all of it by key.
     """
 
     rmse_mm: float
@@ -88,12 +90,16 @@ class SurfaceScore:
     completeness_1mm_pct: float
     completeness_2mm_pct: float
     completeness_pct: float
+    completeness_visible_1mm_pct: float | None
+    completeness_visible_2mm_pct: float | None
     completeness_visible_pct: float | None
     visible_pct: float | None
     f_score: float
     success: bool
     icp_displacement_mm: float | None
     icp_residual_mm: float | None
+    icp_matched_pct: float | None
+    outside_pct: float
     cloud_points: int
     truth_samples: int
 
@@ -171,7 +177,24 @@ def thin(points_m: Array, voxel_m: float) -> Array:
     return np.stack([np.bincount(row, weights=points_m[:, k]) / count for k in range(3)], axis=1)
 
 
-def evaluate_surface(
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Comparison:
+    """A score with what it was computed from: the aligned, thinned cloud, shape (n, 3), and its errors, shape (n,)."""
+
+    score: SurfaceScore
+    points_W_m: Array
+    error_mm: Array
+
+    def __post_init__(self) -> None:
+        freeze(self, points_W_m=(None, 3), error_mm=(None,))
+
+
+def evaluate_surface(cloud_W_m: Array, mesh: Mesh, **options: Any) -> SurfaceScore:
+    """Score a cloud against a true mesh; takes what `compare_surface` takes."""
+    return compare_surface(cloud_W_m, mesh, **options).score
+
+
+def compare_surface(
     cloud_W_m: Array,
     mesh: Mesh,
     *,
@@ -183,7 +206,7 @@ def evaluate_surface(
     voxel_m: float = 0.0008,
     rng: np.random.Generator | None = None,
     samples: int = 150_000,
-) -> SurfaceScore:
+) -> Comparison:
     """Score a cloud against a true mesh; `SurfaceScore` defines every figure.
 
     Parameters
@@ -204,8 +227,12 @@ def evaluate_surface(
     InputError
         If the mesh is empty or nothing of it counts.
     StageError
-        If too little of the cloud lies near the truth to say anything.
+        If too little of the cloud lies near the truth to say anything, its scale is suspicious, or ICP says that the
+        two do not belong together.
     """
+    suspicion = suspicious_scale(cloud_W_m, mesh)
+    if suspicion is not None:
+        raise StageError(suspicion)
     crop = crop or Crop()
     rng = rng or np.random.default_rng(0)
     surface = sample_surface(mesh, crop, rng, samples)
@@ -227,7 +254,7 @@ def evaluate_surface(
         seen = count_views(surface, mesh, camera_centres_W_m) >= visible_views
     precision, recall = _share(to_truth_mm, 3.0), _share(to_cloud_mm, 3.0)
     rmse = float(np.sqrt((np.minimum(to_truth_mm, cap_mm) ** 2).mean()))
-    return SurfaceScore(
+    score = SurfaceScore(
         rmse_mm=rmse,
         rmse_cap_mm=cap_mm,
         accuracy_mean_mm=float(to_truth_mm.mean()),
@@ -240,17 +267,54 @@ def evaluate_surface(
         completeness_1mm_pct=_share(to_cloud_mm, 1.0),
         completeness_2mm_pct=_share(to_cloud_mm, 2.0),
         completeness_pct=recall,
-        completeness_visible_pct=_share(to_cloud_mm[seen], 3.0) if seen is not None and seen.any() else None,
+        completeness_visible_1mm_pct=_visible_share(to_cloud_mm, seen, 1.0),
+        completeness_visible_2mm_pct=_visible_share(to_cloud_mm, seen, 2.0),
+        completeness_visible_pct=_visible_share(to_cloud_mm, seen, 3.0),
         visible_pct=100.0 * float(seen.mean()) if seen is not None else None,
         f_score=2 * precision * recall / (precision + recall) if precision + recall > 0 else 0.0,
         success=rmse < SUCCESS_RMSE_MM and recall > SUCCESS_COMPLETENESS_PCT,
         icp_displacement_mm=refinement.displacement_mm if refinement else None,
         icp_residual_mm=refinement.residual_mm if refinement else None,
+        icp_matched_pct=refinement.matched_pct if refinement else None,
+        outside_pct=100.0 * (1.0 - len(kept) / len(cloud)),
         cloud_points=len(even),
         truth_samples=len(surface.points_m),
     )
+    return Comparison(score=score, points_W_m=even, error_mm=to_truth_mm)
+
+
+def suspicious_scale(cloud_m: Array, mesh: Mesh) -> str | None:
+    """A sentence if cloud and mesh differ so much in extent that one of them is hardly in metres; else None.
+
+    A cloud may hold more than the truth or a part of it only, so that a factor of ten either way proves nothing.
+    """
+    cloud = np.asarray(cloud_m, dtype=np.float64).reshape(-1, 3)
+    if len(cloud) < 2 or len(mesh.vertices_m) == 0:
+        return None
+    # The middle nine tenths: one stray point must not make a cloud look large.
+    low, high = np.percentile(cloud, (5.0, 95.0), axis=0)
+    extent = float(np.linalg.norm(high - low)) / 0.9
+    truth = float(np.linalg.norm(np.ptp(np.asarray(mesh.vertices_m), axis=0)))
+    if extent <= 0.0 or truth <= 0.0 or 1.0 / MAX_SCALE_RATIO < extent / truth < MAX_SCALE_RATIO:
+        return None
+    ratio = extent / truth
+    return (
+        f"reference: {truth:.3g} m across while the cloud is {extent:.3g} m, a suspicious scale (ratio {ratio:.3g}); "
+        "are both in metres?"
+    )
+
+
+def error_colours(error_mm: Array, top_mm: float = 3.0) -> Array:
+    """Colours (red, green, blue, 0 to 1), shape (n, 3), from blue (0) over green to red (`top_mm` and more)."""
+    share = np.clip(np.asarray(error_mm) / top_mm, 0.0, 1.0)
+    return np.stack([np.clip(2 * share - 1, 0, 1), 1 - np.abs(2 * share - 1), np.clip(1 - 2 * share, 0, 1)], axis=1)
 
 
 def _share(distance_mm: Array, threshold_mm: float) -> float:
     """Share in percent of distances below a threshold."""
     return 100.0 * float((distance_mm < threshold_mm).mean())
+
+
+def _visible_share(distance_mm: Array, seen: BoolArray | None, threshold_mm: float) -> float | None:
+    """The same over what was seen; None where that is not known or nothing."""
+    return _share(distance_mm[seen], threshold_mm) if seen is not None and seen.any() else None

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from wakewise.evaluation import SURFACE_DEFINITIONS
+
 Figures = dict[str, Any]
 
 # key: (unit, definition). The order is that of tables. Target speeds are the excess over the flow without thrusters.
@@ -21,6 +23,9 @@ _FIGURES: dict[str, tuple[str, str]] = {
     "completeness_1mm_pct": ("%", "share of the true surface with a cloud point within 1 mm"),
     "completeness_2mm_pct": ("%", "share of the true surface with a cloud point within 2 mm"),
     "f_score": ("%", "harmonic mean of precision and recall at 3 mm (Tanks and Temples), 0 to 100"),
+    **{key: SURFACE_DEFINITIONS[key] for key in (
+        "accuracy_p90_mm", "completeness_visible_1mm_pct", "completeness_visible_2mm_pct", "visible_pct",
+        "icp_displacement_mm", "icp_matched_pct", "outside_pct")},
     "images": ("", "photographs taken"),
     "registered_images": ("", "photographs that found their place in the model"),
     "features_per_image": ("", "mean number of SIFT keypoints in a photograph"),

@@ -7,8 +7,8 @@ import io
 import json
 import platform
 from collections.abc import Callable
+from contextlib import suppress
 from importlib.metadata import version
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +16,11 @@ import numpy as np
 import polars as pl
 
 from wakewise import __version__
-from wakewise.arrays import Array
 from wakewise.errors import InputError, StageError
 from wakewise.evaluation import Crop, evaluate_surface, flight_figures
 from wakewise.experiments.metrics import Figures, Gathering, comparison
 from wakewise.experiments.stages import Ledger, Quiet, Watch
+from wakewise.experiments.textured import write_textured
 from wakewise.files import write_json, write_text
 from wakewise.geometry import matrix_from_quat
 from wakewise.missions import SETTLING
@@ -47,12 +47,17 @@ _SURFACE_FIGURES = (
     "completeness_1mm_pct",
     "completeness_2mm_pct",
     "f_score",
+    "accuracy_p90_mm",
+    "completeness_visible_1mm_pct",
+    "completeness_visible_2mm_pct",
+    "visible_pct",
+    "icp_displacement_mm",
+    "icp_matched_pct",
+    "outside_pct",
 )
 _MODEL_FIGURES = ("reprojection_px", "cameras_rmse_mm", "features_per_image", "inlier_matches")
-# Views whose axes differ by more hardly share a SIFT match (Mikolajczyk & Schmid 2005, doi 10.1109/TPAMI.2005.188).
-_PAIR_ANGLE_RAD = np.radians(45.0)
 # What is reconstructed is a little more than the target: estimated cameras put it some millimetres off its place.
-_REGION_SHARE = 1.25
+REGION_SHARE = 1.25
 
 
 def run_trial(scenario: Scenario, folder: Path, watch: Watch | None = None) -> Figures:
@@ -86,6 +91,13 @@ def run_trial(scenario: Scenario, folder: Path, watch: Watch | None = None) -> F
     gathering.add({"wall_s": ledger.total("wall_s"), "cpu_s": ledger.total("cpu_s")})
     result = gathering.finish()
     write_json(folder / "metrics.json", result)
+    # For people only, so it is no part of what the trial is said to have cost.
+    mesh, coloured = folder / "mesh.ply", folder / "mesh.glb"
+    if coloured.exists() and mesh.exists() and coloured.stat().st_mtime >= mesh.stat().st_mtime:
+        watch.skipped("colours")
+    elif mesh.exists():
+        with watch.stage("colours") as progress:
+            texture_trial(mission, folder, progress)
     return result
 
 
@@ -147,9 +159,9 @@ def reconstruct_trial(scenario: Scenario, mission: Mission, folder: Path, progre
             folder,
             scenario.reconstruction,
             focal_px=build_camera(scenario).focal_px,
-            pairs=nearby_pairs(names, axes),
             reference_positions=dict(zip(names, centres, strict=True)),
-            region=(mission.target.centre_W_m, _REGION_SHARE * mission.target.radius_m),
+            reference_axes=dict(zip(names, axes, strict=True)),
+            region=(mission.target.centre_W_m, REGION_SHARE * mission.target.radius_m),
             progress=progress,
         )
         summary: dict[str, Any] = model.summary()
@@ -158,12 +170,11 @@ def reconstruct_trial(scenario: Scenario, mission: Mission, folder: Path, progre
         write_json(folder / "model.json", {"figures": {}, "failure": str(fault)})
 
 
-def nearby_pairs(names: list[str], axes_W: Array) -> list[tuple[str, str]]:
-    """Pairs of photographs whose optical axes, shape (n, 3), are near enough to share features."""
-    cosine = axes_W @ axes_W.T
-    return [
-        (names[i], names[j]) for i, j in combinations(range(len(names)), 2) if cosine[i, j] > np.cos(_PAIR_ANGLE_RAD)
-    ]
+def texture_trial(mission: Mission, folder: Path, progress: Callable[..., None]) -> None:
+    """Write the model in the photographs' colours (mesh.glb), for people; a mesh that no photograph sees gets none."""
+    bed_z_m = mission.target.bed_z_m
+    with suppress(StageError):
+        write_textured(folder, folder / "images", folder / "mesh.glb", bed_z_m=bed_z_m, progress=progress)
 
 
 def evaluate_trial(mission: Mission, folder: Path) -> dict[str, Any]:

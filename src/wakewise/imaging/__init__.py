@@ -6,22 +6,30 @@ the true silt and a seed.
 """
 
 from wakewise.imaging.blur import motion_blur, motion_px, pose_at
-from wakewise.imaging.camera import PinholeCamera
+from wakewise.imaging.camera import Camera, FlatPort, LensCamera, PinholeCamera
+from wakewise.imaging.camera_model import Calibration, calibrate
 from wakewise.imaging.optics import SiltOptics, WaterOptics, haze_between, through_water, water_optics, water_types
+from wakewise.imaging.panels import Panels
 from wakewise.imaging.photograph import Photo, photograph, photograph_of, sharpness
 from wakewise.imaging.renderer import Lights, Render, render
 from wakewise.imaging.scene import Scene
 from wakewise.imaging.settings import ImagingSettings
 
 __all__ = [
+    "Calibration",
+    "Camera",
+    "FlatPort",
     "ImagingSettings",
+    "LensCamera",
     "Lights",
+    "Panels",
     "Photo",
     "PinholeCamera",
     "Render",
     "Scene",
     "SiltOptics",
     "WaterOptics",
+    "calibrate",
     "haze_between",
     "motion_blur",
     "motion_px",

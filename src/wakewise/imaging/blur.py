@@ -16,7 +16,8 @@ from numba import njit, prange
 
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
-from wakewise.imaging.camera import PinholeCamera
+from wakewise.imaging.camera import Camera
+from wakewise.imaging.lens import IDEAL, pixel_at, ray_at
 from wakewise.imaging.renderer import Image
 
 STEP_PX = 1.0
@@ -24,6 +25,8 @@ STEP_PX = 1.0
 STILL_PX = 0.02
 """Motion below which a frame counts as still."""
 MOST_FRAMES = 65
+FAR_M = 1e4
+"""What is nowhere is taken to be this far."""
 
 
 def pose_at(poses: Sequence[Pose], fraction: float) -> Pose:
@@ -39,18 +42,18 @@ def pose_at(poses: Sequence[Pose], fraction: float) -> Pose:
     return Pose((1.0 - t) * a.p_m + t * b.p_m, quat_multiply(a.q, quat_from_rotvec(t * turn)))
 
 
-def motion_px(camera: PinholeCamera, poses: Sequence[Pose], depth_m: float) -> float:
+def motion_px(camera: Camera, poses: Sequence[Pose], depth_m: float) -> float:
     """Longest path in pixels that a point seen in the middle view at `depth_m` takes during the exposure."""
     middle = pose_at(poses, 0.5)
     w, h = camera.width, camera.height
     grid = np.array([[x, y] for x in (0.0, 0.5 * w, w) for y in (0.0, 0.5 * h, h)])
-    points_W = middle.apply(camera.rays(grid) * depth_m)
+    points_W = middle.apply(camera.unproject(grid, np.full(len(grid), depth_m)))
     track = np.stack([camera.project(pose.inverse().apply(points_W)) for pose in poses])
     path = np.linalg.norm(np.diff(track, axis=0), axis=2).sum(axis=0)
     return float(np.nanmax(path, initial=0.0))
 
 
-def motion_blur(image: Image, depth_m: Image, camera: PinholeCamera, poses: Sequence[Pose]) -> Image:
+def motion_blur(image: Image, depth_m: Image, camera: Camera, poses: Sequence[Pose]) -> Image:
     """Average the frames of an exposure, each warped from the one at its middle.
 
     Parameters
@@ -59,7 +62,7 @@ def motion_blur(image: Image, depth_m: Image, camera: PinholeCamera, poses: Sequ
         Linear radiance from `pose_at(poses, 0.5)`.
     depth_m : ndarray, shape (h, w)
         Depth along the optical axis, infinite where nothing is seen.
-    camera : PinholeCamera
+    camera : Camera
     poses : sequence of Pose
         X_WC evenly spaced over the exposure, the first and last at its ends.
 
@@ -73,18 +76,20 @@ def motion_blur(image: Image, depth_m: Image, camera: PinholeCamera, poses: Sequ
     motion = motion_px(camera, poses, min(near, 1e3))
     if motion < STILL_PX:
         return image
-    frames = int(np.clip(math.ceil(motion / STEP_PX), 3, MOST_FRAMES))
+    # An odd number, so that the middle frame is the view itself.
+    frames = int(np.clip(2 * math.ceil(0.5 * (motion / STEP_PX - 1.0)) + 1, 3, MOST_FRAMES))
     middle = pose_at(poses, 0.5)
     turns, shifts = np.empty((frames, 3, 3)), np.empty((frames, 3))
     for k in range(frames):
         X_KM = pose_at(poses, (k + 0.5) / frames).inverse() @ middle
         turns[k], shifts[k] = X_KM.R, X_KM.p_m
     out = np.empty_like(image)
-    _average(out, image, depth_m, turns, shifts, camera.focal_px)
+    row = camera.row
+    _average(out, image, 1.0 / depth_m, turns, shifts, np.append(row, 1.0 / row[1:3]))
     return out
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, inline="always", error_model="numpy")
 def _cubic(t: float) -> tuple[float, float, float, float]:
     """Weights of four neighbours at a fraction t: cubic convolution (Keys 1981, doi 10.1109/TASSP.1981.1163711).
 
@@ -98,30 +103,42 @@ def _cubic(t: float) -> tuple[float, float, float, float]:
     )
 
 
-@njit(cache=True, parallel=True)
-def _average(out: Any, image: Any, depth_m: Any, turns: Any, shifts: Any, focal_px: float) -> None:
-    """Mean over frames k of image[q_k(p)], where q_k solves project_k(q) = p by fixed-point steps from q = p."""
-    h, w = depth_m.shape
+@njit(cache=True, inline="always", error_model="numpy")
+def _seen_at(lens: Any, turns: Any, shifts: Any, k: int, qx: float, qy: float, nearness: float) -> tuple[float, float]:
+    """Pixel at which another frame sees what the middle one sees in the pixel (qx, qy) at 1 / nearness."""
+    if lens[0] == IDEAL:
+        rx, ry = (qx - lens[3]) * lens[14], (qy - lens[4]) * lens[15]
+        x = turns[k, 0, 0] * rx + turns[k, 0, 1] * ry + turns[k, 0, 2] + shifts[k, 0] * nearness
+        y = turns[k, 1, 0] * rx + turns[k, 1, 1] * ry + turns[k, 1, 2] + shifts[k, 1] * nearness
+        z = max(turns[k, 2, 0] * rx + turns[k, 2, 1] * ry + turns[k, 2, 2] + shifts[k, 2] * nearness, 1e-3)
+        per_z = 1.0 / z
+        return lens[3] + lens[1] * x * per_z, lens[4] + lens[2] * y * per_z
+    depth = 1.0 / max(nearness, 1.0 / FAR_M)
+    sx, sy, z0 = ray_at(lens, qx, qy)
+    sx, sy = sx * (depth - z0), sy * (depth - z0)
+    x = turns[k, 0, 0] * sx + turns[k, 0, 1] * sy + turns[k, 0, 2] * depth + shifts[k, 0]
+    y = turns[k, 1, 0] * sx + turns[k, 1, 1] * sy + turns[k, 1, 2] * depth + shifts[k, 1]
+    z = turns[k, 2, 0] * sx + turns[k, 2, 1] * sy + turns[k, 2, 2] * depth + shifts[k, 2]
+    return pixel_at(lens, x, y, max(z, lens[13] + 1e-3))
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def _average(out: Any, image: Any, nearness: Any, turns: Any, shifts: Any, lens: Any) -> None:
+    """Mean over frames k of image[q_k(p)], where q_k solves seen_k(q) = p by fixed-point steps from q = p."""
+    h, w = nearness.shape
     frames = turns.shape[0]
-    cx, cy = 0.5 * w, 0.5 * h
     for y in prange(h):
         for x in range(w):
-            red, green, blue = 0.0, 0.0, 0.0
+            red, green, blue = image[y, x, 0], image[y, x, 1], image[y, x, 2]
             for k in range(frames):
-                a00, a01, a02, sx = turns[k, 0, 0], turns[k, 0, 1], turns[k, 0, 2], shifts[k, 0]
-                a10, a11, a12, sy = turns[k, 1, 0], turns[k, 1, 1], turns[k, 1, 2], shifts[k, 1]
-                a20, a21, a22, sz = turns[k, 2, 0], turns[k, 2, 1], turns[k, 2, 2], shifts[k, 2]
+                if k == frames // 2:
+                    continue
                 qx, qy = x + 0.5, y + 0.5
                 for _ in range(4):
                     i = min(max(int(qx), 0), w - 1)
                     j = min(max(int(qy), 0), h - 1)
-                    nearness = 1.0 / depth_m[j, i]
-                    rx, ry = (qx - cx) / focal_px, (qy - cy) / focal_px
-                    px = a00 * rx + a01 * ry + a02 + sx * nearness
-                    py = a10 * rx + a11 * ry + a12 + sy * nearness
-                    pz = max(a20 * rx + a21 * ry + a22 + sz * nearness, 1e-3)
-                    ex = x + 0.5 - (cx + focal_px * px / pz)
-                    ey = y + 0.5 - (cy + focal_px * py / pz)
+                    sx, sy = _seen_at(lens, turns, shifts, k, qx, qy, nearness[j, i])
+                    ex, ey = x + 0.5 - sx, y + 0.5 - sy
                     qx += ex
                     qy += ey
                     if abs(ex) + abs(ey) < 0.01:

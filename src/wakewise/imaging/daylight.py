@@ -1,4 +1,4 @@
-"""Down-welling light on every vertex, with the shade that target and stones cast: baked once per scene.
+"""Light from above on every vertex, with the shade that target and stones cast: baked once per scene.
 
 Under water the sky is squeezed into Snell's window, 48.6 deg about the zenith for a refractive index of 4/3, and dim
 diffuse light comes from outside of it (Mobley, Light and Water, Academic Press 1994, section 4.2). The shares used here
@@ -16,6 +16,7 @@ from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
 from wakewise.arrays import Array, IntArray
+from wakewise.imaging.panels import Panels
 
 SNELL_SIN = 0.75
 """Sine of the half angle of Snell's window."""
@@ -39,10 +40,12 @@ def sky_radiance(up: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(up >= cos_edge, window, np.where(up >= 0.0, OUTSIDE_SHARE * window, BED_REFLECTANCE))
 
 
-def bake_daylight(
-    parts: Sequence[tuple[Array, IntArray]], normals: Sequence[Array], near_m: float
-) -> NDArray[np.float32]:
-    """Irradiance on the outer and the inner side of each vertex of target, bed and stones, shape (n, 2).
+def bake_light(
+    parts: Sequence[tuple[Array, IntArray]], normals: Sequence[Array], near_m: float, panels: Panels, foot_W_m: Array
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Irradiance by sky and by panels on both sides of each vertex of target, bed and stones, shape (n, 2) each.
+
+    Each is 1 on a level open surface at the foot. What bed and target throw back is the same share of either.
 
     Parameters
     ----------
@@ -50,32 +53,45 @@ def bake_daylight(
     normals : their unit vertex normals
     near_m : float
         Bed vertices farther than this from the foot are taken as unshaded.
+    panels : Panels
+    foot_W_m : ndarray, shape (3,)
+        Origin of the scene's frame in the world.
     """
     occluder = EmbreeScene()
     for vertices, faces in (parts[0], parts[2]):
         if len(faces):
             TriangleMesh(occluder, np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int32))
-    out = []
+    down = np.array([[0.0, 0.0, -1.0]])
+    at_foot = float(panels.irradiance(foot_W_m[None], down)[0])
+    per_unit = 1.0 / at_foot if at_foot > 0.0 else 0.0
+    skies, lamps = [], []
     for k, ((vertices, faces), normal) in enumerate(zip(parts, normals, strict=True)):
-        light = np.zeros((len(vertices), 2), np.float32)
+        sky, lamp = np.zeros((len(vertices), 2), np.float32), np.zeros((len(vertices), 2), np.float32)
         lit = np.arange(len(vertices))
         if k == 1:
-            light[:] = np.clip(0.5 - 0.5 * normal[:, 2:], 0.0, 1.0)
+            sky[:] = np.clip(0.5 - 0.5 * normal[:, 2:], 0.0, 1.0)
+            lamp[:] = per_unit * panels.irradiance(vertices + foot_W_m, normal)[:, None]
             lit = np.nonzero(np.hypot(vertices[:, 0], vertices[:, 1]) < near_m)[0]
         sides = (1.0, -1.0) if k == 0 else (1.0,)
         rays = int(np.clip(RAYS_TOTAL // max(1, len(lit) * len(sides) * len(parts)), 8, 64))
         for side, sign in enumerate(sides):
-            light[lit, side] = _irradiance(occluder, vertices[lit], sign * normal[lit], rays)
-        out.append(_smooth(light, faces) if len(faces) else light)
-    return np.concatenate(out).astype(np.float32)
+            points, outward = vertices[lit], sign * normal[lit]
+            direct, thrown_back = _irradiance(occluder, points, outward, rays)
+            sky[lit, side] = direct + thrown_back
+            lamp[lit, side] = per_unit * panels.irradiance(points + foot_W_m, outward, occluder, foot_W_m) + thrown_back
+        skies.append(_smooth(sky, faces) if len(faces) else sky)
+        lamps.append(_smooth(lamp, faces) if len(faces) else lamp)
+    return np.concatenate(skies).astype(np.float32), np.concatenate(lamps).astype(np.float32)
 
 
-def _irradiance(occluder: EmbreeScene, points: Array, normals: Array, rays: int) -> NDArray[np.float64]:
-    """Mean radiance over a stratified cosine-weighted hemisphere of `rays` directions, shape (n,)."""
+def _irradiance(
+    occluder: EmbreeScene, points: Array, normals: Array, rays: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean radiance of the sky, and of bed and target, over a cosine-weighted hemisphere of `rays` directions, (n,)."""
     # The same golden-angle spiral everywhere, turned by a vertex's own angle so that no pattern shows.
     k = np.arange(rays)
     radius = np.sqrt((k + 0.5) / rays)
-    total = np.zeros(len(points))
+    direct, thrown_back = np.zeros(len(points)), np.zeros(len(points))
     helper = np.where(np.abs(normals[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
     tangent = np.cross(normals, helper)
     tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-12)
@@ -87,8 +103,10 @@ def _irradiance(occluder: EmbreeScene, points: Array, normals: Array, rays: int)
         out = math.sqrt(1.0 - radius[i] ** 2)
         way = radius[i] * (np.cos(a)[:, None] * tangent + np.sin(a)[:, None] * bitangent) + out * normals
         hit = occluder.run(start, np.ascontiguousarray(way, np.float32), query="OCCLUDED") >= 0
-        total += np.where(hit, TARGET_REFLECTANCE * 0.5, sky_radiance(-way[:, 2]))
-    return total / rays
+        radiance, up = sky_radiance(-way[:, 2]), way[:, 2] <= 0.0
+        direct += np.where(~hit & up, radiance, 0.0)
+        thrown_back += np.where(hit, TARGET_REFLECTANCE * 0.5, np.where(up, 0.0, radiance))
+    return direct / rays, thrown_back / rays
 
 
 def _smooth(light: NDArray[np.float32], faces: IntArray, passes: int = 2) -> NDArray[np.float32]:

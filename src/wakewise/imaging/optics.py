@@ -20,7 +20,8 @@ from numba import njit, prange
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
-from wakewise.imaging.camera import PinholeCamera
+from wakewise.imaging.camera import Camera
+from wakewise.imaging.lens import ray_at
 from wakewise.imaging.renderer import LAMP_REFERENCE_M, Image, Lights, Render
 from wakewise.interfaces import ScalarGrid
 
@@ -117,20 +118,29 @@ class SiltOptics:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Haze:
-    """Silt and veil along coarse rays: what lies between the camera and each range.
+    """Silt and veil along coarse rays: what lies between the water's edge before the lens and each range.
 
-    `ranges_m` (k,) along the ray; `silt_tau` (h', w', k) optical depth of the silt; `veil` (h', w', k, 3) radiance
-    scattered into the ray. Rays stand every `stride` pixels, the first through the image's corner (0, 0).
+    `ranges_m` (k,) along the ray; `table` (h', w', k, 4): the optical depth of the silt, then the radiance scattered
+    into the ray in red, green, blue. Rays stand every `stride` pixels, the first through the image's corner (0, 0).
     """
 
     ranges_m: Array
-    silt_tau: Image
-    veil: Image
+    table: Image
     stride: int
+
+    @property
+    def silt_tau(self) -> Image:
+        """Optical depth of the silt, shape (h', w', k)."""
+        return self.table[..., 0]
+
+    @property
+    def veil(self) -> Image:
+        """Radiance scattered into the ray, shape (h', w', k, 3)."""
+        return self.table[..., 1:]
 
 
 def haze_between(
-    camera: PinholeCamera,
+    camera: Camera,
     X_WC: Pose,
     water: WaterOptics,
     silt_optics: SiltOptics,
@@ -139,33 +149,33 @@ def haze_between(
     *,
     reach_m: float = 4.0,
     nodes: int = 49,
-    stride: int = 16,
+    stride: int | None = None,
 ) -> Haze:
     """Integrate silt and veil along coarse rays out to `reach_m` from the camera.
 
-    Both vary slowly across the image, since the silt's grid is coarser than the strides: pixels may interpolate.
+    Both vary slowly across the image, since the silt's grid is coarser than the strides: pixels may interpolate. The
+    stride is 16 px, or a 60th of the image's width if that is more.
     """
+    stride = stride or max(16, camera.width // 60)
     ranges = reach_m * np.linspace(0.0, 1.0, nodes) ** 2
     columns, rows = -(-camera.width // stride) + 1, -(-camera.height // stride) + 1
-    tau = np.zeros((rows, columns, nodes), np.float32)
-    veil = np.zeros((rows, columns, nodes, 3), np.float32)
+    table = np.zeros((rows, columns, nodes, 4), np.float32)
     values = np.zeros((1, 1, 1)) if silt is None else silt.values
     origin = np.zeros(3) if silt is None else silt.origin_W_m
     spacing = 1.0 if silt is None else silt.spacing_m
     power = lights.lamp * LAMP_REFERENCE_M**2 / max(1, len(lights.lamps_C_m))
     _march(
-        tau, veil, ranges, stride, camera.width, camera.height, camera.focal_px, X_WC.R, X_WC.p_m, values, origin,
-        spacing, silt_optics.attenuation_m2_kg, water.signal_per_m, water.veil_per_m, lights.ambient * water.veil,
-        lights.ambient * silt_optics.veil, water.backscatter_per_m, silt_optics.backscatter_share, lights.lamps_C_m,
-        power,
+        table, ranges, stride, camera.row, X_WC.R, X_WC.p_m, values, origin, spacing, silt_optics.attenuation_m2_kg,
+        water.signal_per_m, water.veil_per_m, lights.from_above * water.veil, lights.from_above * silt_optics.veil,
+        water.backscatter_per_m, silt_optics.backscatter_share, lights.lamps_C_m, power,
     )  # fmt: skip
-    return Haze(ranges_m=ranges, silt_tau=tau, veil=veil, stride=stride)
+    return Haze(ranges_m=ranges, table=table, stride=stride)
 
 
 def through_water(
-    view: Render, camera: PinholeCamera, haze: Haze, water: WaterOptics, ambient: float = 1.0
+    view: Render, camera: Camera, haze: Haze, water: WaterOptics, from_above: float = 1.0
 ) -> tuple[Image, Image]:
-    """Lay the water over a view.
+    """Lay the water over a view under light `from_above`, relative to the reference.
 
     Returns
     -------
@@ -176,13 +186,13 @@ def through_water(
     out = np.empty_like(view.radiance)
     silt_per_m = np.empty_like(view.depth_m)
     _apply(
-        out, silt_per_m, view.radiance, view.lamp_radiance, view.depth_m, haze.ranges_m, haze.silt_tau, haze.veil,
-        haze.stride, camera.focal_px, water.signal_per_m, water.veil_per_m, ambient * water.veil,
+        out, silt_per_m, view.radiance, view.lamp_radiance, view.depth_m, haze.ranges_m, haze.table, haze.stride,
+        camera.row, water.signal_per_m, water.veil_per_m, from_above * water.veil,
     )  # fmt: skip
     return out, silt_per_m
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def sample_grid(values: Any, origin: Any, spacing: float, x: float, y: float, z: float) -> float:
     """Trilinear value of a grid at a point; zero outside."""
     u, v, w = (x - origin[0]) / spacing, (y - origin[1]) / spacing, (z - origin[2]) / spacing
@@ -199,103 +209,119 @@ def sample_grid(values: Any, origin: Any, spacing: float, x: float, y: float, z:
     return low * (1 - c) + high * c
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def _march(
-    tau_out: Any, veil_out: Any, ranges: Any, stride: int, width: int, height: int, focal_px: float, R_WC: Any, p: Any,
-    values: Any, origin: Any, spacing: float, attenuation: float, signal: Any, veil_rate: Any, water_veil: Any,
-    silt_veil: Any, water_back: Any, silt_back: Any, lamps: Any, power: float,
+    table: Any, ranges: Any, stride: int, lens: Any, R_WC: Any, p: Any, values: Any, origin: Any, spacing: float,
+    attenuation: float, signal: Any, veil_rate: Any, water_veil: Any, silt_veil: Any, water_back: Any, silt_back: Any,
+    lamps: Any, power: float,
 ) -> None:  # fmt: skip
     """Midpoint rule, two steps between nodes; within a step the medium is uniform and the exponentials are exact.
 
-    Ambient light: dL/ds = (beta_B B_w + c_s B_s) T. Lamps: a medium that scatters b_b backward evenly over the rear
+    Light from above: dL/ds = (beta_B B_w + c_s B_s) T. Lamps: a medium that scatters b_b backward evenly over the rear
     hemisphere returns b_b / (2 pi) of the irradiance per steradian, which is b_b / 2 relative to a white card's 1 / pi,
     and the lamp's light has come about the same way as it goes back: T squared.
     """
-    rows, columns, nodes = tau_out.shape
+    rows, columns, nodes, _ = table.shape
     for row in prange(rows):
+        left = np.empty(3)  # of light from above, on its way to the camera
+        left_twice = np.empty(3)  # of the lamps' light, out and back
         for column in range(columns):
-            dx, dy = (column * stride - 0.5 * width) / focal_px, (row * stride - 0.5 * height) / focal_px
-            dz = 1.0 / math.sqrt(dx * dx + dy * dy + 1.0)
-            dx, dy = dx * dz, dy * dz
-            wx = R_WC[0, 0] * dx + R_WC[0, 1] * dy + R_WC[0, 2] * dz
-            wy = R_WC[1, 0] * dx + R_WC[1, 1] * dy + R_WC[1, 2] * dz
-            wz = R_WC[2, 0] * dx + R_WC[2, 1] * dy + R_WC[2, 2] * dz
+            sx, sy, z0 = ray_at(lens, float(column * stride), float(row * stride))
+            dz = 1.0 / math.sqrt(sx * sx + sy * sy + 1.0)
+            dx, dy = sx * dz, sy * dz
+            # Where the water begins: at the lens, or at the outer face of the port.
+            x0, y0, z0 = (lens[13] - z0) * sx, (lens[13] - z0) * sy, lens[13]
             tau = 0.0
+            left[:] = 1.0
+            left_twice[:] = 1.0
             for node in range(1, nodes):
                 length = 0.5 * (ranges[node] - ranges[node - 1])
                 for c in range(3):
-                    veil_out[row, column, node, c] = veil_out[row, column, node - 1, c]
+                    table[row, column, node, 1 + c] = table[row, column, node - 1, 1 + c]
                 for half in range(2):
                     t = ranges[node - 1] + (half + 0.5) * length
-                    silt = sample_grid(values, origin, spacing, p[0] + t * wx, p[1] + t * wy, p[2] + t * wz)
-                    silt *= attenuation
+                    x, y, z = x0 + t * dx, y0 + t * dy, z0 + t * dz
+                    silt = attenuation * sample_grid(
+                        values, origin, spacing,
+                        p[0] + R_WC[0, 0] * x + R_WC[0, 1] * y + R_WC[0, 2] * z,
+                        p[1] + R_WC[1, 0] * x + R_WC[1, 1] * y + R_WC[1, 2] * z,
+                        p[2] + R_WC[2, 0] * x + R_WC[2, 1] * y + R_WC[2, 2] * z,
+                    )  # fmt: skip
                     lamp = 0.0
                     for m in range(lamps.shape[0]):
-                        lx, ly, lz = t * dx - lamps[m, 0], t * dy - lamps[m, 1], t * dz - lamps[m, 2]
+                        lx, ly, lz = x - lamps[m, 0], y - lamps[m, 1], z - lamps[m, 2]
                         if lz > 0.0:
                             r2 = lx * lx + ly * ly + lz * lz + 1e-4
                             lamp += power * lz / (r2 * math.sqrt(r2))
-                    start = t - 0.5 * length
                     for c in range(3):
                         fade = veil_rate[c] + silt
                         source = veil_rate[c] * water_veil[c] + silt * silt_veil[c]
-                        amount = source * math.exp(-veil_rate[c] * start - tau) * _mean_decay(fade, length)
-                        back = 0.5 * (water_back[c] + silt * silt_back[c]) * lamp
-                        both_ways = 2.0 * (signal[c] + silt)
-                        amount += back * math.exp(-2.0 * (signal[c] * start + tau)) * _mean_decay(both_ways, length)
-                        veil_out[row, column, node, c] += amount
+                        kept = math.exp(-fade * length)
+                        amount = source * left[c] * _mean_decay(fade, length, kept)
+                        left[c] *= kept
+                        if lamp > 0.0:
+                            back = 0.5 * (water_back[c] + silt * silt_back[c]) * lamp
+                            both_ways = 2.0 * (signal[c] + silt)
+                            kept = math.exp(-both_ways * length)
+                            amount += back * left_twice[c] * _mean_decay(both_ways, length, kept)
+                            left_twice[c] *= kept
+                        else:
+                            left_twice[c] *= math.exp(-2.0 * (signal[c] + silt) * length)
+                        table[row, column, node, 1 + c] += amount
                     tau += silt * length
-                tau_out[row, column, node] = tau
+                table[row, column, node, 0] = tau
 
 
-@njit(cache=True, inline="always")
-def _mean_decay(rate: float, length: float) -> float:
-    """Integral of exp(-rate s) over 0..length."""
+@njit(cache=True, inline="always", error_model="numpy")
+def _mean_decay(rate: float, length: float, kept: float) -> float:
+    """Integral of exp(-rate s) over 0..length, of which `kept` = exp(-rate length) is left."""
     x = rate * length
-    return length * (1.0 - 0.5 * x) if x < 1e-6 else (1.0 - math.exp(-x)) / rate
+    return length * (1.0 - 0.5 * x) if x < 1e-6 else (1.0 - kept) / rate
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def _apply(
-    out: Any, silt_per_m: Any, radiance: Any, lamp_radiance: Any, depth_m: Any, ranges: Any, tau: Any, veil: Any,
-    stride: int, focal_px: float, signal: Any, veil_rate: Any, water_veil: Any,
+    out: Any, silt_per_m: Any, radiance: Any, lamp_radiance: Any, depth_m: Any, ranges: Any, table: Any, stride: int,
+    lens: Any, signal: Any, veil_rate: Any, water_veil: Any,
 ) -> None:  # fmt: skip
     h, w = depth_m.shape
-    last = ranges.shape[0] - 1
+    _, columns, nodes, _ = table.shape
+    last = nodes - 1
     reach = ranges[last]
     for y in prange(h):
         v = (y + 0.5) / stride
         j = int(v)
-        b = v - j
+        b = np.float32(v - j)
+        line = np.empty((columns, nodes, 4), np.float32)
+        for i in range(columns):
+            for k in range(nodes):
+                for c in range(4):
+                    line[i, k, c] = table[j, i, k, c] + b * (table[j + 1, i, k, c] - table[j, i, k, c])
         for x in range(w):
             u = (x + 0.5) / stride
             i = int(u)
             a = u - i
-            dx, dy = (x + 0.5 - 0.5 * w) / focal_px, (y + 0.5 - 0.5 * h) / focal_px
-            slope = math.sqrt(dx * dx + dy * dy + 1.0)
-            r = min(depth_m[y, x], 1e4) * slope
+            sx, sy, _ = ray_at(lens, x + 0.5, y + 0.5)
+            nothing = not depth_m[y, x] < 1e4
+            r = 1e4 if nothing else max(depth_m[y, x] - lens[13], 0.0) * math.sqrt(sx * sx + sy * sy + 1.0)
             near = min(r, reach)
             # Nodes stand at reach * (k / last)**2.
             k = min(int(last * math.sqrt(near / reach)), last - 1)
-            c = min(max((near - ranges[k]) / (ranges[k + 1] - ranges[k]), 0.0), 1.0)
-            silt = 0.0
-            red, green, blue = 0.0, 0.0, 0.0
-            for corner in range(4):
-                jj, ii = j + (corner >> 1), i + (corner & 1)
-                weight = (b if corner >> 1 else 1 - b) * (a if corner & 1 else 1 - a)
-                n, f = weight * (1 - c), weight * c
-                silt += n * tau[jj, ii, k] + f * tau[jj, ii, k + 1]
-                red += n * veil[jj, ii, k, 0] + f * veil[jj, ii, k + 1, 0]
-                green += n * veil[jj, ii, k, 1] + f * veil[jj, ii, k + 1, 1]
-                blue += n * veil[jj, ii, k, 2] + f * veil[jj, ii, k + 1, 2]
+            f = min(max((near - ranges[k]) / (ranges[k + 1] - ranges[k]), 0.0), 1.0)
+            w00, w01, w10, w11 = (1 - a) * (1 - f), (1 - a) * f, a * (1 - f), a * f
+            silt = w00 * line[i, k, 0] + w01 * line[i, k + 1, 0]
+            silt += w10 * line[i + 1, k, 0] + w11 * line[i + 1, k + 1, 0]
             beyond = r - near
-            for band in range(3):
-                kept = math.exp(-signal[band] * r - silt)
-                lamp = lamp_radiance[y, x, band]
-                value = (radiance[y, x, band] - lamp) * kept + lamp * kept * kept
-                value += red if band == 0 else green if band == 1 else blue
+            for c in range(3):
+                q = c + 1
+                value = w00 * line[i, k, q] + w01 * line[i, k + 1, q]
+                value += w10 * line[i + 1, k, q] + w11 * line[i + 1, k + 1, q]
+                if not nothing:
+                    kept = math.exp(-signal[c] * r - silt)
+                    lamp = lamp_radiance[y, x, c]
+                    value += kept * (radiance[y, x, c] - lamp + lamp * kept)
                 if beyond > 0.0:
-                    far = 1.0 - math.exp(-veil_rate[band] * beyond)
-                    value += water_veil[band] * math.exp(-veil_rate[band] * near - silt) * far
-                out[y, x, band] = value
+                    far = 1.0 - math.exp(-veil_rate[c] * beyond)
+                    value += water_veil[c] * math.exp(-veil_rate[c] * near - silt) * far
+                out[y, x, c] = value
             silt_per_m[y, x] = silt / max(near, 1e-6)

@@ -16,7 +16,7 @@ from numba import njit, prange
 from wakewise.arrays import Array
 from wakewise.geometry import Pose
 from wakewise.imaging.blur import pose_at
-from wakewise.imaging.camera import PinholeCamera
+from wakewise.imaging.camera import Camera
 from wakewise.imaging.optics import WaterOptics, sample_grid
 from wakewise.imaging.renderer import LAMP_REFERENCE_M, Image, Lights
 from wakewise.interfaces import ScalarGrid
@@ -33,7 +33,7 @@ STEPS = 9
 
 
 def flake_positions(
-    camera: PinholeCamera,
+    camera: Camera,
     X_WC: Pose,
     silt: ScalarGrid | None,
     per_m3: float,
@@ -42,12 +42,21 @@ def flake_positions(
 ) -> Array:
     """Draw where flakes are, shape (n, 3) in the camera frame: a Poisson process with density per_m3 + per_kg C."""
     densest = per_m3 + (per_kg * float(silt.values.max(initial=0.0)) if silt is not None else 0.0)
-    f = camera.focal_px
-    volume = camera.width * camera.height / f**2 * (FARTHEST_M**3 - NEAREST_M**3) / 3.0
+    # A pyramid that holds the whole view: slopes to the points of the image's border.
+    w, h = float(camera.width), float(camera.height)
+    edge = np.linspace(0.0, 1.0, 17)
+    border = [np.column_stack([edge * w, np.full(17, y)]) for y in (0.0, h)]
+    border += [np.column_stack([np.full(17, x), edge * h]) for x in (0.0, w)]
+    corners = camera.unproject(np.concatenate(border), np.full(68, FARTHEST_M))[:, :2] / FARTHEST_M
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    volume = float(np.prod(high - low)) * (FARTHEST_M**3 - NEAREST_M**3) / 3.0
     n = int(rng.poisson(densest * volume))
     depth = (NEAREST_M**3 + rng.random(n) * (FARTHEST_M**3 - NEAREST_M**3)) ** (1.0 / 3.0)
-    pixels = rng.random((n, 2)) * np.array([camera.width, camera.height])
-    points_C = camera.rays(pixels) * depth[:, None]
+    points_C = np.column_stack([(low + rng.random((n, 2)) * (high - low)) * depth[:, None], depth])
+    pixels = camera.project(points_C)
+    inside = np.all((pixels >= 0.0) & (pixels <= (w, h)), axis=1)
+    points_C = points_C[inside]
+    n = len(points_C)
     keep = rng.random(n) * densest < per_m3 + per_kg * concentration(silt, X_WC.apply(points_C))
     return points_C[keep]
 
@@ -62,7 +71,7 @@ def concentration(silt: ScalarGrid | None, points_W_m: Array) -> Array:
 def draw_flakes(
     image: Image,
     depth_m: Image,
-    camera: PinholeCamera,
+    camera: Camera,
     poses: Sequence[Pose],
     points_C_m: Array,
     water: WaterOptics,
@@ -87,7 +96,7 @@ def draw_flakes(
     lamp = lights.lamp * LAMP_REFERENCE_M**2 / max(1, len(lights.lamps_C_m))
     lamp_light = (lamp * np.clip(away[..., 2], 0.0, None) / (np.sum(away**2, axis=2) + 1e-4) ** 1.5).sum(axis=1)
     # A flake turned every way gathers half of the down-welling light of a level card.
-    light = reflectance * (0.5 * lights.ambient + lamp_light)
+    light = reflectance * (0.5 * lights.from_above + lamp_light)
     colour = light[:, None] * np.exp(-water.signal_per_m * z[:, None])
     cover = np.minimum(0.85, own**2 / radius**2)
 
@@ -101,7 +110,7 @@ def draw_flakes(
     return out
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def _sample(values: Any, origin: Any, spacing: float, points: Any) -> Any:
     out = np.empty(points.shape[0])
     for i in prange(points.shape[0]):
@@ -109,7 +118,7 @@ def _sample(values: Any, origin: Any, spacing: float, points: Any) -> Any:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _splat(out: Any, depth_m: Any, track: Any, z: Any, radius: Any, cover: Any, colour: Any) -> None:
     """Blend flakes one after the other; a streak is drawn as overlapping disks that share the cover."""
     h, w = depth_m.shape

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.imaging.blur import motion_blur, pose_at
-from wakewise.imaging.camera import PinholeCamera
+from wakewise.imaging.camera import Camera
 from wakewise.imaging.optics import SiltOptics, haze_between, through_water
 from wakewise.imaging.particles import draw_flakes, flake_positions
 from wakewise.imaging.renderer import Image, Render, render
@@ -40,7 +40,7 @@ class Photo:
 
 def photograph(
     scene: Scene,
-    camera: PinholeCamera,
+    camera: Camera,
     poses: Sequence[Pose],
     silt: ScalarGrid | None,
     settings: ImagingSettings,
@@ -52,7 +52,7 @@ def photograph(
     Parameters
     ----------
     scene : Scene
-    camera : PinholeCamera
+    camera : Camera
         `settings.camera()`, or another one.
     poses : sequence of Pose
         True X_WC at instants evenly spaced over the exposure, the first and last at its ends; one means no motion.
@@ -75,7 +75,7 @@ def photograph(
 
 def photograph_of(
     view: Render,
-    camera: PinholeCamera,
+    camera: Camera,
     poses: Sequence[Pose],
     silt: ScalarGrid | None,
     settings: ImagingSettings,
@@ -88,7 +88,7 @@ def photograph_of(
     middle = pose_at(poses, 0.5)
     lights, water = settings.lights(), settings.water()
     haze = haze_between(camera, middle, water, grains or SiltOptics(), silt, lights)
-    radiance, silt_per_m = through_water(view, camera, haze, water, lights.ambient)
+    radiance, silt_per_m = through_water(view, camera, haze, water, lights.from_above)
     radiance = motion_blur(radiance, view.depth_m, camera, poses)
     flakes = flake_positions(camera, middle, silt, settings.flakes_per_m3, settings.flakes_per_kg, rng)
     radiance = draw_flakes(radiance, view.depth_m, camera, poses, flakes, water, lights, rng)

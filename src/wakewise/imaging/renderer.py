@@ -1,59 +1,68 @@
 """From a scene and a pose to linear radiance, depth and the target's share of every pixel.
 
-Two passes. The first casts one ray through each pixel's centre: it gives the depth, exactly, and the bed's colour from
-maps already filtered to the pixel's footprint. The second casts `samples` x `samples` rays where one is not enough: on
-target and stones, whose colour is computed rather than filtered, and where neighbouring pixels see different things.
+Two passes over bands of the image. The first casts one ray through each pixel's centre: it gives the depth, exactly,
+and the bed's colour from maps already filtered to the pixel's footprint. The second casts `samples` x `samples` rays
+where one is not enough: on target and stones, whose colour is computed rather than filtered, and where neighbouring
+pixels see different things. Bands keep the rays in the processor's cache and the memory small at any image size.
 """
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
 import numba
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
-from wakewise.imaging.camera import PinholeCamera
-from wakewise.imaging.scene import BED, TARGET, Scene
-from wakewise.imaging.texture import BED_TEXEL_M, baked_albedo, coral_albedo, stone_albedo
+from wakewise.imaging.camera import Camera
+from wakewise.imaging.scene import Scene
+from wakewise.imaging.shading import aim, keep_first, needs_more, shade
 
 Image = NDArray[np.float32]
-MISS_M = 1e30
-"""Embree gives rays that meet nothing a larger distance."""
 LAMP_REFERENCE_M = 0.5
 """Where the lamps' irradiance is stated."""
+BAND_RAYS = 32768
+"""Rays cast at a time."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Lights:
-    """Light on the scene, relative to the down-welling irradiance on a level open surface.
+    """Light on the scene, relative to a reference irradiance on a level open surface at the target.
 
-    `ambient` scales the down-welling light. `lamps_C_m`, shape (k, 3), are the vehicle's lamps in the camera frame,
-    pointing along the optical axis; together they give the irradiance `lamp` on a card facing them from 0.5 m.
+    `ambient` is what the sky gives there and `panels` what the tank's LED panels give. `lamps_C_m`, shape (k, 3), are
+    the vehicle's lamps in the camera frame, pointing along the optical axis; together they give the irradiance `lamp`
+    on a card facing them from 0.5 m.
     """
 
     ambient: float = 1.0
+    panels: float = 0.0
     lamp: float = 0.35
     lamps_C_m: Array
 
     def __post_init__(self) -> None:
         freeze(self, lamps_C_m=(None, 3))
-        if self.ambient < 0.0 or self.lamp < 0.0:
-            raise InputError(f"lights: ambient {self.ambient:g}, lamp {self.lamp:g}, neither may be negative")
+        if not min(self.ambient, self.panels, self.lamp) >= 0.0:
+            raise InputError(
+                f"lights: ambient {self.ambient:g}, panels {self.panels:g}, lamp {self.lamp:g}, none may be negative"
+            )
+
+    @property
+    def from_above(self) -> float:
+        """Irradiance of sky and panels together."""
+        return self.ambient + self.panels
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Render:
     """What reaches the camera in perfectly clear water.
 
-    `radiance` (h, w, 3) linear RGB relative to a white level card under the down-welling light; `lamp_radiance`
+    `radiance` (h, w, 3) linear RGB relative to a white level card under the reference light; `lamp_radiance`
     (h, w, 3), the part of it that the lamps gave; `depth_m` (h, w) along the optical axis at the pixel's centre,
     infinite where nothing is hit; `target_fraction` (h, w), the target's share of the pixel's samples.
     """
@@ -64,13 +73,13 @@ class Render:
     target_fraction: Image
 
 
-def render(scene: Scene, camera: PinholeCamera, X_WC: Pose, lights: Lights, samples: int = 2) -> Render:
+def render(scene: Scene, camera: Camera, X_WC: Pose, lights: Lights, samples: int = 2) -> Render:
     """Render one view without any water between.
 
     Parameters
     ----------
     scene : Scene
-    camera : PinholeCamera
+    camera : Camera
     X_WC : Pose
     lights : Lights
     samples : int
@@ -84,156 +93,59 @@ def render(scene: Scene, camera: PinholeCamera, X_WC: Pose, lights: Lights, samp
     if not 1 <= samples <= 8:
         raise InputError(f"render: samples {samples}, allowed 1 to 8")
     R, origin = X_WC.R, X_WC.p_m - scene.foot_W_m
-    h, w, f = camera.height, camera.width, camera.focal_px
+    h, w, row = camera.height, camera.width, camera.row
     lamps = lights.lamps_C_m @ R.T + origin
     # Each lamp's share, so that all together give `lamp` at the reference distance.
     power = lights.lamp * LAMP_REFERENCE_M**2 / max(1, len(lamps))
-    colours = np.zeros((h * w, 2, 3), np.float32)
-    fraction = np.zeros(h * w, np.float32)
+    light = np.float32(lights.ambient) * scene.daylight + np.float32(lights.panels) * scene.panel_light
+    radiance, lamp_radiance = np.zeros((h * w, 3), np.float32), np.zeros((h * w, 3), np.float32)
+    fraction, depth = np.zeros(h * w, np.float32), np.full(h * w, np.inf, np.float32)
+    kind = np.full(h * w, -1, np.int8)
 
-    def shade(pixels: NDArray[np.int64], first_ray: NDArray[np.int64], across: int, hits: _Hits) -> None:
-        _shade(
-            pixels, first_ray, across, hits.kind, hits.triangle, hits.u, hits.v, hits.distance, scene.faces,
-            scene.first_face, scene.normals, scene.daylight, scene.bed_maps, scene.seed, R, origin, f, w, h,
-            lights.ambient, power, lamps, colours, fraction,
+    axis = np.ascontiguousarray(R[:, 2])
+
+    def cast(pixels: NDArray[np.int64], across: int, only_bed: bool) -> tuple[NDArray[np.int64], dict[str, Any]]:
+        most = len(pixels) * across**2
+        starts, ways = np.empty((most, 3), np.float32), np.empty((most, 3), np.float32)
+        which, spreads = np.empty(most, np.int64), np.empty(most, np.float32)
+        count = aim(pixels, across, w, row, R, origin, scene.top_m, starts, ways, which, spreads)
+        hits = scene.embree.run(starts[:count], ways[:count], output=True)
+        shade(
+            pixels, across, which, starts, ways, spreads, hits["geomID"], hits["primID"], hits["u"], hits["v"],
+            hits["tfar"], scene.faces, scene.first_face, scene.normals, light, scene.bed_maps, scene.seed, axis, power,
+            lamps, only_bed, radiance, lamp_radiance, fraction,
         )  # fmt: skip
+        return which, hits
 
-    hits = _cast(scene, _directions(np.arange(h * w), 1, w, h, f, R), origin)
-    depth = np.where(hits.distance < MISS_M, hits.distance, np.inf).astype(np.float32).reshape(h, w)
-    again = _needs_more(hits.kind.reshape(h, w), depth).ravel() if samples > 1 else np.zeros(h * w, np.bool_)
-    once, more = np.nonzero(~again)[0], np.nonzero(again)[0]
-    shade(once, once, 1, hits)
-    if len(more):
-        fine = _cast(scene, _directions(more, samples, w, h, f, R), origin)
-        shade(more, np.arange(len(more)) * samples**2, samples, fine)
-    image = colours.reshape(h, w, 2, 3)
+    def first(begin: int) -> None:
+        pixels = np.arange(begin, min(begin + BAND_RAYS, h * w))
+        which, hits = cast(pixels, 1, samples > 1)
+        keep_first(begin, row, w, which, hits["geomID"], hits["tfar"], kind, depth)
+
+    in_threads(first, range(0, h * w, BAND_RAYS))
+    kinds, depths = kind.reshape(h, w), depth.reshape(h, w)
+    if samples > 1:
+        again = np.empty((h, w), np.bool_)
+        rows = max(1, BAND_RAYS // w)
+        in_threads(lambda y: needs_more(kinds, depths, y, min(y + rows, h), again), range(0, h, rows))
+        more = np.flatnonzero(again)
+        step = max(1, BAND_RAYS // samples**2)
+        in_threads(lambda k: cast(more[k : k + step], samples, False), range(0, len(more), step))
     return Render(
-        radiance=image[:, :, 0] + image[:, :, 1],
-        lamp_radiance=np.ascontiguousarray(image[:, :, 1]),
-        depth_m=depth,
+        radiance=radiance.reshape(h, w, 3),
+        lamp_radiance=lamp_radiance.reshape(h, w, 3),
+        depth_m=depths,
         target_fraction=fraction.reshape(h, w),
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Hits:
-    """What each ray met first: kind of surface (-1 none), its triangle, barycentrics, and distance in ray lengths."""
-
-    kind: NDArray[np.int32]
-    triangle: NDArray[np.int32]
-    u: NDArray[np.float32]
-    v: NDArray[np.float32]
-    distance: NDArray[np.float32]
-
-
-def _cast(scene: Scene, directions: NDArray[np.float32], origin: Array) -> _Hits:
-    """Cast rays from one origin on as many threads as numba uses; Embree releases the interpreter's lock."""
-    origins = np.broadcast_to(origin.astype(np.float32), (1, 3))
-    parts = np.array_split(directions, max(1, min(numba.get_num_threads(), len(directions) // 4096)))
-
-    def run(part: NDArray[np.float32]) -> dict[str, Any]:
-        return scene.embree.run(np.ascontiguousarray(np.broadcast_to(origins, part.shape)), part, output=True)
-
-    with ThreadPoolExecutor(len(parts)) as pool:
-        found = list(pool.map(run, parts))
-    columns = [np.concatenate([part[name] for part in found]) for name in ("geomID", "primID", "u", "v", "tfar")]
-    return _Hits(*columns)
-
-
-@njit(cache=True, parallel=True)
-def _directions(pixels: Any, across: int, width: int, height: int, focal_px: float, R_WC: Any) -> Any:
-    """Rays through the samples of each pixel, in world axes, one unit of depth long: distance is then depth."""
-    n = across * across
-    out = np.empty((pixels.shape[0] * n, 3), np.float32)
-    for k in prange(pixels.shape[0]):
-        row, column = pixels[k] // width, pixels[k] % width
-        for s in range(n):
-            x = (column + (s % across + 0.5) / across - 0.5 * width) / focal_px
-            y = (row + (s // across + 0.5) / across - 0.5 * height) / focal_px
-            for c in range(3):
-                out[k * n + s, c] = R_WC[c, 0] * x + R_WC[c, 1] * y + R_WC[c, 2]
-    return out
-
-
-@njit(cache=True, parallel=True)
-def _needs_more(kind: Any, depth_m: Any) -> Any:
-    """Where one ray is not enough: not bed and not open water, or beside another kind or a step of 4 % in depth."""
-    h, w = kind.shape
-    out = np.zeros((h, w), np.bool_)
-    for y in prange(h):
-        for x in range(w):
-            own, d = kind[y, x], depth_m[y, x]
-            more = own >= 0 and own != BED
-            for yy in range(max(0, y - 1), min(h, y + 2)):
-                for xx in range(max(0, x - 1), min(w, x + 2)):
-                    other = kind[yy, xx]
-                    more |= other != own
-                    if own >= 0 and other >= 0:
-                        more |= abs(depth_m[yy, xx] - d) > 0.04 * d
-            out[y, x] = more
-    return out
-
-
-@njit(cache=True, parallel=True)
-def _shade(
-    pixels: Any, first_ray: Any, across: int, kind: Any, triangle: Any, u: Any, v: Any, distance: Any, faces: Any,
-    first_face: Any, normals: Any, daylight: Any, maps: Any, seed: int, R_WC: Any, origin: Any, focal_px: float,
-    width: int, height: int, ambient: float, power: float, lamps: Any, colours: Any, fraction: Any,
-) -> None:  # fmt: skip
-    """Shade the samples of each pixel and write their mean: colours[pixel, 0] by daylight, [pixel, 1] by the lamps.
-
-    Surfaces are matt (Lambert). A lamp's light falls off with the squared distance and with the cosine from its axis.
-    """
-    n = across * across
-    for k in prange(pixels.shape[0]):
-        pixel = pixels[k]
-        row, column = pixel // width, pixel % width
-        for s in range(n):
-            i = first_ray[k] + s
-            what, t = kind[i], distance[i]
-            if what < 0:
-                continue
-            dx = (column + (s % across + 0.5) / across - 0.5 * width) / focal_px
-            dy = (row + (s // across + 0.5) / across - 0.5 * height) / focal_px
-            wx = R_WC[0, 0] * dx + R_WC[0, 1] * dy + R_WC[0, 2]
-            wy = R_WC[1, 0] * dx + R_WC[1, 1] * dy + R_WC[1, 2]
-            wz = R_WC[2, 0] * dx + R_WC[2, 1] * dy + R_WC[2, 2]
-            x, y, z = origin[0] + t * wx, origin[1] + t * wy, origin[2] + t * wz
-            face = first_face[what] + triangle[i]
-            a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
-            wb, wc = u[i], v[i]
-            wa = 1.0 - wb - wc
-            nx = wa * normals[a, 0] + wb * normals[b, 0] + wc * normals[c, 0]
-            ny = wa * normals[a, 1] + wb * normals[b, 1] + wc * normals[c, 1]
-            nz = wa * normals[a, 2] + wb * normals[b, 2] + wc * normals[c, 2]
-            length = math.sqrt(nx * nx + ny * ny + nz * nz) + 1e-12
-            facing = -(nx * wx + ny * wy + nz * wz) / (length * math.sqrt(wx * wx + wy * wy + wz * wz))
-            # Open surfaces show their inner side; smooth normals near a rim may lean away and count as the rim.
-            inner = 1 if what == TARGET and facing < -0.25 else 0
-            sign = -1.0 / length if inner == 1 else 1.0 / length
-            nx, ny, nz = sign * nx, sign * ny, sign * nz
-            footprint = t / (focal_px * across)
-            if what == TARGET:
-                red, green, blue = coral_albedo(x, y, z, footprint, seed)
-                fraction[pixel] += 1.0 / n
-            elif what == BED:
-                # A slanting footprint is long and narrow: filter to its geometric mean.
-                slant = footprint / math.sqrt(max(abs(facing), 0.02))
-                red, green, blue = baked_albedo(maps, BED_TEXEL_M, x, y, slant)
-            else:
-                red, green, blue = stone_albedo(x, y, z, footprint, seed)
-            day = ambient * (wa * daylight[a, inner] + wb * daylight[b, inner] + wc * daylight[c, inner]) / n
-            night = 0.0
-            for m in range(lamps.shape[0]):
-                lx, ly, lz = lamps[m, 0] - x, lamps[m, 1] - y, lamps[m, 2] - z
-                r2 = lx * lx + ly * ly + lz * lz + 1e-4
-                on_surface = nx * lx + ny * ly + nz * lz
-                off_axis = -(R_WC[0, 2] * lx + R_WC[1, 2] * ly + R_WC[2, 2] * lz)
-                if on_surface > 0.0 and off_axis > 0.0:
-                    night += power * on_surface * off_axis / (r2 * r2 * n)
-            colours[pixel, 0, 0] += red * day
-            colours[pixel, 0, 1] += green * day
-            colours[pixel, 0, 2] += blue * day
-            colours[pixel, 1, 0] += red * night
-            colours[pixel, 1, 1] += green * night
-            colours[pixel, 1, 2] += blue * night
+def in_threads(work: Callable[[int], Any], items: Iterable[int]) -> None:
+    """Do the work on as many threads as numba uses; Embree and the kernels release the interpreter's lock."""
+    threads = numba.get_num_threads()
+    if threads == 1:
+        for item in items:
+            work(item)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        for _ in pool.map(work, items):
+            pass

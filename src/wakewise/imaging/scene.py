@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from wakewise.arrays import Array, IntArray
 from wakewise.errors import InputError
-from wakewise.imaging.daylight import bake_daylight
+from wakewise.imaging.daylight import bake_light
+from wakewise.imaging.panels import Panels
 from wakewise.imaging.texture import BED_MAP_LEVELS, BED_MAP_SIZE, BED_TEXEL_M, Maps, bake_bed, bed_heights
 from wakewise.targets import Mesh, Target
 
@@ -34,7 +35,9 @@ class Scene:
 
     `foot_W_m` (3,) is the origin F in the world; `vertices_F_m` (n, 3), `faces` (m, 3) and `first_face` (3,) hold
     target, bed and stones one after the other; `normals` (n, 3) point outward; `daylight` (n, 2) is the irradiance of
-    the down-welling light on the outer and the inner side, relative to a level open surface; `bed_maps` the baked sand.
+    the down-welling light on the outer and the inner side, relative to a level open surface, and `panel_light` (n, 2)
+    that of the tank's panels, relative to a level open surface at the foot; `bed_maps` the baked sand; `top_m` the
+    least z of all vertices.
     """
 
     foot_W_m: Array
@@ -43,12 +46,22 @@ class Scene:
     first_face: NDArray[np.int64]
     normals: NDArray[np.float32]
     daylight: NDArray[np.float32]
+    panel_light: NDArray[np.float32]
     bed_maps: Maps
+    top_m: float
     seed: int
     embree: Any
 
     @classmethod
-    def build(cls, target: Target, seed: int, *, bed_half_m: float = 1.5, stones: int = 200) -> Scene:
+    def build(
+        cls,
+        target: Target,
+        seed: int,
+        *,
+        bed_half_m: float = 1.5,
+        stones: int = 200,
+        panels: Panels | None = None,
+    ) -> Scene:
         """Lay the bed, scatter the stones, light everything and make it ready for rays.
 
         Parameters
@@ -60,6 +73,8 @@ class Scene:
             Half width of the part of the bed with fine relief; flat coarse sand goes on to 12 m.
         stones : int
             Number of stones on the fine part, none nearer to the target's bounding circle than 3 cm.
+        panels : Panels, optional
+            Four over a tank of 6 x 5 m if not given.
 
         Raises
         ------
@@ -81,7 +96,8 @@ class Scene:
         stone_vertices, stone_faces = _stones(stones, clear_m + 0.03, bed_half_m, noise_seed)
         parts = [(vertices, faces), (bed_vertices, bed_faces), (stone_vertices, stone_faces)]
         normals = [vertex_normals(v, f) for v, f in parts]
-        daylight = bake_daylight(parts, normals, near_m=clear_m + 0.4)
+        panels = panels or Panels.over_tank(6.0, 5.0)
+        daylight, panel_light = bake_light(parts, normals, clear_m + 0.4, panels, foot_W)
 
         offsets = np.cumsum([0] + [len(v) for v, _ in parts])
         embree = EmbreeScene()
@@ -95,7 +111,9 @@ class Scene:
             first_face=np.cumsum([0, len(faces), len(bed_faces)]),
             normals=np.concatenate(normals).astype(np.float32),
             daylight=daylight,
+            panel_light=panel_light,
             bed_maps=bake_bed(BED_MAP_SIZE, BED_MAP_LEVELS, BED_TEXEL_M, noise_seed),
+            top_m=float(min(v[:, 2].min(initial=np.inf) for v, _ in parts)),
             seed=noise_seed,
             embree=embree,
         )

@@ -44,7 +44,7 @@ def expose(
     return out
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def _encode(out: Any, radiance: Any, noise: Any, gains: Any, per_electron: float, read: float, table: Any) -> None:
     h, w, _ = radiance.shape
     for y in prange(h):

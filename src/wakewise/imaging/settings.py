@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from wakewise.imaging.camera import PinholeCamera
+from wakewise.imaging.camera import FlatPort, LensCamera, PinholeCamera
 from wakewise.imaging.optics import WaterOptics, water_optics
 from wakewise.imaging.renderer import Lights
 from wakewise.settings import Settings
@@ -25,25 +25,56 @@ class ImagingSettings(Settings):
     exposure_s: float = Field(0.008, description="time the shutter is open, s", gt=0.0, le=1.0)
     instants: int = Field(5, description="true camera poses kept across each exposure, for motion blur", ge=2, le=101)
     samples: int = Field(2, description="rays across a pixel (squared in all) on target and edges", ge=1, le=8)
+    distortion: tuple[float, float, float, float] = Field(
+        (0.0, 0.0, 0.0, 0.0), description="OpenCV's k1, k2, p1, p2 of the lens, in air if there is a port"
+    )
+    port_air_m: float | None = Field(
+        None, description="air between the lens's pupil and a flat port, m; none = no port", ge=0.0, le=1.0
+    )
+    port_glass_m: float = Field(0.005, description="thickness of the flat port, m", ge=0.0, le=0.1)
+    port_index: float = Field(1.49, description="refractive index of the flat port; 1.49 is acrylic", ge=1.0, le=3.0)
     water_type: WaterType = Field("II", description="Jerlov water type: I to III oceanic, 1C to 5C coastal")
-    ambient: float = Field(1.0, description="down-welling light relative to the reference, 0 = night", ge=0.0, le=10.0)
-    lamp: float = Field(0.35, description="lamps' irradiance at 0.5 m relative to the daylight", ge=0.0, le=100.0)
+    ambient: float = Field(0.4, description="light from the sky relative to the reference, 0 = night", ge=0.0, le=10.0)
+    panels: float = Field(
+        0.6,
+        description="light from four LED panels at the surface, at the target, relative to the reference",
+        ge=0,
+        le=10,
+    )
+    lamp: float = Field(0.35, description="lamps' irradiance at 0.5 m relative to the reference", ge=0.0, le=100.0)
     lamp_offset_m: float = Field(0.2, description="distance of each of two lamps to the camera's side, m", gt=0, le=2.0)
     gain: float = Field(0.75, description="signal, 1 = saturation, of a white card in unit light", gt=0.0, le=100.0)
     flakes_per_m3: float = Field(1500.0, description="visible flakes in clear water, 1/m3", ge=0.0, le=1e6)
     flakes_per_kg: float = Field(1e6, description="visible flakes per kilogram of suspended silt, 1/kg", ge=0.0, le=1e8)
     electrons_per_s: float = Field(1.5e6, description="electrons per second at saturation", gt=0.0, le=1e12)
+    photo_format: Literal["png", "jpeg"] = Field("png", description="how photographs are stored")
+    jpeg_quality: int = Field(92, description="quality of photographs stored as JPEG", ge=1, le=100)
     read_noise_e: float = Field(4.0, description="read noise, electrons rms", ge=0.0, le=1000.0)
 
-    def camera(self) -> PinholeCamera:
-        """Ideal camera of these settings."""
-        return PinholeCamera(self.width, self.height, math.radians(self.fov_deg))
+    def camera(self) -> PinholeCamera | LensCamera:
+        """Camera of these settings; an ideal one if it has neither distortion nor port.
+
+        Raises
+        ------
+        InputError
+            If the lens cannot show the field of view.
+        """
+        fov_rad = math.radians(self.fov_deg)
+        if self.port_air_m is None and not any(self.distortion):
+            return PinholeCamera(self.width, self.height, fov_rad)
+        port = None
+        if self.port_air_m is not None:
+            port = FlatPort(air_m=self.port_air_m, glass_m=self.port_glass_m, glass_index=self.port_index)
+        return LensCamera(self.width, self.height, fov_rad, self.distortion, port)
 
     def lights(self) -> Lights:
-        """Daylight, and two lamps level with the lens, a little above it."""
+        """Sky, panels, and two lamps level with the lens, a little above it."""
         x = self.lamp_offset_m
         return Lights(
-            ambient=self.ambient, lamp=self.lamp, lamps_C_m=np.array([[-x, -0.4 * x, 0.0], [x, -0.4 * x, 0.0]])
+            ambient=self.ambient,
+            panels=self.panels,
+            lamp=self.lamp,
+            lamps_C_m=np.array([[-x, -0.4 * x, 0.0], [x, -0.4 * x, 0.0]]),
         )
 
     def water(self) -> WaterOptics:

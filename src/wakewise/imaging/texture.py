@@ -25,7 +25,7 @@ BED_MAP_LEVELS = 6
 Maps = NDArray[np.uint16]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, inline="always", error_model="numpy")
 def _finalise(h: int) -> float:
     """Scramble 32 bits and map them to [0, 1)."""
     h &= 0xFFFFFFFF
@@ -37,7 +37,7 @@ def _finalise(h: int) -> float:
     return h * (1.0 / 4294967296.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def value_noise(x: float, y: float, z: float, seed: int) -> float:
     """Smooth noise in [0, 1] with mean 1/2 on the unit lattice."""
     xi, yi, zi = math.floor(x), math.floor(y), math.floor(z)
@@ -55,7 +55,7 @@ def value_noise(x: float, y: float, z: float, seed: int) -> float:
     return a + w * (b - a)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def octaves(
     x: float, y: float, z: float, coarsest_m: float, finest_m: float, gain: float, footprint_m: float, seed: int
 ) -> float:
@@ -75,7 +75,7 @@ def octaves(
     return total / weight
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def coral_albedo(x: float, y: float, z: float, footprint_m: float, seed: int) -> tuple[float, float, float]:
     """Reflectance (r, g, b) of a coral at a point of the world.
 
@@ -90,7 +90,7 @@ def coral_albedo(x: float, y: float, z: float, footprint_m: float, seed: int) ->
     return q * (0.33 + 0.18 * hue), q * (0.225 + 0.22 * hue), q * (0.135 + 0.02 * hue)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def stone_albedo(x: float, y: float, z: float, footprint_m: float, seed: int) -> tuple[float, float, float]:
     """Reflectance (r, g, b) of a stone at a point of the world; coarse noise gives each its own grey."""
     grain = octaves(x, y, z, 0.012, FINEST_CELL_M, 0.8, footprint_m, seed + 201)
@@ -99,7 +99,7 @@ def stone_albedo(x: float, y: float, z: float, footprint_m: float, seed: int) ->
     return q * 0.25, q * (0.235 - 0.03 * tone), q * (0.205 - 0.06 * tone)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def sand_albedo(x: float, y: float, footprint_m: float, seed: int) -> tuple[float, float, float]:
     """Reflectance (r, g, b) of carbonate sand above or below a point: about 0.3-0.45 (Hochberg et al. 2003)."""
     stain = octaves(x, y, 0.0, 0.32, 0.04, 0.75, footprint_m, seed + 301)
@@ -112,7 +112,7 @@ def sand_albedo(x: float, y: float, footprint_m: float, seed: int) -> tuple[floa
     return q * 0.40, q * (0.365 - 0.03 * stain), q * (0.295 - 0.06 * stain)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def bed_height(x: float, y: float, clear_m: float, seed: int) -> float:
     """Height in m of the sand above the nominal bed, at a point relative to the target's foot.
 
@@ -125,7 +125,7 @@ def bed_height(x: float, y: float, clear_m: float, seed: int) -> float:
     return 2.0 * amplitude * octaves(x, y, 0.0, 0.5, 0.06, 0.55, 0.0, seed + 401)
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def bed_heights(xy_m: Any, clear_m: float, seed: int) -> Any:
     """`bed_height` at points, shape (n, 2) to (n,)."""
     out = np.empty(xy_m.shape[0])
@@ -134,7 +134,7 @@ def bed_heights(xy_m: Any, clear_m: float, seed: int) -> Any:
     return out
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def bake_bed(size: int, levels: int, texel_m: float, seed: int) -> Any:
     """Bake the sand's albedo into nested maps centred on the target's foot.
 
@@ -157,16 +157,16 @@ def bake_bed(size: int, levels: int, texel_m: float, seed: int) -> Any:
     return maps
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _bilinear(maps: Any, level: int, texel_m: float, x: float, y: float) -> tuple[float, float, float]:
     size = maps.shape[1]
     u = min(max(x / texel_m + 0.5 * size - 0.5, 0.0), size - 1.001)
     v = min(max(y / texel_m + 0.5 * size - 0.5, 0.0), size - 1.001)
-    i, j = int(u), int(v)
+    i, j = np.uint64(u), np.uint64(v)
     a, b = u - i, v - j
     k = 1.0 / 65535.0
     p, q, r, s = k * (1 - a) * (1 - b), k * a * (1 - b), k * (1 - a) * b, k * a * b
-    m, n = i + 1, j + 1
+    m, n = i + np.uint64(1), j + np.uint64(1)
     return (
         p * maps[level, i, j, 0] + q * maps[level, m, j, 0] + r * maps[level, i, n, 0] + s * maps[level, m, n, 0],
         p * maps[level, i, j, 1] + q * maps[level, m, j, 1] + r * maps[level, i, n, 1] + s * maps[level, m, n, 1],
@@ -174,7 +174,7 @@ def _bilinear(maps: Any, level: int, texel_m: float, x: float, y: float) -> tupl
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def baked_albedo(maps: Any, texel_m: float, x: float, y: float, footprint_m: float) -> tuple[float, float, float]:
     """Look the bed's albedo up at (x, y) from the target's foot, between the two levels that suit the footprint."""
     levels, size = maps.shape[0], maps.shape[1]
@@ -188,8 +188,8 @@ def baked_albedo(maps: Any, texel_m: float, x: float, y: float, footprint_m: flo
     r, g, b = 0.0, 0.0, 0.0
     # A level that does not reach (x, y) has no weight, since then t = 1 is the next one alone.
     if t < 1.0:
-        r, g, b = _bilinear(maps, low, texel_m * 2.0**low, x, y)
+        r, g, b = _bilinear(maps, low, texel_m * (1 << low), x, y)
     if t > 0.0:
-        r1, g1, b1 = _bilinear(maps, low + 1, texel_m * 2.0 ** (low + 1), x, y)
+        r1, g1, b1 = _bilinear(maps, low + 1, texel_m * (2 << low), x, y)
         r, g, b = r + t * (r1 - r), g + t * (g1 - g), b + t * (b1 - b)
     return r, g, b

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.control import make_controller
+from wakewise.control import Surroundings, check_start, covering_spheres, make_controller, state_of
 from wakewise.errors import InputError
 from wakewise.estimation import ErrorStateFilter
 from wakewise.geometry import Pose, quat_from_rotvec, quat_multiply
-from wakewise.imaging import PinholeCamera, Scene
+from wakewise.imaging import LensCamera, Panels, PinholeCamera, Scene
 from wakewise.interfaces import BodyState, Controller, Estimator, ScalarGrid
 from wakewise.missions import Route, RoutePilot, TankBounds, check_clearance, plan_route
 from wakewise.operation.loop import Truth, WaterTruth
@@ -106,13 +106,10 @@ def build_mission(scenario: Scenario) -> Mission:
     InputError
         Unknown vehicle or target, an orbit that would touch something, or a current faster than the vehicle can hold.
     """
-    length, width, depth = scenario.tank.size_m
+    bounds = tank_bounds(scenario)
     vehicle = load_vehicle(scenario.vehicle)
-    target = build_target(scenario.target, depth)
+    target = build_target(scenario.target, scenario.tank.size_m[2])
     route = plan_route(target.centre_W_m, scenario.mission)
-    bounds = TankBounds(
-        low_W_m=np.array([-length / 2, -width / 2, 0.0]), high_W_m=np.array([length / 2, width / 2, depth])
-    )
     clearance_m = check_clearance(
         route, vehicle.X_BC, vehicle.size_m, bounds, target.mesh.vertices_m, scenario.mission.clearance_m
     )
@@ -124,6 +121,7 @@ def build_mission(scenario: Scenario) -> Mission:
         delicacy(target.mesh) if gain > 0.0 else None,
         gain,
     )
+    check_way(scenario, vehicle, region, route)
     return Mission(
         vehicle=vehicle,
         target=target,
@@ -132,6 +130,43 @@ def build_mission(scenario: Scenario) -> Mission:
         clearance_m=clearance_m,
         holding=check_current(scenario, vehicle, route),
     )
+
+
+def build_surroundings(scenario: Scenario, target: Target | None = None) -> Surroundings:
+    """What a planner keeps clear of: floor, walls and surface of the tank, stated obstacles, the target if given."""
+    bounds = tank_bounds(scenario)
+    obstacles = np.array(scenario.control.obstacles).reshape(-1, 4)
+    names = tuple(f"obstacle {k + 1} (control.obstacles)" for k in range(len(obstacles)))
+    around = np.zeros((0, 4)) if target is None else covering_spheres(target.mesh.vertices_m)
+    return Surroundings.tank(
+        bounds.low_W_m, bounds.high_W_m, np.vstack([obstacles, around]), (*names, *("the target",) * len(around))
+    )
+
+
+def tank_bounds(scenario: Scenario) -> TankBounds:
+    """The tank's water."""
+    length, width, depth = scenario.tank.size_m
+    return TankBounds(
+        low_W_m=np.array([-length / 2, -width / 2, 0.0]), high_W_m=np.array([length / 2, width / 2, depth])
+    )
+
+
+def check_way(scenario: Scenario, vehicle: Vehicle, region: Region, route: Route) -> None:
+    """Refuse a start from which no plan can be good, and a route through a stated obstacle.
+
+    How near the route comes to the target itself is for `wakewise.missions.check_clearance`, which knows its mesh.
+
+    Raises
+    ------
+    InputError
+        See `wakewise.control.check_start`; what is touched, and when, is named.
+    """
+    around = build_surroundings(scenario)
+    check_start(vehicle, region, state_of(route.body(0.0, vehicle.X_BC)), around)
+    if scenario.control.obstacles:
+        for time_s in np.arange(0.0, route.duration_s, 0.25):
+            state = state_of(route.body(float(time_s), vehicle.X_BC))
+            check_start(vehicle, region, state, around, what=f"mission at {time_s:.0f} s")
 
 
 def check_current(scenario: Scenario, vehicle: Vehicle, route: Route, looks: int = 200) -> Holding | None:
@@ -178,6 +213,8 @@ def build_flight(scenario: Scenario, mission: Mission) -> Flight:
         water_density_kg_m3=tank_settings.density_kg_m3,
     )
     wished = mission.route.body(0.0, believed.X_BC)
+    around = build_surroundings(scenario, mission.target)
+    check_start(believed, mission.region, state_of(wished), build_surroundings(scenario))
     start = BodyState(X_WB=_misplaced(wished.X_WB, seeds.start))
     tank = Tank(true_vehicle, mission.target, tank_settings, start, seeds.tank)
     control, depth_m = scenario.control, tank_settings.size_m[2]
@@ -186,7 +223,7 @@ def build_flight(scenario: Scenario, mission: Mission) -> Flight:
         true_vehicle=true_vehicle,
         pilot=RoutePilot(route=mission.route, X_BC=believed.X_BC, exposure_s=scenario.imaging.exposure_s),
         controller=make_controller(
-            scenario.method, believed, mission.region, wake_model(control.wake, depth_m), control
+            scenario.method, believed, mission.region, wake_model(control.wake, depth_m), control, around
         ),
         estimator=ErrorStateFilter(believed, scenario.estimation),
         tank=tank,
@@ -195,14 +232,15 @@ def build_flight(scenario: Scenario, mission: Mission) -> Flight:
     )
 
 
-def build_camera(scenario: Scenario) -> PinholeCamera:
+def build_camera(scenario: Scenario) -> PinholeCamera | LensCamera:
     """The camera of a scenario."""
     return scenario.imaging.camera()
 
 
 def build_scene(scenario: Scenario, target: Target) -> Scene:
     """The target on its bed, textured, as the camera finds it."""
-    return Scene.build(target, scenario.target.seed)
+    length, width, _ = scenario.tank.size_m
+    return Scene.build(target, scenario.target.seed, panels=Panels.over_tank(length, width))
 
 
 def _misplaced(X_WB: Pose, rng: np.random.Generator, spread_m: float = 0.02, spread_rad: float = 0.03) -> Pose:

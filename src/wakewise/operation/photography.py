@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from wakewise.files import whole_file, write_text
 from wakewise.geometry import Pose
-from wakewise.imaging import SiltOptics, photograph
+from wakewise.imaging import SiltOptics, calibrate, photograph
 from wakewise.interfaces import ScalarGrid, no_progress
 from wakewise.operation.build import Mission, Seeds, build_camera, build_scene
 from wakewise.operation.recorder import ExposureRecord, read_exposures
@@ -34,22 +34,28 @@ def photograph_flight(
 ) -> None:
     """Render the photographs that are not there yet; images.csv, written last, says that all are.
 
-    Each photograph draws its noise from its own child of the seed, so a resumed run gives the same pictures.
+    cameras.txt (COLMAP) and camera.json hold the camera model; the poses of images.csv are those of its projection
+    centre, which lies off the lens's pupil where a flat port bends the rays. Each photograph draws its noise from its
+    own child of the seed, so a resumed run gives the same pictures.
     """
     exposures = read_exposures(folder / "exposures.npz")
     names = mission.route.exposure_names
     camera = build_camera(scenario)
+    calibration = calibrate(camera)
+    calibration.write(folder)
     progress(0, len(exposures), "building the scene")
     scene = build_scene(scenario, mission.target)
     streams = Seeds.of(scenario.seed).imaging.spawn(len(exposures))
     grains = SiltOptics(diameter_m=scenario.tank.grain_m, density_kg_m3=scenario.tank.grain_density_kg_m3)
     images = folder / "images"
     rows = []
-    for k, (name, exposure, rng) in enumerate(zip(names, exposures, streams, strict=True)):
+    suffix = ".png" if scenario.imaging.photo_format == "png" else ".jpg"
+    for k, (planned, exposure, rng) in enumerate(zip(names, exposures, streams, strict=True)):
+        name = Path(planned).with_suffix(suffix).name
         note = images / f".{Path(name).stem}.json"
         if not ((images / name).exists() and note.exists()):
             photo = photograph(scene, camera, exposure.X_WC_true, _silt(exposure), scenario.imaging, rng, grains)
-            write_image(images / name, photo.image)
+            write_image(images / name, photo.image, scenario.imaging.jpeg_quality)
             write_text(note, json.dumps({"sharpness": photo.sharpness, "turbidity_per_m": photo.turbidity_per_m}))
         seen = json.loads(note.read_text(encoding="utf-8"))
         middle = exposure.X_WC_true[len(exposure.X_WC_true) // 2]
@@ -57,8 +63,8 @@ def photograph_flight(
             [
                 name,
                 f"{exposure.time_s:.6f}",
-                *_numbers(exposure.X_WC_est),
-                *_numbers(middle),
+                *_numbers(exposure.X_WC_est @ calibration.X_CM),
+                *_numbers(middle @ calibration.X_CM),
                 "" if seen["sharpness"] is None else f"{seen['sharpness']:.6g}",
                 f"{seen['turbidity_per_m']:.6g}",
             ]
@@ -72,10 +78,11 @@ def photograph_flight(
         note.unlink()
 
 
-def write_image(path: Path, image: NDArray[np.uint8]) -> None:
-    """Write an RGB image, shape (h, w, 3), uint8, as a whole PNG."""
+def write_image(path: Path, image: NDArray[np.uint8], jpeg_quality: int = 92) -> None:
+    """Write an RGB image, shape (h, w, 3), uint8, whole or not at all, as its suffix says (.png or .jpg)."""
+    options = [cv2.IMWRITE_JPEG_QUALITY, jpeg_quality] if path.suffix == ".jpg" else []
     with whole_file(path) as temporary:
-        temporary.write_bytes(cv2.imencode(".png", image[..., ::-1])[1].tobytes())
+        temporary.write_bytes(cv2.imencode(path.suffix, image[..., ::-1], options)[1].tobytes())
 
 
 def _silt(exposure: ExposureRecord) -> ScalarGrid | None:

@@ -19,6 +19,7 @@ from wakewise.missions import MissionSettings
 from wakewise.reconstruction import ReconstructionSettings
 from wakewise.settings import Settings
 from wakewise.tank import TankSettings
+from wakewise.tank.settings import WATERS
 from wakewise.targets import coral_kinds
 
 PRESETS = ("quick", "standard")
@@ -62,6 +63,9 @@ class Scenario(Settings):
 def load_scenario(preset: str | None, path: Path | None, overrides: dict[str, Any]) -> Scenario:
     """Lay a scenario file over a preset and the overrides over both, then check the whole.
 
+    A kind of water (`tank.water`) sets silt and grains: they replace those of the layers below it, where a scenario
+    that a trial left behind spells them out, and yield to what its own layer, or one above, says of them.
+
     Parameters
     ----------
     preset : str or None
@@ -76,18 +80,22 @@ def load_scenario(preset: str | None, path: Path | None, overrides: dict[str, An
     InputError
         Naming the file or field, what was found and what is allowed.
     """
-    tree: dict[str, Any] = {}
+    layers: list[dict[str, Any]] = []
     source = "scenario"
     if preset is not None:
         if preset not in PRESETS:
             raise InputError(f"--preset: '{preset}', allowed are {', '.join(PRESETS)}")
         text = resources.files("wakewise.operation").joinpath("presets", f"{preset}.yaml").read_text(encoding="utf-8")
-        tree = yaml.safe_load(text)
+        layers.append(yaml.safe_load(text))
     if path is not None:
         source = str(path)
-        tree = _merged(tree, _read_yaml(path))
+        layers.append(_read_yaml(path))
+    changes: dict[str, Any] = {}
     for name, value in overrides.items():
-        tree = _merged(tree, _nested(name, value))
+        changes = _merged(changes, _nested(name, value))
+    tree: dict[str, Any] = {}
+    for layer in (*layers, changes):
+        tree = _merged(tree, _with_water(layer))
     return check_scenario(tree, source)
 
 
@@ -177,6 +185,14 @@ def _read_yaml(path: Path) -> dict[str, Any]:
     if not isinstance(tree, dict):
         raise InputError(f"{path}: holds {type(tree).__name__}, must hold fields of a scenario such as 'seed: 1'")
     return tree
+
+
+def _with_water(layer: dict[str, Any]) -> dict[str, Any]:
+    """The layer with what its kind of water says and it does not, so that this replaces what lies below."""
+    tank = layer.get("tank")
+    if not isinstance(tank, dict) or not isinstance(tank.get("water"), str):
+        return layer
+    return layer | {"tank": WATERS.get(tank["water"], {}) | tank}
 
 
 def _nested(dotted: str, value: Any) -> dict[str, Any]:

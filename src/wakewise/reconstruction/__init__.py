@@ -1,5 +1,6 @@
 """Photographs to a 3D model with COLMAP and semi-global stereo, in stages that take files and leave files."""
 
+from wakewise.reconstruction.calibration import Board, Calibration, calibrate
 from wakewise.reconstruction.clouds import Cloud, read_cloud, write_cloud, write_mesh
 from wakewise.reconstruction.photos import Photo, read_photos
 from wakewise.reconstruction.pipeline import Model, reconstruct
@@ -7,10 +8,13 @@ from wakewise.reconstruction.references import match_references, read_reference_
 from wakewise.reconstruction.settings import ReconstructionSettings
 
 __all__ = [
+    "Board",
+    "Calibration",
     "Cloud",
     "Model",
     "Photo",
     "ReconstructionSettings",
+    "calibrate",
     "match_references",
     "read_cloud",
     "read_photos",

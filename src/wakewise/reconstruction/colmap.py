@@ -17,8 +17,13 @@ from wakewise.errors import StageError
 
 T = TypeVar("T")
 
-# Only fatal messages; everything else would land between the lines of a progress bar or of JSON.
-pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL.value
+
+def be_quiet() -> None:
+    """Only fatal messages; everything else would land between the lines of a progress bar or of JSON."""
+    pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL.value
+
+
+be_quiet()
 
 
 def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: None) -> T:
@@ -41,6 +46,7 @@ def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: 
     failure: list[Exception] = []
 
     def body() -> None:
+        be_quiet()  # a bundle adjustment on its own makes COLMAP talk again
         try:
             result.append(work(cancellation_token=token))
         except (RuntimeError, ValueError, IndexError, TypeError, OSError) as error:

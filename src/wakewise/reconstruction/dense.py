@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import small_gicp
 
-from wakewise.arrays import Array
+from wakewise.arrays import Array, IntArray
 from wakewise.errors import StageError
 from wakewise.interfaces import Progress
 from wakewise.reconstruction.clouds import Cloud, write_cloud
@@ -22,6 +24,7 @@ from wakewise.reconstruction.views import Ball, View, rank_partners, read_views
 
 # Depth maps of at most this many other photos vote on a point.
 VOTING_PHOTOS = 8
+MERGE_ROWS = 1_000_000
 
 
 def densify(
@@ -47,25 +50,13 @@ def densify(
     """
     views, points = read_views(sparse, region)
     partners = rank_partners(views, points, region, most=2 * max(VOTING_PHOTOS, settings.stereo_partners))
-    photos = [_load(folder / view.name) for view in views]
     scale = _scale(views, region, settings)
-    jobs = []
-    for i, best in enumerate(partners):
-        good = [j for j in best if rectifiable(views[i], views[j])]
-        jobs += [(i, j) for j in good[: settings.stereo_partners]]
-    maps: list[DepthMap] = []
-    with ThreadPoolExecutor(settings.threads) as pool:
-        results: Iterator[DepthMap | None] = pool.map(
-            lambda job: pair_depth(views, photos, job[0], job[1], region, scale), jobs
-        )
-        try:
-            for done, depth_map in enumerate(results):
-                progress(done, 2 * len(jobs), "stereo")
-                if depth_map is not None:
-                    maps.append(depth_map)
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)  # the threads are over photos and pairs
+    try:
+        maps = _all_depths(folder, views, partners, region, settings, scale, progress)
+    finally:
+        cv2.setNumThreads(before)
     spacing = _spacing(maps) if maps else 0.0
     cloud = _fuse_all(maps, partners, settings, spacing, progress) if maps else np.zeros((0, 9))
     if len(cloud) < 100:
@@ -75,11 +66,63 @@ def densify(
     return {"dense_points": len(cloud), "depth_maps": len(maps), "point_spacing_mm": 1e3 * spacing}
 
 
-def _load(path: Path) -> Image:
+def _all_depths(
+    folder: Path,
+    views: tuple[View, ...],
+    partners: list[list[int]],
+    region: Ball | None,
+    settings: ReconstructionSettings,
+    scale: float,
+    progress: Progress,
+) -> list[DepthMap]:
+    """A depth map of every photo with each of its best partners, as far as they can be rectified."""
+    jobs = []
+    for i, best in enumerate(partners):
+        good = [j for j in best if rectifiable(views[i], views[j])]
+        jobs += [(i, j) for j in good[: settings.stereo_partners]]
+    # Whole multiples, so that large photos need not lie in memory at a size that stereo does not look at.
+    shrink = max(1, int(1.0 / scale))
+    maps: list[DepthMap] = []
+    with ThreadPoolExecutor(settings.threads) as pool:
+        try:
+            photos = list(pool.map(lambda view: _load(folder / view.name, shrink), views))
+            small = tuple(_shrunk(view, shrink) for view in views)
+            results: Iterator[DepthMap | None] = pool.map(
+                lambda job: pair_depth(small, photos, job[0], job[1], region, scale * shrink, settings.stereo_paths),
+                jobs,
+            )
+            for done, depth_map in enumerate(results):
+                progress(done, 2 * len(jobs), "stereo")
+                if depth_map is not None:
+                    maps.append(depth_map)
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    return maps
+
+
+def _load(path: Path, shrink: int) -> Image:
     image = decode(path.read_bytes())
     if image is None:
         raise StageError(f"dense: {path} can no longer be read")
-    return image
+    if shrink == 1:
+        return image
+    height, width = (size - size % shrink for size in image.shape[:2])
+    small = cv2.resize(image[:height, :width], (width // shrink, height // shrink), interpolation=cv2.INTER_AREA)
+    return np.asarray(small, dtype=np.uint8)
+
+
+def _shrunk(view: View, shrink: int) -> View:
+    """The view with pixels `shrink` times as large; COLMAP's pixel positions scale about the photo's corner."""
+    if shrink == 1:
+        return view
+    return replace(
+        view,
+        width=view.width // shrink,
+        height=view.height // shrink,
+        focal_px=view.focal_px / shrink,
+        centre_px=view.centre_px / shrink,
+    )
 
 
 def _scale(views: tuple[View, ...], region: Ball | None, settings: ReconstructionSettings) -> float:
@@ -103,27 +146,49 @@ def _fuse_all(
     progress: Progress,
 ) -> Array:
     """Points, colours and directions to the camera side by side, shape (n, 9)."""
-    parts = []
-    for index, own in enumerate(maps):
-        progress(len(maps) + index, 2 * len(maps), "fusion")
+    alone = len({own.first for own in maps} | {own.second for own in maps}) == 2
+
+    def of_one(index: int) -> tuple[Array, IntArray]:
+        own = maps[index]
         voters = {own.first, *partners[own.first][:VOTING_PHOTOS]}
         neighbours = [
             k
             for k, other in enumerate(maps)
-            if other.first in voters and {other.first, other.second} != {own.first, own.second}
+            if other.first in voters
+            # The pair the other way round is no independent witness; of two photos it is the only one.
+            and ({other.first, other.second} != {own.first, own.second} or (alone and other.first != own.first))
         ]
-        points, colours, towards = fuse(maps, index, neighbours, settings.agreeing_views, settings.agreement_px)
-        if len(points):
-            # Thinned per map first, so that memory stays bounded.
-            mean, values, count = thin_mean(points, np.concatenate([colours, towards], axis=1), spacing)
-            parts.append(np.concatenate([mean, values, count[:, None].astype(np.float64)], axis=1))
-    if not parts:
-        return np.zeros((0, 9))
-    rows = np.concatenate(parts)
-    weighted = rows[:, 3:9]
-    points, values, _ = thin_mean(rows[:, :3], weighted, spacing)
-    keep = ~lonely(points, threads=settings.threads)
-    return np.concatenate([points, values], axis=1)[keep]
+        agreeing = 1 if alone else settings.agreeing_views
+        points, colours, towards = fuse(maps, index, neighbours, agreeing, settings.agreement_px)
+        values = np.concatenate([colours, towards], axis=1)
+        if not len(points):
+            return np.zeros((0, 9)), np.zeros(0, dtype=np.int64)
+        points, values, count = thin_mean(points, values, spacing)
+        return np.concatenate([points, values], axis=1), count
+
+    gathered: list[Array] = []
+    counts: list[IntArray] = []
+
+    def merge() -> None:
+        rows = np.concatenate(gathered)
+        points, values, count = thin_mean(rows[:, :3], rows[:, 3:], spacing, np.concatenate(counts))
+        gathered[:], counts[:] = [np.concatenate([points, values], axis=1)], [count]
+
+    with ThreadPoolExecutor(settings.threads) as pool:
+        try:
+            for index, (rows, count) in enumerate(pool.map(of_one, range(len(maps)))):
+                progress(len(maps) + index, 2 * len(maps), "fusion")
+                gathered.append(rows)
+                counts.append(count)
+                # Merged now and then, so that memory stays bounded.
+                if sum(len(part) for part in gathered[1:]) > MERGE_ROWS:
+                    merge()
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    merge()
+    rows = gathered[0]
+    return rows[~lonely(rows[:, :3], threads=settings.threads)]
 
 
 def _normals(points: Array, towards: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,10 +15,13 @@ from wakewise.errors import InputError, StageError
 from wakewise.files import whole_file
 from wakewise.interfaces import Progress
 from wakewise.reconstruction.colmap import call, remove_logs, settle
+from wakewise.reconstruction.pairs import Pairs
 from wakewise.reconstruction.photos import Photo
 from wakewise.reconstruction.settings import ReconstructionSettings
+from wakewise.reconstruction.sift import folder_features
 
 T = TypeVar("T")
+FEW_FEATURES = 150
 EXTRACTION_BATCHES, MATCHING_BATCHES = 12, 8
 """Parts that the work is done in, for progress; each costs a little, as descriptors are indexed anew."""
 
@@ -29,7 +33,7 @@ def match_photos(
     settings: ReconstructionSettings,
     *,
     focal_px: float | None,
-    pairs: list[tuple[str, str]] | None,
+    pairs: Pairs,
     progress: Progress,
 ) -> dict[str, Any]:
     """Find SIFT features, match and verify; write COLMAP's database whole.
@@ -38,8 +42,8 @@ def match_photos(
     ----------
     focal_px : float, optional
         Focal length to start from, in pixels of these photos; else from EXIF or 1.2 times the longer side.
-    pairs : list of two photo names, optional
-        What to match; else all pairs, or neighbours in order of name when there are many photos.
+    pairs : list of two photo names
+        What to match.
 
     Returns
     -------
@@ -59,22 +63,24 @@ def match_photos(
     with whole_file(database) as temporary:
         try:
             _extract(folder, photos, temporary, settings, focal_px, progress)
-            _match(names, temporary, settings, pairs, progress)
+            _match(temporary, settings, pairs, progress)
             figures = _figures(temporary, len(photos))
             settle(temporary)
         finally:
             remove_logs(temporary)
         if figures["inlier_matches"] == 0:
+            count = figures["features_per_image"]
+            hint = "; so few come from dark, blurred or hazy photos" if count < FEW_FEATURES else ""
             raise StageError(
                 f"matching: no two of the {len(photos)} photos show the same thing "
-                f"({figures['features_per_image']:.0f} features a photo, 0 verified matches)"
+                f"({count:.0f} features a photo, 0 verified matches{hint})"
             )
     return figures
 
 
-def _check_pairs(names: list[str], pairs: list[tuple[str, str]] | None) -> None:
+def _check_pairs(names: list[str], pairs: Pairs) -> None:
     known = set(names)
-    for pair in pairs or ():
+    for pair in pairs:
         for name in pair:
             if name not in known:
                 raise InputError(f"pairs: {name} is not among the photos ({names[0]} ... {names[-1]})")
@@ -88,31 +94,85 @@ def _extract(
     focal_px: float | None,
     progress: Progress,
 ) -> None:
-    reader = pycolmap.ImageReaderOptions()
-    reader.camera_model = "SIMPLE_RADIAL"
-    sizes = {(photo.width, photo.height) for photo in photos}
-    one_camera = len(sizes) == 1
-    if focal_px is not None:
-        if not one_camera:
-            raise InputError("photos: have different sizes, so one focal length in pixels cannot hold for all of them")
-        width, height = sizes.pop()
-        reader.camera_params = f"{focal_px},{width / 2},{height / 2},0"
+    """Features of all photos; those of one size share a camera, as one that was turned has another size."""
+    groups: dict[tuple[int, int], list[str]] = {}
+    for photo in photos:
+        groups.setdefault((photo.width, photo.height), []).append(photo.name)
+    if focal_px is not None and len(groups) > 1:
+        raise InputError("photos: have different sizes, so one focal length in pixels cannot hold for all of them")
+    done = 0
+    for (width, height), names in groups.items():
+        reader = pycolmap.ImageReaderOptions()
+        reader.camera_model = "SIMPLE_RADIAL"
+        if focal_px is not None:
+            reader.camera_params = f"{focal_px},{width / 2},{height / 2},0"
+        work = _by_opencv if settings.detector == "opencv" else _by_colmap
+        work(folder, names, database, settings, reader, partial(_tell, progress, done, len(photos)))
+        done += len(names)
+    progress(done, len(photos), "features")
+
+
+def _tell(progress: Progress, before: int, total: int, done: int) -> None:
+    progress(before + done, total, "features")
+
+
+def _by_opencv(
+    folder: Path,
+    names: list[str],
+    database: Path,
+    settings: ReconstructionSettings,
+    reader: pycolmap.ImageReaderOptions,
+    tell: Callable[[int], None],
+) -> None:
+    """List the photos in COLMAP's database and write OpenCV's features beside them."""
+    call(
+        lambda **_: pycolmap.import_images(
+            database, folder, camera_mode=pycolmap.CameraMode.SINGLE, image_names=names, options=reader
+        ),
+        "features",
+    )
+    # Found before the database is opened: two SQLite libraries must not meet in it, and an interrupt leaves it whole.
+    found = []
+    for k, features in enumerate(folder_features(folder, names, settings)):
+        tell(k)
+        found.append(features)
+    link = pycolmap.Database.open(database)
+    try:
+        for name, features in zip(names, found, strict=True):
+            image_id = link.read_image_with_name(name).image_id
+            link.write_keypoints(image_id, features.keypoints)
+            kind = pycolmap.FeatureExtractorType.SIFT
+            link.write_descriptors(image_id, pycolmap.FeatureDescriptors(kind, features.descriptors))
+    finally:
+        link.close()
+
+
+def _by_colmap(
+    folder: Path,
+    names: list[str],
+    database: Path,
+    settings: ReconstructionSettings,
+    reader: pycolmap.ImageReaderOptions,
+    tell: Callable[[int], None],
+) -> None:
+    """COLMAP's own features."""
     options = pycolmap.FeatureExtractionOptions()
     options.num_threads = settings.threads
     options.use_gpu = False
     options.sift.max_num_features = settings.max_features
     options.sift.first_octave = settings.first_octave
-    options.sift.peak_threshold = settings.peak_threshold
+    # COLMAP counts the contrast per scale of an octave, and has three.
+    options.sift.peak_threshold = settings.peak_threshold / options.sift.octave_resolution
     done = 0
-    for batch in _batches([photo.name for photo in photos], EXTRACTION_BATCHES):
-        progress(done, len(photos), "features")
+    for batch in _batches(names, EXTRACTION_BATCHES):
+        tell(done)
         call(
             partial(
                 pycolmap.extract_features,
                 database,
                 folder,
                 image_names=batch,
-                camera_mode=pycolmap.CameraMode.SINGLE if one_camera else pycolmap.CameraMode.PER_IMAGE,
+                camera_mode=pycolmap.CameraMode.SINGLE,
                 reader_options=reader,
                 extraction_options=options,
                 device=pycolmap.Device.cpu,
@@ -120,16 +180,16 @@ def _extract(
             "features",
         )
         done += len(batch)
-        if one_camera:
-            reader.existing_camera_id = 1
-    progress(done, len(photos), "features")
+        if reader.existing_camera_id < 0 or done == len(batch):
+            link = pycolmap.Database.open(database)
+            reader.existing_camera_id = link.read_image_with_name(batch[0]).camera_id
+            link.close()
 
 
 def _match(
-    names: list[str],
     database: Path,
     settings: ReconstructionSettings,
-    pairs: list[tuple[str, str]] | None,
+    pairs: Pairs,
     progress: Progress,
 ) -> None:
     options = pycolmap.FeatureMatchingOptions()
@@ -137,8 +197,6 @@ def _match(
     options.use_gpu = False
     verification = pycolmap.TwoViewGeometryOptions()
     verification.ransac.random_seed = settings.random_seed
-    if pairs is None:
-        pairs = default_pairs(names, settings)
     pairing = pycolmap.ImportedPairingOptions()
     done = 0
     for batch in _batches(pairs, MATCHING_BATCHES):
@@ -170,20 +228,6 @@ def _batches(items: list[T], count: int) -> list[list[T]]:
     """
     size = max(1, -(-len(items) // count))
     return [items[k : k + size] for k in range(0, len(items), size)]
-
-
-def default_pairs(names: list[str], settings: ReconstructionSettings) -> list[tuple[str, str]]:
-    """Every pair of a small set; of a large one each photo with the next few in order of name, and ever wider ones.
-
-    The steps that double (1, 2, 4, ...) beyond the overlap tie later laps of an orbit to earlier ones.
-    """
-    n = len(names)
-    if n <= settings.exhaustive_up_to:
-        steps = list(range(1, n))
-    else:
-        powers = [2**k for k in range(n.bit_length()) if settings.sequence_overlap < 2**k < n]
-        steps = [*range(1, settings.sequence_overlap + 1), *powers]
-    return [(names[i], names[i + step]) for step in steps for i in range(n - step)]
 
 
 def _figures(database: Path, photos: int) -> dict[str, Any]:

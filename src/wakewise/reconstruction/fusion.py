@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from scipy.spatial import KDTree
 
 from wakewise.arrays import Array, BoolArray, IntArray
 from wakewise.reconstruction.stereo import DepthImage, DepthMap
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _agree(
     depth: DepthImage,
     wanted: BoolArray,
     camera: Array,
-    others: list[DepthImage],
+    others: DepthImage,
+    places: IntArray,
     cameras: Array,
     tolerance_px: float,
 ) -> tuple[Array, IntArray, IntArray]:
-    """Depth averaged over the maps that agree, their number, and the number that look through; one pixel, one thread.
+    """Depth averaged over the maps that agree, their number, and the number that look through.
 
-    `camera` is (focal, cx, cy, baseline, R_CW row by row, centre), shape (16,); `cameras` one row per other map.
+    `camera` is (focal, cx, cy, baseline, R_CW row by row, centre), shape (16,); `cameras` one row per other map, whose
+    depths lie in `others` from `places[k, 0]` on, `places[k, 1]` rows of `places[k, 2]` each: a list of arrays would be
+    counted up and down at every look, which took longer than the geometry.
     """
     height, width = depth.shape
     mean = np.zeros((height, width))
@@ -29,7 +32,8 @@ def _agree(
     against = np.zeros((height, width), np.int64)
     f, cx, cy, base = camera[0], camera[1], camera[2], camera[3]
     R, c = camera[4:13], camera[13:16]
-    for v in prange(height):
+    inverse_focal = 1.0 / cameras[:, 0]
+    for v in range(height):
         for u in range(width):
             if not wanted[v, u]:
                 continue
@@ -40,39 +44,41 @@ def _agree(
             Z = R[2] * x + R[5] * y + R[8] * z + c[2]
             weight = (f * base / (z * z)) ** 2
             total, sum_z = weight, weight * z
-            for k in range(len(others)):
-                o = cameras[k]
-                dx, dy, dz = X - o[13], Y - o[14], Z - o[15]
-                zo = o[10] * dx + o[11] * dy + o[12] * dz
+            inverse_z = 1.0 / z
+            for k in range(len(cameras)):
+                dx, dy, dz = X - cameras[k, 13], Y - cameras[k, 14], Z - cameras[k, 15]
+                zo = cameras[k, 10] * dx + cameras[k, 11] * dy + cameras[k, 12] * dz
                 if zo <= 0.0:
                     continue
-                uo = o[0] * (o[4] * dx + o[5] * dy + o[6] * dz) / zo + o[1]
-                vo = o[0] * (o[7] * dx + o[8] * dy + o[9] * dz) / zo + o[2]
+                inverse_zo = 1.0 / zo
+                scaled = cameras[k, 0] * inverse_zo
+                uo = scaled * (cameras[k, 4] * dx + cameras[k, 5] * dy + cameras[k, 6] * dz) + cameras[k, 1]
+                vo = scaled * (cameras[k, 7] * dx + cameras[k, 8] * dy + cameras[k, 9] * dz) + cameras[k, 2]
                 col, row = int(np.floor(uo + 0.5)), int(np.floor(vo + 0.5))
-                other = others[k]
-                if row < 0 or col < 0 or row >= other.shape[0] or col >= other.shape[1]:
+                if row < 0 or col < 0 or row >= places[k, 1] or col >= places[k, 2]:
                     continue
-                seen = float(other[row, col])
+                seen = float(others[places[k, 0] + row * places[k, 2] + col])
                 if seen <= 0.0:
                     continue
                 # What the other map sees there, taken back into this one.
-                ox, oy = (col - o[1]) / o[0] * seen, (row - o[2]) / o[0] * seen
-                ex = o[4] * ox + o[7] * oy + o[10] * seen + o[13] - c[0]
-                ey = o[5] * ox + o[8] * oy + o[11] * seen + o[14] - c[1]
-                ez = o[6] * ox + o[9] * oy + o[12] * seen + o[15] - c[2]
+                per_pixel = seen * inverse_focal[k]
+                ox, oy = (col - cameras[k, 1]) * per_pixel, (row - cameras[k, 2]) * per_pixel
+                ex = cameras[k, 4] * ox + cameras[k, 7] * oy + cameras[k, 10] * seen + cameras[k, 13] - c[0]
+                ey = cameras[k, 5] * ox + cameras[k, 8] * oy + cameras[k, 11] * seen + cameras[k, 14] - c[1]
+                ez = cameras[k, 6] * ox + cameras[k, 9] * oy + cameras[k, 12] * seen + cameras[k, 15] - c[2]
                 back = R[6] * ex + R[7] * ey + R[8] * ez
-                other_gap = o[0] * o[3] * (1.0 / zo - 1.0 / seen)
                 if back <= 0.0:
                     continue
-                gap = f * base * (1.0 / back - 1.0 / z)
-                bu = f * (R[0] * ex + R[1] * ey + R[2] * ez) / back + cx - u
-                bv = f * (R[3] * ex + R[4] * ey + R[5] * ez) / back + cy - v
+                inverse_back = 1.0 / back
+                gap = f * base * (inverse_back - inverse_z)
+                bu = f * inverse_back * (R[0] * ex + R[1] * ey + R[2] * ez) + cx - u
+                bv = f * inverse_back * (R[3] * ex + R[4] * ey + R[5] * ez) + cy - v
                 if abs(gap) < tolerance_px and bu * bu + bv * bv < 4.0:
                     votes[v, u] += 1
-                    w = (o[0] * o[3] / (seen * seen)) ** 2
+                    w = (cameras[k, 0] * cameras[k, 3] / (seen * seen)) ** 2
                     total += w
                     sum_z += w * back
-                elif other_gap > 3.0 * tolerance_px:
+                elif cameras[k, 0] * cameras[k, 3] * (inverse_zo - 1.0 / seen) > 3.0 * tolerance_px:
                     against[v, u] += 1  # the other map sees something well behind this point: it looks through
             mean[v, u] = sum_z / total
     return mean, votes, against
@@ -108,10 +114,12 @@ def fuse(
     if not neighbours:
         return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3))
     camera = pack(own)
-    others = _typed([maps[k].depth_m for k in neighbours])
-    mean, votes, against = _agree(
-        own.depth_m, own.wanted, camera, others, np.array([pack(maps[k]) for k in neighbours]), tolerance_px
-    )
+    depths = [maps[k].depth_m for k in neighbours]
+    starts = np.cumsum([0, *(depth.size for depth in depths[:-1])])
+    places = np.array([(start, *depth.shape) for start, depth in zip(starts, depths, strict=True)], dtype=np.int64)
+    others = np.concatenate([depth.ravel() for depth in depths])
+    cameras = np.array([pack(maps[k]) for k in neighbours])
+    mean, votes, against = _agree(own.depth_m, own.wanted, camera, others, places, cameras, tolerance_px)
     v, u = np.nonzero((votes >= agreeing) & (against <= votes) & own.wanted)
     z = mean[v, u]
     rays = np.stack([(u - own.centre_px[0]) / own.focal_px, (v - own.centre_px[1]) / own.focal_px, np.ones(len(u))], 1)
@@ -121,22 +129,25 @@ def fuse(
     return points, colours, towards / np.linalg.norm(towards, axis=1, keepdims=True)
 
 
-def _typed(arrays: list[DepthImage]) -> list[DepthImage]:
-    from numba.typed import List
+def thin_mean(
+    points_m: Array, values: Array, voxel_m: float, weights: IntArray | None = None
+) -> tuple[Array, Array, IntArray]:
+    """Mean point and mean values of each occupied cell of a grid, and how many points it had.
 
-    out: list[DepthImage] = List(arrays)
-    return out
-
-
-def thin_mean(points_m: Array, values: Array, voxel_m: float) -> tuple[Array, Array, IntArray]:
-    """Mean point and mean values of each occupied cell of a grid, and how many points it had."""
+    Points that are means already count as many times as `weights`, shape (n,), says.
+    """
+    if len(points_m) == 0:
+        return np.zeros((0, 3)), np.zeros((0, values.shape[1])), np.zeros(0, dtype=np.int64)
     cells = np.floor(points_m / voxel_m).astype(np.int64)
     cells -= cells.min(axis=0)
     spans = cells.max(axis=0) + 1
     key = (cells[:, 0] * spans[1] + cells[:, 1]) * spans[2] + cells[:, 2]
-    _, row, count = np.unique(key, return_inverse=True, return_counts=True)
-    both = np.concatenate([points_m, values], axis=1)
-    mean = np.stack([np.bincount(row, weights=column) for column in both.T], axis=1) / count[:, None]
+    order = np.argsort(key, kind="stable")
+    starts = np.flatnonzero(np.diff(key[order], prepend=-1))
+    weight = np.ones(len(key), dtype=np.int64) if weights is None else weights
+    both = (np.concatenate([points_m, values], axis=1) * weight[:, None])[order]
+    count = np.add.reduceat(weight[order], starts)
+    mean = np.add.reduceat(both, starts, axis=0) / count[:, None]
     return mean[:, :3], mean[:, 3:], count
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import tempfile
 from functools import partial
 from pathlib import Path
@@ -15,8 +16,14 @@ from wakewise.errors import InputError, StageError
 from wakewise.evaluation import robust_similarity
 from wakewise.files import whole_folder
 from wakewise.interfaces import Progress
-from wakewise.reconstruction.colmap import call
+from wakewise.reconstruction.colmap import call, no_stderr, settle
 from wakewise.reconstruction.settings import ReconstructionSettings
+
+# Largest reprojection errors that are let pass, one after the other, until the mean is small enough (COLMAP's own: 4).
+CUTS_PX = (2.0, 1.5, 1.0, 0.75)
+MIN_ANGLE_DEG = 1.5
+# No photo sees sharply from nearer, and none of a scan from farther: beyond, the positions are hardly in metres.
+SENSIBLE_RANGE_M = (0.01, 1000.0)
 
 
 def map_photos(
@@ -29,9 +36,11 @@ def map_photos(
     references: dict[str, Array] | None,
     progress: Progress,
 ) -> dict[str, Any]:
-    """Incremental structure from motion; keep the largest model, bring it to the reference positions, write it whole.
+    """Structure from motion; keep the largest model, bring it to the reference positions, write it whole.
 
-    J. L. Schoenberger and J.-M. Frahm, Structure-from-motion revisited, CVPR 2016, doi 10.1109/CVPR.2016.445.
+    Incremental: J. L. Schoenberger and J.-M. Frahm, Structure-from-motion revisited, CVPR 2016, doi
+    10.1109/CVPR.2016.445. Global: L. Pan et al., Global structure-from-motion revisited, ECCV 2024, doi
+    10.1007/978-3-031-73661-2_4.
 
     Parameters
     ----------
@@ -39,65 +48,139 @@ def map_photos(
         How many there are, for the progress and the messages.
     references : dict, optional
         Camera centres in m, shape (3,), by photo name. They fix place, turn and scale by a robust similarity; the
-        model's shape does not bend to them.
+        model's shape does not bend to them unless `position_priors` is set.
 
     Returns
     -------
     dict
-        registered_images, points, reprojection_px, track_length, focal_px, cameras_rmse_mm and cameras_max_mm over all
-        registered photos with a reference, reference_inliers, scale; None where no references were given.
+        registered_images, points, reprojection_px, reprojection_met, track_length, focal_px, cameras_rmse_mm and
+        cameras_max_mm over all registered photos with a reference, reference_inliers, scale, surface_distance_m (median
+        from camera to sparse point), suspicion; None where no references were given.
 
     Raises
     ------
     StageError
         If too few photos register or the model cannot be aligned.
     """
-    options = pycolmap.IncrementalPipelineOptions()
-    options.num_threads = settings.threads
-    options.random_seed = settings.random_seed
-    options.mapper.random_seed = settings.random_seed
-    options.min_model_size = 3
-    options.max_num_models = 5
-    options.extract_colors = False
-    options.ba_global_max_num_iterations = 100
-    done = [0]
-
-    def one_more() -> None:
-        done[0] += 1
-
     with tempfile.TemporaryDirectory(prefix=".mapping.", dir=sparse.parent) as scratch:
-        models = call(
-            partial(
-                pycolmap.incremental_mapping, database, folder, scratch, options=options, next_image_callback=one_more
-            ),
-            "mapping",
-            lambda: progress(min(done[0], photos), photos, "mapping"),
-        )
+        if settings.position_priors and references is not None:
+            copy = Path(scratch) / "database.db"
+            shutil.copyfile(database, copy)
+            _write_priors(copy, references, settings.prior_sigma_m)
+            database = copy
+        models = _solve(folder, database, Path(scratch), settings, photos, progress)
     if not models:
         raise StageError(f"mapping: none of the {photos} photos register; they show too little in common")
     model = max(models.values(), key=lambda one: one.num_reg_images())
     registered = model.num_reg_images()
-    if registered < settings.min_registered:
-        raise StageError(f"mapping: {registered} of {photos} photos register, at least {settings.min_registered} must")
+    least = min(settings.min_registered, photos)
+    if registered < least:
+        raise StageError(f"mapping: {registered} of {photos} photos register, at least {least} must")
+    _tighten(model, settings)
     figures: dict[str, Any] = {
         "cameras_rmse_mm": None,
         "cameras_max_mm": None,
         "reference_inliers": None,
         "scale": None,
+        "surface_distance_m": None,
+        "suspicion": None,
     }
     if references is not None:
-        figures = _align(model, references, settings)
+        figures = _align(model, references, settings) | _plausibility(model)
     model.extract_colors_for_all_images(folder)
+    error_px = float(model.compute_mean_reprojection_error())
     figures |= {
         "registered_images": registered,
         "points": model.num_points3D(),
-        "reprojection_px": float(model.compute_mean_reprojection_error()),
+        "reprojection_px": error_px,
+        "reprojection_met": error_px < settings.reprojection_px,
         "track_length": float(model.compute_mean_track_length()),
         "focal_px": float(np.median([camera.focal_length for camera in model.cameras.values()])),
     }
     with whole_folder(sparse) as temporary:
         model.write_binary(temporary)
     return figures
+
+
+def _solve(
+    folder: Path, database: Path, scratch: Path, settings: ReconstructionSettings, photos: int, progress: Progress
+) -> dict[int, pycolmap.Reconstruction]:
+    """Every model that comes about, by COLMAP's number."""
+    done = [0]
+
+    def one_more() -> None:
+        done[0] += 1
+
+    def watch() -> None:
+        progress(min(done[0], photos), photos, "mapping")
+
+    out = scratch / "models"
+    out.mkdir()
+    if settings.mapper == "global":
+        options = pycolmap.GlobalPipelineOptions()
+        options.num_threads = settings.threads
+        options.random_seed = settings.random_seed
+        options.mapper.random_seed = settings.random_seed
+        options.mapper.num_threads = settings.threads
+        options.mapper.bundle_adjustment.ceres.solver_options.max_num_iterations = settings.bundle_iterations
+        # It takes no cancellation token: an interrupt waits for its end.
+        found = call(lambda **_: pycolmap.global_mapping(database, folder, out, options=options), "mapping", watch)
+        return dict(found)
+    options = pycolmap.IncrementalPipelineOptions()
+    options.num_threads = settings.threads
+    options.random_seed = settings.random_seed
+    options.mapper.random_seed = settings.random_seed
+    options.min_model_size = min(3, photos)
+    if photos == 2:
+        # There is no third photo to confirm a point, nor another pair to begin with.
+        options.triangulation.ignore_two_view_tracks = False
+        options.mapper.init_min_tri_angle = 2.0
+        options.mapper.init_min_num_inliers = 30
+    options.max_num_models = 5
+    options.extract_colors = False
+    options.ba_global_max_num_iterations = settings.bundle_iterations
+    if settings.position_priors:
+        options.use_prior_position = True
+        options.use_robust_loss_on_prior_position = True
+    return dict(
+        call(
+            partial(pycolmap.incremental_mapping, database, folder, out, options=options, next_image_callback=one_more),
+            "mapping",
+            watch,
+        )
+    )
+
+
+def _write_priors(database: Path, references: dict[str, Array], sigma_m: float) -> None:
+    """Put known camera positions into a database that is then mapped."""
+    link = pycolmap.Database.open(database)
+    try:
+        for image in link.read_all_images():
+            if image.name in references:
+                prior = pycolmap.PosePrior()
+                prior.corr_data_id = image.data_id
+                prior.position = references[image.name]
+                prior.position_covariance = sigma_m**2 * np.eye(3)
+                prior.coordinate_system = pycolmap.PosePriorCoordinateSystem.CARTESIAN
+                link.write_pose_prior(prior)
+    finally:
+        link.close()
+    settle(database)
+
+
+def _tighten(model: pycolmap.Reconstruction, settings: ReconstructionSettings) -> None:
+    """Cut observations that stick out and adjust again, until the mean reprojection error is below what is wished."""
+    for cut_px in CUTS_PX:
+        if model.compute_mean_reprojection_error() < settings.reprojection_px:
+            return
+        pycolmap.ObservationManager(model).filter_all_points3D(cut_px, MIN_ANGLE_DEG)
+        options = pycolmap.BundleAdjustmentOptions()
+        options.print_summary = False
+        options.ceres.solver_options.max_num_iterations = settings.bundle_iterations
+        options.ceres.solver_options.num_threads = settings.threads
+        with no_stderr():  # it announces itself whatever the level of logging
+            call(partial(pycolmap.bundle_adjustment, model, options), "bundle adjustment")
+        model.update_point_3d_errors()
 
 
 def _align(
@@ -116,11 +199,43 @@ def _align(
         similarity, inliers = robust_similarity(centres, wanted, np.random.default_rng(settings.random_seed))
     except InputError as error:
         raise StageError(f"alignment of the cameras: {error}") from None
-    model.transform(pycolmap.Sim3d(similarity.scale, pycolmap.Rotation3d(similarity.R_AB), similarity.t_A_m))
     error_mm = 1e3 * np.linalg.norm(similarity.apply(centres) - wanted, axis=1)
+    spread_mm = 1e3 * float(np.sqrt(((wanted - wanted.mean(axis=0)) ** 2).sum(axis=1).mean()))
+    median_mm = float(np.median(error_mm))
+    # A right model lies within a few percent of the path's extent; an unrelated one at about its extent.
+    if median_mm > MAX_MISFIT * spread_mm:
+        raise StageError(
+            f"alignment: the cameras lie {median_mm:.0f} mm (median) off their reference positions, which spread over "
+            f"{spread_mm:.0f} mm; model and references do not belong together"
+        )
+    model.transform(pycolmap.Sim3d(similarity.scale, pycolmap.Rotation3d(similarity.R_AB), similarity.t_A_m))
     return {
         "cameras_rmse_mm": float(np.sqrt((error_mm**2).mean())),
         "cameras_max_mm": float(error_mm.max()),
         "reference_inliers": int(inliers.sum()),
         "scale": similarity.scale,
     }
+
+
+MAX_MISFIT = 0.25
+"""Median error of aligned cameras over the spread of their references from which on they are unrelated."""
+
+
+def _plausibility(model: pycolmap.Reconstruction) -> dict[str, Any]:
+    """How far the cameras are from what they see, and a word where that cannot be metres."""
+    points = np.array([point.xyz for point in model.points3D.values()])
+    rows = np.random.default_rng(0).choice(len(points), size=min(len(points), 2000), replace=False)
+    depths = []
+    for image in model.images.values():
+        if image.has_pose:
+            depth = points[rows] @ (matrix := image.cam_from_world().matrix())[2, :3] + matrix[2, 3]
+            depths.append(np.median(depth[depth > 0]) if (depth > 0).any() else np.nan)
+    distance = float(np.nanmedian(depths))
+    low, high = SENSIBLE_RANGE_M
+    suspicion = None
+    if not low <= distance <= high:
+        suspicion = (
+            f"reference cameras: the surface would be {distance:.3g} m away, usual is {low:g} to {high:g} m; "
+            "are the positions in metres?"
+        )
+    return {"surface_distance_m": distance, "suspicion": suspicion}

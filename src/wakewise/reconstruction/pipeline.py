@@ -19,18 +19,28 @@ from wakewise.reconstruction.dense import densify
 from wakewise.reconstruction.features import match_photos
 from wakewise.reconstruction.mapping import map_photos
 from wakewise.reconstruction.meshing import mesh_points
-from wakewise.reconstruction.photos import read_photos
+from wakewise.reconstruction.pairs import Pairs, choose_pairs
+from wakewise.reconstruction.patchmatch import patch_match, require_cuda
+from wakewise.reconstruction.photos import Photo, read_photos, without_duplicates
 from wakewise.reconstruction.references import match_references
 from wakewise.reconstruction.settings import ReconstructionSettings
-from wakewise.reconstruction.stages import StageResult, fingerprint, run_stage
+from wakewise.reconstruction.stages import StageResult, fingerprint, make_folder, need_room, run_stage
 from wakewise.reconstruction.views import Ball
 
 # Part of every stage's fingerprint: raise it when a stage's result changes for the same input.
-VERSION = 4
+VERSION = 5
 _STAGES = {
-    "match": ("max_features", "first_octave", "peak_threshold", "exhaustive_up_to", "sequence_overlap", "random_seed"),
-    "map": ("min_registered", "random_seed"),
-    "dense": ("dense_px", "dense_zoom", "stereo_partners", "agreeing_views", "agreement_px"),
+    "match": ("detector", "max_features", "first_octave", "peak_threshold", "random_seed"),
+    "map": (
+        "mapper",
+        "bundle_iterations",
+        "reprojection_px",
+        "position_priors",
+        "prior_sigma_m",
+        "min_registered",
+        "random_seed",
+    ),
+    "dense": ("dense", "dense_px", "dense_zoom", "stereo_paths", "stereo_partners", "agreeing_views", "agreement_px"),
     "mesh": ("mesh_depth",),
 }
 
@@ -40,14 +50,18 @@ class Model:
     """What a reconstruction is; written as `reconstruction.json`.
 
     reprojection_px: mean over all observations. cameras_rmse_mm: distance of registered cameras from their references
-    after the similarity, None without references. stages_s: what each stage took when it ran; `skipped` were done
+    after the similarity, None without references. reprojection_met: whether the mean is below what the settings wish.
+    duplicates: photos left out because another has the same bytes. suspicion: a word where lengths cannot be metres.
+    stages_s: what each stage took when it ran; `skipped` were done
     before. wall_s: this call. A model without references has no scale, so its lengths are None.
     """
 
     images: int
+    duplicates: int
     registered_images: int
     points: int
     reprojection_px: float
+    reprojection_met: bool
     track_length: float
     focal_px: float
     features_per_image: float
@@ -57,6 +71,8 @@ class Model:
     cameras_max_mm: float | None
     reference_inliers: int | None
     scale: float | None
+    surface_distance_m: float | None
+    suspicion: str | None
     dense_points: int
     depth_maps: int
     point_spacing_mm: float | None
@@ -69,7 +85,11 @@ class Model:
     def summary(self) -> dict[str, Any]:
         """All figures as plain values for JSON, with a reason (`why`) for each that is null."""
         figures = {**asdict(self), "skipped": list(self.skipped)}
-        reason = {"mesh_vertices": "no mesh was asked for", "mesh_faces": "no mesh was asked for"}
+        reason = {
+            "mesh_vertices": "no mesh was asked for",
+            "mesh_faces": "no mesh was asked for",
+            "suspicion": "nothing looks suspicious",
+        }
         why = {
             key: reason.get(key, "no reference cameras were given, so the model has no scale")
             for key, value in figures.items()
@@ -86,6 +106,7 @@ def reconstruct(
     focal_px: float | None = None,
     pairs: Sequence[tuple[str, str]] | None = None,
     reference_positions: dict[str, Array] | None = None,
+    reference_axes: dict[str, Array] | None = None,
     region: tuple[Array, float] | None = None,
     progress: Progress = no_progress,
 ) -> Model:
@@ -100,9 +121,11 @@ def reconstruct(
     focal_px : float, optional
         Focal length in pixels to start from; it is refined.
     pairs : sequence of two photo names, optional
-        Which photos to match, such as neighbours by the vehicle's own estimate of its pose.
+        Which photos to match; else the settings choose.
     reference_positions : dict, optional
         Camera centres in m, shape (3,), by photo name; they fix scale and frame.
+    reference_axes : dict, optional
+        Optical axes, shape (3,), by photo name, in the frame of the references: with them pairs are chosen by poses.
     region : (centre, radius), optional
         What the dense model is wanted of, in the frame of the references: shape (3,) in m, and m.
     progress : callable
@@ -117,15 +140,21 @@ def reconstruct(
     """
     start = time.perf_counter()
     settings = settings or ReconstructionSettings()
-    found = read_photos(photos)
+    dense_points = densify
+    if settings.dense == "patch-match":
+        require_cuda()
+        dense_points = patch_match
+    found, duplicates = without_duplicates(read_photos(photos))
     names = [photo.name for photo in found]
     if focal_px is not None and not (np.isfinite(focal_px) and focal_px > 0):
         raise InputError(f"focal length: {focal_px:g} px, must be above 0")
     references = None if reference_positions is None else match_references(reference_positions, names)
+    if settings.position_priors and references is None:
+        raise InputError("position priors: need known camera positions")
     ball = _ball(region, references)
-    out.mkdir(parents=True, exist_ok=True)
+    listed = choose_pairs(names, settings, references, reference_axes) if pairs is None else [(a, b) for a, b in pairs]
+    make_folder(out)
     database, sparse, dense, mesh = out / "database.db", out / "sparse", out / "dense.ply", out / "mesh.ply"
-    listed = None if pairs is None else [(a, b) for a, b in pairs]
 
     def key(stage: str, before: str, *parts: Any) -> str:
         used = {field: getattr(settings, field) for field in _STAGES[stage]}
@@ -137,7 +166,7 @@ def reconstruct(
         "match",
         key("match", "", [asdict(photo) for photo in found], focal_px, listed),
         (database,),
-        lambda: match_photos(photos, found, database, settings, focal_px=focal_px, pairs=listed, progress=progress),
+        lambda: _match(photos, found, database, settings, focal_px, listed, progress),
     )
     placed = None if references is None else {name: position.tolist() for name, position in references.items()}
     results["map"] = run_stage(
@@ -145,9 +174,7 @@ def reconstruct(
         "map",
         key("map", results["match"].key, placed),
         (sparse / "images.bin",),
-        lambda: map_photos(
-            photos, database, sparse, settings, photos=len(found), references=references, progress=progress
-        ),
+        lambda: _map(photos, database, sparse, settings, len(found), references, progress),
     )
     place = None if ball is None else [ball.centre_W_m.tolist(), ball.radius_m]
     results["dense"] = run_stage(
@@ -155,7 +182,7 @@ def reconstruct(
         "dense",
         key("dense", results["map"].key, place),
         (dense,),
-        lambda: densify(photos, sparse, dense, settings, region=ball, progress=progress),
+        lambda: dense_points(photos, sparse, dense, settings, region=ball, progress=progress),
     )
     if settings.mesh:
         spacing = 1e-3 * results["dense"].figures["point_spacing_mm"]
@@ -173,6 +200,7 @@ def reconstruct(
         figures["point_spacing_mm"] = None
     model = Model(
         images=len(found),
+        duplicates=duplicates,
         wall_s=time.perf_counter() - start,
         stages_s={name: result.wall_s for name, result in results.items()},
         skipped=tuple(name for name, result in results.items() if result.skipped),
@@ -180,6 +208,35 @@ def reconstruct(
     )
     write_json(out / "reconstruction.json", model.summary())
     return model
+
+
+def _match(
+    folder: Path,
+    photos: tuple[Photo, ...],
+    database: Path,
+    settings: ReconstructionSettings,
+    focal_px: float | None,
+    pairs: Pairs,
+    progress: Progress,
+) -> dict[str, Any]:
+    # 128 bytes of descriptor and up to 24 of keypoint; a few matches in a hundred features, twice; a log beside it all.
+    features, matches = len(photos) * settings.max_features * 152, len(pairs) * settings.max_features * 2
+    need_room(database.parent, 2.0 * (features + matches), "match")
+    return match_photos(folder, photos, database, settings, focal_px=focal_px, pairs=pairs, progress=progress)
+
+
+def _map(
+    folder: Path,
+    database: Path,
+    sparse: Path,
+    settings: ReconstructionSettings,
+    photos: int,
+    references: dict[str, Array] | None,
+    progress: Progress,
+) -> dict[str, Any]:
+    # Points and tracks are a part of what the database holds; it is copied where priors are written into it.
+    need_room(sparse.parent, database.stat().st_size * (2.0 if settings.position_priors else 0.5), "map")
+    return map_photos(folder, database, sparse, settings, photos=photos, references=references, progress=progress)
 
 
 def _ball(region: tuple[Array, float] | None, references: dict[str, Array] | None) -> Ball | None:

@@ -12,21 +12,60 @@ from wakewise.settings import Settings
 class ReconstructionSettings(Settings):
     """How photographs become a model. The defaults are one fixed rule for every target; none is fitted to one."""
 
+    detector: Literal["colmap", "opencv"] = Field(
+        default="colmap",
+        description="whose SIFT: COLMAP's registered more real photos (31 of 31 against 24); OpenCV's takes a third of "
+        "the time and is as precise on sharp ones",
+    )
     max_features: int = Field(default=3000, ge=200, le=30000, description="most SIFT features kept per photo")
     first_octave: Literal[-1, 0] = Field(
         default=-1, description="-1 doubles the photo before looking for features, for real photos; 0 is 4 times faster"
     )
     peak_threshold: float = Field(
-        default=0.0067, gt=0.0, le=0.1, description="smallest SIFT contrast, 0.0067 is COLMAP's"
+        default=0.02,
+        gt=0.0,
+        le=0.3,
+        description="smallest SIFT contrast, grey levels 0 to 1, over all 3 scales of an octave",
+    )
+    matching: Literal["auto", "exhaustive", "sequential", "poses"] = Field(
+        default="auto",
+        description="which photos to match: all pairs, neighbours in order of name (and laps by ever wider steps), or "
+        "neighbours by known camera poses; auto takes poses if known, else all pairs of a small set",
     )
     exhaustive_up_to: int = Field(
-        default=80, ge=3, description="photos up to which every pair is matched; more: in sequence"
+        default=80, ge=3, description="photos up to which auto matches every pair; more: in sequence"
     )
     sequence_overlap: int = Field(default=10, ge=2, le=100, description="photos that each is matched with, in sequence")
+    pose_neighbours: int = Field(default=8, ge=2, le=100, description="photos that each is matched with, by poses")
+    mapper: Literal["incremental", "global"] = Field(
+        default="incremental", description="one photo after the other, or all at once (GLOMAP)"
+    )
+    bundle_iterations: int = Field(default=100, ge=1, le=1000, description="most iterations of a bundle adjustment")
+    reprojection_px: float = Field(
+        default=0.5,
+        gt=0.0,
+        le=10.0,
+        description="mean reprojection error to get below: outliers are cut ever more closely until it is met",
+    )
+    position_priors: bool = Field(
+        default=False, description="let known camera positions pull at the model, instead of only placing it"
+    )
+    prior_sigma_m: float = Field(
+        default=0.005,
+        gt=0.0,
+        le=100.0,
+        description="standard deviation of a known camera position, m, where priors pull",
+    )
     min_registered: int = Field(default=3, ge=3, description="fewer registered photos than this is a failure")
+    dense: Literal["stereo", "patch-match"] = Field(
+        default="stereo", description="dense points by semi-global stereo, or by COLMAP's patch-match, which needs CUDA"
+    )
     dense_px: int = Field(default=640, ge=100, le=4000, description="longest side in pixels of what stereo works on")
     dense_zoom: float = Field(
         default=1.5, ge=1.0, le=3.0, description="enlargement of a region of interest before stereo"
+    )
+    stereo_paths: Literal[3, 8] = Field(
+        default=8, description="directions that stereo smooths along; 3 costs a third of 8"
     )
     stereo_partners: int = Field(
         default=3, ge=1, le=8, description="neighbours that each photo is paired with for stereo"

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
+import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from wakewise.errors import InputError, StageError
 from wakewise.files import write_json
+
+LOW_DISK_MB = 5.0
 
 
 def fingerprint(*parts: Any) -> str:
@@ -40,12 +45,58 @@ def run_stage(
     known = _read_stamp(stamp)
     if known.get("key") == key and all(path.exists() for path in products):
         return StageResult(figures=known["figures"], wall_s=known["wall_s"], key=key, skipped=True)
-    stamp.unlink(missing_ok=True)
     start = time.perf_counter()
-    figures = work()
-    wall_s = time.perf_counter() - start
-    write_json(stamp, {"key": key, "wall_s": wall_s, "figures": figures})
+    try:
+        stamp.unlink(missing_ok=True)
+        figures = work()
+        wall_s = time.perf_counter() - start
+        write_json(stamp, {"key": key, "wall_s": wall_s, "figures": figures})
+    except OSError as fault:
+        raise StageError(f"{name}: {no_room(fault, folder)}; the stages before it are kept") from fault
+    except StageError as fault:
+        # COLMAP and SQLite tell of a full disk in words of their own, or not at all.
+        free_MB = shutil.disk_usage(folder).free / 1e6
+        if free_MB > LOW_DISK_MB or "is full" in str(fault):
+            raise
+        raise StageError(f"{fault}; the disk of {folder} is full, {free_MB:.0f} MB are left") from fault
     return StageResult(figures=figures, wall_s=wall_s, key=key, skipped=False)
+
+
+def need_room(folder: Path, size_bytes: float, name: str) -> None:
+    """Check for room before a stage whose library ends the whole process when the disk is full, as COLMAP's does.
+
+    Raises
+    ------
+    StageError
+        If less is free than the stage may write.
+    """
+    free = shutil.disk_usage(folder).free
+    if free < size_bytes:
+        raise StageError(
+            f"{name}: the disk of {folder} is full, {free / 1e6:.1f} MB are left and about {size_bytes / 1e6:.1f} MB "
+            "needed; the stages before it are kept"
+        )
+
+
+def no_room(fault: OSError, folder: Path) -> str:
+    """What a failed write means, in one line."""
+    if fault.errno in (errno.ENOSPC, errno.EDQUOT):
+        return f"the disk of {folder} is full"
+    return f"{fault.filename or folder}: {fault.strerror or fault}"
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder for results.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made, such as where a file is.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        raise InputError(f"{folder}: cannot be made a folder for the model ({fault.strerror})") from None
 
 
 def _read_stamp(path: Path) -> dict[str, Any]:

@@ -70,7 +70,7 @@ def rectifiable(first: View, second: View) -> bool:
 
 
 def pair_depth(
-    views: tuple[View, ...], photos: list[Image], i: int, j: int, region: Ball | None, scale: float
+    views: tuple[View, ...], photos: list[Image], i: int, j: int, region: Ball | None, scale: float, paths: int = 8
 ) -> DepthMap | None:
     """Depth map of view i from the pair (i, j), which must be rectifiable; None if too little of it can be seen.
 
@@ -78,6 +78,8 @@ def pair_depth(
     ----------
     scale : float
         Rectified pixels per pixel of the photo; less is taken where the range of disparities would be too wide.
+    paths : int
+        Directions that smoothness is looked for along, 3 or 8.
     """
     one, two = views[i], views[j]
     focus = one.focus_W_m
@@ -93,7 +95,7 @@ def pair_depth(
     count = int(np.ceil((focal * baseline / near - zero - lowest + 2) / 16)) * 16
     if count > MAX_DISPARITIES:
         smaller = 0.95 * scale * MAX_DISPARITIES / count
-        return pair_depth(views, photos, i, j, region, smaller) if smaller > 0.3 * scale else None
+        return pair_depth(views, photos, i, j, region, smaller, paths) if smaller > 0.3 * scale else None
     left, top, width, height = _window(one, R, focal, region)
     # SGBM gives nothing within the disparity range of the borders: the window grows by it, onto real pixels.
     pad_left, pad_right = max(0, lowest + count), max(0, -lowest)
@@ -115,7 +117,7 @@ def pair_depth(
         uniquenessRatio=10,
         speckleWindowSize=60,
         speckleRange=1,
-        mode=cv2.STEREO_SGBM_MODE_HH,
+        mode=cv2.STEREO_SGBM_MODE_HH if paths == 8 else cv2.STEREO_SGBM_MODE_SGBM_3WAY,
     )
     disparity = matcher.compute(cv2.cvtColor(a, cv2.COLOR_BGR2GRAY), cv2.cvtColor(b, cv2.COLOR_BGR2GRAY))
     d = disparity.astype(np.float32) / 16.0

@@ -103,8 +103,8 @@ def read_views(sparse: Path, region: Ball | None) -> tuple[tuple[View, ...], Arr
                 seen=seen,
             )
         )
-    if len(views) < 3:
-        raise StageError(f"dense: {len(views)} registered photos see the region, at least 3 must")
+    if len(views) < 2:
+        raise StageError(f"dense: {len(views)} registered photos see the region, at least 2 must")
     return tuple(views), points
 
 

@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 
+import cv2
+
 from wakewise.errors import InputError
 from wakewise.files import write_text
 from wakewise.reports import figures
 from wakewise.reports.errors import ModelErrors, model_errors
-from wakewise.reports.ink import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, error_colours
+from wakewise.reports.ink import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, data_uri, error_colours
 from wakewise.reports.page import absence, error_scale, missing, panel, pictures, plot, section, whole_page
 from wakewise.reports.photos import embed
 from wakewise.reports.trial import Trial, read_trial
@@ -20,6 +22,7 @@ from wakewise.reports.words import grouped, number, shown, unit, verdict
 VIEW_PIXELS = 300
 PHOTO_WIDTH = 720
 VIEWPOINTS = 3
+ROWS = ("rows.png", "rows.jpg", "rows.webp")
 _PLAIN = 0.01  # a smaller difference, relative to the larger value, is none
 # Where less is better, where more is; for the rest a difference is neither.
 _LESS = (
@@ -52,12 +55,13 @@ def write_comparison(trials: Mapping[str, Path], out: Path) -> Path:
     if not trials:
         raise InputError("comparison: no trials, needs at least one")
     path = out if out.suffix == ".html" else out / "comparison.html"
-    write_text(path, comparison_page({name: read_trial(folder) for name, folder in trials.items()}))
+    rows = next((file for file in (path.parent / name for name in ROWS) if file.is_file()), None)
+    write_text(path, comparison_page({name: read_trial(folder) for name, folder in trials.items()}, rows))
     return path
 
 
-def comparison_page(trials: Mapping[str, Trial]) -> str:
-    """HTML of the comparison."""
+def comparison_page(trials: Mapping[str, Trial], rows: Path | None = None) -> str:
+    """HTML of the comparison; `rows` is a picture with a row per method, as `wakewise film --rows` makes it."""
     errors = {name: model_errors(trial) for name, trial in trials.items()}
     parts = (
         ("figures", "Figures"),
@@ -69,7 +73,7 @@ def comparison_page(trials: Mapping[str, Trial]) -> str:
     body = (
         f'<header class="top">{_headline(trials)}</header>'
         f'<nav class="parts" aria-label="parts"><div>{links}</div></nav>'
-        f"<main>{_figures(trials)}{_water(trials)}{_seen(trials)}{_models(trials, errors)}</main>"
+        f"<main>{_figures(trials)}{_water(trials)}{_rows(rows)}{_seen(trials)}{_models(trials, errors)}</main>"
         "<footer>Ratios are to the first method. One trial per method is one draw: only many seeds say how large a "
         "difference is. Made by Wakewise.</footer>"
     )
@@ -157,6 +161,23 @@ def _water(trials: Mapping[str, Trial]) -> str:
             "Both sides share the colours.",
             "no trial recorded the speed at the target",
         ),
+    )
+
+
+def _rows(picture: Path | None) -> str:
+    if picture is None:
+        return ""
+    image = cv2.imread(str(picture), cv2.IMREAD_COLOR)
+    if image is None:
+        return ""
+    jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 86])[1]
+    said = "each method at three times, by the camera and from outside"
+    return section(
+        "rows",
+        "At the same times",
+        "Each method at the same times after its first photograph: what its camera saw, and the vehicle and its wash.",
+        f'<button type="button" class="photo" data-facts="{said}"><img alt="{said}" '
+        f'src="{data_uri(jpeg.tobytes(), "image/jpeg")}"></button>',
     )
 
 

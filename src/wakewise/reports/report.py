@@ -11,6 +11,7 @@ from wakewise.files import write_text
 from wakewise.reports import figures
 from wakewise.reports.errors import ModelErrors, model_errors
 from wakewise.reports.ink import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, error_colours
+from wakewise.reports.looks import coloured_model, colours_html, film_html
 from wakewise.reports.page import (
     absence,
     chip,
@@ -158,7 +159,8 @@ def _flown(trial: Trial, errors: ModelErrors | None) -> str:
         "flown",
         "What was flown",
         lead,
-        scene
+        film_html(trial)
+        + scene
         + plot(
             figures.plan_and_side(trial),
             "flight from above and from the side",
@@ -185,7 +187,7 @@ def _seen(trial: Trial) -> str:
         '<span class="on-screen">; a click enlarges</span>. Sharpness is that of the target as it '
         "appears in the picture (variance of the Laplacian), so compare it between photographs of the same orbit."
     )
-    return section("seen", "What was seen", lead, contact_sheet(trial, leg_of))
+    return section("seen", "What was seen", lead, contact_sheet(trial, leg_of) + colours_html(trial))
 
 
 def _water(trial: Trial) -> str:
@@ -231,7 +233,8 @@ def _model(trial: Trial, errors: ModelErrors | None) -> str:
         "The model",
         f"How far the reconstruction is from the true surface, {aligned}. What stands less than 10 mm above the bed "
         "does not count: sand touches it.",
-        panel(
+        _in_colour(trial)
+        + panel(
             "Accuracy",
             "The reconstruction, coloured by its distance to the true surface.",
             error_scale("error (mm)", ((OVER_LIMIT, "more"),)),
@@ -250,6 +253,16 @@ def _model(trial: Trial, errors: ModelErrors | None) -> str:
             "everything beyond.",
         ),
     )
+
+
+def _in_colour(trial: Trial) -> str:
+    found = coloured_model(trial)
+    if found is None:
+        return ""
+    surface, colours = found
+    views = draw_surface(surface, colours, SIDES, Frame.around(surface.vertices_m), VIEW_PIXELS)
+    text = "The model in the colours of its photographs, as mesh.glb has it for other programs."
+    return panel("Likeness", text, "", pictures(views, SIDES, "model in colour"))
 
 
 def _figures(trial: Trial) -> str:

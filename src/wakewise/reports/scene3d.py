@@ -19,6 +19,7 @@ from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_multiply
 from wakewise.reports.errors import ModelErrors
 from wakewise.reports.ink import error_colours
+from wakewise.reports.looks import coloured_model
 from wakewise.reports.trial import Photograph, Surface, Trial, find_setting
 from wakewise.vehicles import Vehicle, load_vehicle
 
@@ -103,6 +104,16 @@ def _target(server: viser.ViserServer, trial: Trial, errors: ModelErrors | None)
         mesh.visual = trimesh.visual.TextureVisuals(material=matt)
         mesh.visual.vertex_attributes["color"] = _linear(error_colours(errors.model_accuracy_m[chosen]))
         scene.add_mesh_trimesh("/model by error", mesh)
+    found = coloured_model(trial)
+    if found is not None:
+        whole, colours = found
+        model, chosen = lightened(whole)
+        mesh = trimesh.Trimesh(upright(model.vertices_m, trial.bed_z_m), model.faces, process=False)
+        mesh.visual = trimesh.visual.TextureVisuals(
+            material=trimesh.visual.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=0.9)
+        )
+        mesh.visual.vertex_attributes["color"] = _linear(colours[chosen])
+        scene.add_mesh_trimesh("/model in colour", mesh, visible=errors is None)
     if errors is not None:
         step = max(1, -(-len(errors.points_m) // MAX_POINTS))
         scene.add_point_cloud(

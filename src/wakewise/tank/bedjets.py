@@ -19,34 +19,41 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import njit
-from scipy.special import i0
 
 from wakewise.arrays import Array, IntArray
 from wakewise.tank.bedjets_sums import (
-    HIGHEST,
+    COLUMNS,
     LOG_WIDTH,
-    REACH,
     WALL_JET_SPREAD,
+    finish_rows,
+    leaning,
+    log_i0s,
+    log_overlap,
     sum_planes,
     with_images,
 )
 from wakewise.tank.chunks import over_points
-from wakewise.tank.faces import LEAST_IMAGE_M_S, Face, Room
+from wakewise.tank.faces import Face, Room
 
+LEAST_RING_IMAGE_M_S = 2e-4  # images whose crest would not reach this speed at the wall are left out
 WALL_JET_SPEED = 1.16  # u_max r / sqrt(M), Rajaratnam 1976
 STRIKE_HEIGHT = 1.75  # of the parcel's sigma: 0.14 H, where the bed's pressure begins to turn the jet (Beltaos 1974)
 _LAYER_CONVECTION = 1 / math.sqrt(2)  # mean of u weighted with u over a Gaussian layer, as a share of u_max
-# Rings of one jet closer than this share of L become one: then none are more than 2 L apart, where a row of Gaussians
-# still sums to a constant within 1.4 % (Poisson summation, 2 exp(-2 pi^2 / 4)).
-_RING_MERGE = 1.0
+# Rings become one that are less than this apart, counted in widths L of their crests: then rows are no coarser than
+# 2 sqrt(2) L, where Gaussians still sum to a constant within 17 % (Poisson summation, 2 exp(-2 pi^2 / 8)), and mostly
+# no coarser than 2 L, where they do within 1.4 %.
+_MERGE_L2 = 2.0
+# Weak rings may come from farther, as long as no water is moved wrongly by more than about this.
+_MERGE_ERROR_M_S, _FARTHEST_L2 = 1.5e-3, 6.0
 
 
 @dataclass(frozen=True, eq=False)
 class Rings:
-    """Rings of the wall jets, oldest first.
+    """Rings of the wall jets on one plane, in its own frame.
 
     Parameters
     ----------
@@ -54,43 +61,34 @@ class Rings:
         Where the jet struck, carried by the current since.
     radius_m : ndarray, shape (n,)
     impulse_m4_s : ndarray, shape (n,)
-    heading : ndarray, shape (n, 2)
-        Horizontal unit vector towards which a slanting jet leans.
-    kappa : ndarray, shape (n,)
-        How much it leans, 0 for an upright jet.
-    stream : ndarray of int, shape (n,)
-        The jet it came from.
+    lean : ndarray, shape (n, 2)
+        Share of the impulse that goes along the plane, as a vector: its length is below 1, and 0 for an upright jet.
     """
 
     centre_m: Array
     radius_m: Array
     impulse_m4_s: Array
-    heading: Array
-    kappa: Array
-    stream: IntArray
+    lean: Array
 
     @classmethod
     def none(cls) -> Rings:
         """No rings at all."""
-        return cls(
-            np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros((0, 2)), np.zeros(0), np.zeros(0, dtype=np.int64)
-        )
+        return cls(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros((0, 2)))
 
     @property
     def count(self) -> int:
         """How many there are."""
         return len(self.radius_m)
 
+    @cached_property
+    def heading_kappa(self) -> tuple[Array, Array]:
+        """Unit vectors towards which slanting jets lean, shape (n, 2), and how much, shape (n,): 0 for upright ones."""
+        heading, kappa = leaning(self.lean)
+        return heading, kappa
+
     def take(self, keep: np.ndarray) -> Rings:
         """Those that a mask or an index array picks."""
-        return Rings(
-            self.centre_m[keep],
-            self.radius_m[keep],
-            self.impulse_m4_s[keep],
-            self.heading[keep],
-            self.kappa[keep],
-            self.stream[keep],
-        )
+        return Rings(self.centre_m[keep], self.radius_m[keep], self.impulse_m4_s[keep], self.lean[keep])
 
     def joined(self, later: Rings) -> Rings:
         """These followed by the later ones."""
@@ -98,32 +96,15 @@ class Rings:
             np.concatenate([self.centre_m, later.centre_m]),
             np.concatenate([self.radius_m, later.radius_m]),
             np.concatenate([self.impulse_m4_s, later.impulse_m4_s]),
-            np.concatenate([self.heading, later.heading]),
-            np.concatenate([self.kappa, later.kappa]),
-            np.concatenate([self.stream, later.stream]),
+            np.concatenate([self.lean, later.lean]),
         )
 
 
-def lean(horizontal_share: Array) -> Array:
-    """Concentration kappa of a von Mises distribution whose mean direction vector has the given length, shape (n,).
-
-    Best and Fisher 1981 (doi 10.1080/03610918108812225), good to about 1 %; cut at a length of 0.98.
-    """
-    h = np.clip(np.asarray(horizontal_share, dtype=np.float64), 0.0, 0.98)
-    low = 2 * h + h**3 + 5 * h**5 / 6
-    middle = -0.4 + 1.39 * h + 0.43 / (1 - h)
-    high = 1 / np.maximum(h**3 - 4 * h**2 + 3 * h, 1e-9)
-    kappa: Array = np.where(h < 0.53, low, np.where(h < 0.85, middle, high))
-    return kappa
-
-
-def rings_from_strikes(position_m: Array, impulse_m4_s: Array, sigma_m: Array, stream: IntArray) -> Rings:
-    """Rings that take over from parcels (arrays as in `Parcels`) which have come down to the bed."""
+def rings_from_strikes(position_m: Array, impulse_m4_s: Array, sigma_m: Array) -> Rings:
+    """Rings that take over from parcels (arrays as in `Parcels`, in the plane's frame) which have come down to it."""
     size = np.linalg.norm(impulse_m4_s, axis=1)
-    flat = np.hypot(impulse_m4_s[:, 0], impulse_m4_s[:, 1])
-    heading = np.where(flat[:, None] > 0, impulse_m4_s[:, :2], [1.0, 0.0]) / np.where(flat > 0, flat, 1.0)[:, None]
-    share = flat / np.where(size > 0, size, 1.0)
-    return Rings(position_m[:, :2].copy(), STRIKE_HEIGHT * sigma_m, size, heading, lean(share), stream.copy())
+    lean = impulse_m4_s[:, :2] / np.where(size > 0, size, 1.0)[:, None]
+    return Rings(position_m[:, :2].copy(), STRIKE_HEIGHT * sigma_m, size, lean)
 
 
 def ring_velocity(
@@ -138,35 +119,18 @@ def ring_velocity(
 
 
 def packed_rings(rings: Rings, least_m: float = 0.0, per_height: float = 0.0) -> Array:
-    """One row per ring, as the kernel reads it, for several calls of `packed_velocity`, shape (n, 14).
+    """One row per ring, as the kernel reads it, for several calls of `packed_velocity`, shape (n, 15).
 
     A layer has the thickness hypot(0.093 R, least_m). Where that is more than the law's, it is slower by the square
     root of the ratio, so that it carries the same momentum. `per_height` is one over
     the distance to the opposite face, where F ends with a factor 1 - h per_height; 0 for none.
     """
-    strength = ring_strength(rings)
-    weight = 1 / i0(rings.kappa)
-    # Where a ring can be felt at all, whatever the azimuth: w lies between exp(-kappa)/I0 and exp(kappa)/I0.
-    inner = rings.radius_m * (weight * np.exp(-rings.kappa)) ** 0.25 * math.exp(-REACH)
-    outer = rings.radius_m * (weight * np.exp(rings.kappa)) ** 0.25 * math.exp(REACH)
-    highest = HIGHEST * outer * math.exp(-REACH)
-    least, ends = np.full(rings.count, least_m), np.full(rings.count, per_height)
-    return np.column_stack(
-        [
-            rings.centre_m,
-            rings.radius_m,
-            strength,
-            rings.heading,
-            rings.kappa,
-            weight,
-            inner**2,
-            outer**2,
-            highest,
-            least,
-            ends,
-            np.log(weight),
-        ]
-    )
+    rows = np.empty((rings.count, COLUMNS))
+    rows[:, 0:2], rows[:, 2], rows[:, 3] = rings.centre_m, rings.radius_m, ring_strength(rings)
+    rows[:, 4:6], rows[:, 6] = rings.heading_kappa
+    rows[:, 11], rows[:, 12] = least_m, per_height
+    finish_rows(rows)
+    return rows
 
 
 def packed_velocity(points_W_m: Array, packed: Array, bed_z_m: float, *, exact: bool = False) -> Array:
@@ -186,7 +150,7 @@ def planes_velocity(points_W_m: Array, planes: Array, starts: IntArray, packed: 
         same rings on both sides, else 0.
     starts : ndarray of int, shape (k + 1,)
         Plane i has the rings from starts[i] to starts[i + 1].
-    packed : ndarray, shape (m, 14)
+    packed : ndarray, shape (m, 15)
         See `packed_rings`; each in its plane's frame.
     exact : bool
         Sum in double precision.
@@ -206,7 +170,7 @@ def with_ring_images(packed: Array, face: Face, room: Room) -> Array:
     walls = [((first, second).index(o.axis), o.at_m, o.side) for o in room.faces if o.axis != face.axis]
     if not walls or not len(packed):
         return packed
-    return with_images(packed, np.array(walls, dtype=np.float64), LEAST_IMAGE_M_S)
+    return with_images(packed, np.array(walls, dtype=np.float64), LEAST_RING_IMAGE_M_S)
 
 
 def ring_strength(rings: Rings) -> Array:
@@ -216,13 +180,14 @@ def ring_strength(rings: Rings) -> Array:
 
 
 def layer_speed(rings: Rings) -> Array:
-    """Speed at the bed under each ring's crest, shape (n,), from all rings of its own jet.
+    """Speed at the bed under each ring's crest, shape (n,), from all rings that lie on the same ground.
 
-    Rings about one centre add up in full. A jet that wanders leaves rings about many: the crests of two of them meet
-    along less and less of their length as the centres part, and hardly at all a radius apart.
+    Rings about one centre that lean the same way add up in full, from whichever jets they came. Rings about different
+    centres meet along less and less of their crests as the centres part, and hardly at all a radius apart; those that
+    lean different ways lend each other speed as far as their directions overlap.
     """
     speed = np.zeros(rings.count)
-    _sum_layers(rings.centre_m, rings.radius_m, ring_strength(rings), rings.stream, speed)
+    _sum_layers(rings.centre_m, rings.radius_m, ring_strength(rings), *rings.heading_kappa, speed)
     return speed
 
 
@@ -236,70 +201,80 @@ def grown(rings: Rings, current_m_s: Array, dt_s: float, least_m: float = 0.0) -
     speed = layer_speed(rings) * np.sqrt(thin / np.hypot(thin, least_m))
     radius = np.sqrt(rings.radius_m**2 + 2 * rings.radius_m * _LAYER_CONVECTION * speed * dt_s)
     centre = rings.centre_m + current_m_s[..., :2] * dt_s
-    return Rings(centre, radius, rings.impulse_m4_s, rings.heading, rings.kappa, rings.stream), speed
+    return Rings(centre, radius, rings.impulse_m4_s, rings.lean), speed
 
 
 def coarsened(rings: Rings) -> Rings:
-    """Neighbouring rings of one jet, close in radius and centre, made one; impulse is conserved."""
+    """Rings that are near each other in centre, radius and direction made one.
+
+    Kept are their impulse, the part of it along the plane, the centre of impulse, and the flow that they carry, which
+    goes with impulse over radius.
+    """
     if rings.count < 2:
         return rings
-    order = np.lexsort((np.arange(rings.count), rings.stream))
     keep = np.ones(rings.count, dtype=np.bool_)
-    centre, radius, impulse = rings.centre_m.copy(), rings.radius_m.copy(), rings.impulse_m4_s.copy()
-    heading, kappa = rings.heading.copy(), rings.kappa.copy()
-    _merge_rings(order, centre, radius, impulse, heading, kappa, rings.stream, keep)
-    if keep.all():
+    centre, radius, impulse, lean = (a.copy() for a in (rings.centre_m, rings.radius_m, rings.impulse_m4_s, rings.lean))
+    speed = ring_strength(rings) / radius
+    if not _merge_rings(centre, radius, impulse, lean, *rings.heading_kappa, speed, keep):
         return rings
-    return Rings(centre, radius, impulse, heading, kappa, rings.stream).take(keep)
+    return Rings(centre, radius, impulse, lean).take(keep)
 
 
 @njit(cache=True)
 def _merge_rings(
-    order: IntArray,
     centre: Array,
     radius: Array,
     impulse: Array,
+    lean: Array,
     heading: Array,
     kappa: Array,
-    stream: IntArray,
+    speed: Array,
     keep: np.ndarray,
-) -> None:
-    joined_last = False
-    for n in range(1, order.shape[0]):
-        a, b = order[n - 1], order[n]
-        close = (
-            not joined_last
-            and stream[a] == stream[b]
-            and abs(math.log(radius[a] / radius[b])) < _RING_MERGE * LOG_WIDTH
-            and math.hypot(centre[a, 0] - centre[b, 0], centre[a, 1] - centre[b, 1])
-            < _RING_MERGE * LOG_WIDTH * radius[a]
-        )
-        joined_last = close
-        if not close:
+) -> bool:
+    """Let each ring take up an older one close to it; a ring that took part waits for the next time."""
+    n = radius.shape[0]
+    free, found = np.ones(n, np.bool_), False
+    logs, bessel, per_L2 = np.log(radius), log_i0s(kappa), LOG_WIDTH**-2
+    for b in range(n - 1, 0, -1):
+        if not free[b]:
             continue
-        share = impulse[a] / (impulse[a] + impulse[b])
-        # The newer ring b takes a's part, so that the order within a jet stays.
-        centre[b] = share * centre[a] + (1 - share) * centre[b]
-        radius[b] = share * radius[a] + (1 - share) * radius[b]
-        turned = share * heading[a] + (1 - share) * heading[b]
-        heading[b] = turned / max(math.hypot(turned[0], turned[1]), 1e-12)
-        kappa[b] = share * kappa[a] + (1 - share) * kappa[b]
-        impulse[b] += impulse[a]
-        keep[a] = False
+        for a in range(b - 1, -1, -1):
+            if not free[a]:
+                continue
+            dx, dy = centre[a, 0] - centre[b, 0], centre[a, 1] - centre[b, 1]
+            apart2 = per_L2 * ((logs[a] - logs[b]) ** 2 + (dx * dx + dy * dy) / min(radius[a], radius[b]) ** 2)
+            weaker = min(speed[a], speed[b])
+            most = min(max(_MERGE_L2, (_MERGE_ERROR_M_S / weaker) ** 2), _FARTHEST_L2)
+            if apart2 > most:
+                continue
+            # Gaussians x widths apart overlap by exp(-x^2 / 8).
+            apart2 -= 8.0 * log_overlap(heading[a], kappa[a], bessel[a], heading[b], kappa[b], bessel[b])
+            if apart2 > most:
+                continue
+            total = impulse[a] + impulse[b]
+            share = impulse[a] / total
+            centre[b] = share * centre[a] + (1 - share) * centre[b]
+            lean[b] = share * lean[a] + (1 - share) * lean[b]
+            radius[b] = 1.0 / (share / radius[a] + (1 - share) / radius[b])
+            impulse[b] = total
+            keep[a] = free[a] = free[b] = False
+            found = True
+            break
+    return found
 
 
 @njit(cache=True)
-def _sum_layers(centre: Array, radius: Array, strength: Array, stream: IntArray, out: Array) -> None:
-    """For each ring, strengths of its jet's rings weighted with nearness in log radius and in centre, over radius."""
+def _sum_layers(centre: Array, radius: Array, strength: Array, heading: Array, kappa: Array, out: Array) -> None:
+    """For each ring, strengths weighted with nearness in log radius, centre and direction, over its radius."""
+    logs, bessel = np.log(radius), log_i0s(kappa)
     for i in range(radius.shape[0]):
         total = 0.0
         for j in range(radius.shape[0]):
-            if stream[i] != stream[j]:
-                continue
-            apart = math.log(radius[i] / radius[j]) / LOG_WIDTH
+            apart = (logs[i] - logs[j]) / LOG_WIDTH
             dx, dy = centre[i, 0] - centre[j, 0], centre[i, 1] - centre[j, 1]
-            wide = 2.0 * (dx * dx + dy * dy) / (radius[i] * radius[i])
-            exponent = 0.5 * apart * apart + wide
+            exponent = 0.5 * apart * apart + 2.0 * (dx * dx + dy * dy) / (radius[i] * radius[i])
             if exponent < 12.0:
+                if i != j:
+                    exponent -= log_overlap(heading[i], kappa[i], bessel[i], heading[j], kappa[j], bessel[j])
                 total += strength[j] * math.exp(-exponent)
         out[i] = total / radius[i]

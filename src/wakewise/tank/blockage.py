@@ -13,8 +13,9 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from numba import njit
 
-from wakewise.arrays import Array, freeze
+from wakewise.arrays import Array, IntArray, freeze
 from wakewise.tank.induction import FixedSources, smooth_share
 from wakewise.targets import Target
 
@@ -83,19 +84,21 @@ class Blockage:
         strengths: Array = self.response @ np.einsum("ni,ni->n", undisturbed_m_s, self.normals)
         return strengths
 
-    def near(self, points_W_m: Array) -> np.ndarray:
-        """Which points, shape (n, 3), are within four times the body's radius, shape (n,)."""
-        away = points_W_m - self._middle
-        close: np.ndarray = np.einsum("ni,ni->n", away, away) < self._reach_m**2
-        return close
+    def near(self, points_W_m: Array) -> IntArray:
+        """Indices of the points, shape (n, 3), that are within four times the body's radius."""
+        return _near(points_W_m, self._middle, self._reach_m)
 
     def velocity(self, points_W_m: Array, strengths_m3_s: Array) -> Array:
         """What the sources add, shape (n, 3), at points, shape (n, 3); nothing beyond four times the body's radius."""
         out = np.zeros_like(points_W_m)
-        near = self.near(points_W_m)
-        if near.any():
-            out[near] = self._both.velocity(points_W_m[near], np.concatenate([strengths_m3_s, strengths_m3_s]))
+        self.add_velocity(points_W_m, self.near(points_W_m), strengths_m3_s, out)
         return out
+
+    def add_velocity(self, points_W_m: Array, near: IntArray, strengths_m3_s: Array, out: Array) -> None:
+        """Add to `out` what the sources add at some of the points."""
+        if len(near):
+            both = np.concatenate([strengths_m3_s, strengths_m3_s])
+            out[near] += self._both.velocity(points_W_m[near], both)
 
     def leakage(self, undisturbed_m_s: Array) -> float:
         """Root mean square velocity across the surface with the body's answer, over that without it."""
@@ -103,6 +106,18 @@ class Blockage:
         before = np.einsum("ni,ni->n", undisturbed_m_s, self.normals)
         after = before + np.einsum("ni,ni->n", answer, self.normals)
         return float(np.sqrt(np.mean(after**2) / max(np.mean(before**2), 1e-30)))
+
+
+@njit(cache=True)
+def _near(points: Array, middle: Array, reach: float) -> IntArray:
+    found = np.empty(points.shape[0], np.int64)
+    count = 0
+    for p in range(points.shape[0]):
+        dx, dy, dz = points[p, 0] - middle[0], points[p, 1] - middle[1], points[p, 2] - middle[2]
+        if dx * dx + dy * dy + dz * dz < reach * reach:
+            found[count] = p
+            count += 1
+    return found[:count]
 
 
 def _across(points: Array, normals: Array, sources: Array, sigmas: Array, bed_z_m: float) -> Array:

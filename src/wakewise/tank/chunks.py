@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from wakewise.arrays import Array
 
-_CHUNK = 512  # least points of a piece
+_CHUNK = 192  # least points of a piece
 _BLOCKS = 64
 _THREADED_PAIRS = 700_000  # about 0.7 ms of work; below it threads cost more than they save
 

@@ -28,8 +28,10 @@ import numpy as np
 from wakewise.arrays import Array
 
 PUFF_SPREAD = 0.34 / 2
-_FIRST_D = 1 / math.sqrt(8)  # sigma at the disk over its diameter
-_CORE_END_D = 0.5
+FIRST_D = 1 / math.sqrt(8)
+"""Sigma at the disk over its diameter."""
+CORE_END_D = 0.5
+"""Sigma at the core's end over the diameter."""
 
 
 @dataclass(frozen=True)
@@ -42,11 +44,11 @@ class Spreading:
     @property
     def core_spread(self) -> float:
         """Growth of sigma with the path in the core."""
-        return (_CORE_END_D - _FIRST_D) / self.core_D
+        return (CORE_END_D - FIRST_D) / self.core_D
 
 
 _HALF_WIDTH = 0.094 / math.sqrt(2 * math.log(2))
-PLAIN = Spreading(core_D=_CORE_END_D / _HALF_WIDTH, spread=_HALF_WIDTH)
+PLAIN = Spreading(core_D=CORE_END_D / _HALF_WIDTH, spread=_HALF_WIDTH)
 """Without swirl: beyond the core sigma is 0.0798 of the whole path."""
 
 SWIRLING = Spreading(core_D=2.6, spread=0.15)
@@ -55,19 +57,19 @@ SWIRLING = Spreading(core_D=2.6, spread=0.15)
 
 def first_sigma_m(diameter_m: Array) -> Array:
     """Size of a parcel at its disk."""
-    return diameter_m * _FIRST_D
+    return diameter_m * FIRST_D
 
 
 def carried_share(sigma_m: Array, diameter_m: Array) -> Array:
     """Share eta of the water's speed at its centre at which a parcel moves on."""
-    eta: Array = np.where(sigma_m < _CORE_END_D * diameter_m, (_FIRST_D * diameter_m / sigma_m) ** 2, 0.5)
+    eta: Array = np.where(sigma_m < CORE_END_D * diameter_m, (FIRST_D * diameter_m / sigma_m) ** 2, 0.5)
     return eta
 
 
 def disk_share(sigma_m: Array, diameter_m: Array) -> Array:
     """Share Q0/Q of the water at a parcel that came through the disk, from 1 at the disk to 0 far down the jet."""
-    core = sigma_m < _CORE_END_D * diameter_m
-    share: Array = np.where(core, (_FIRST_D * diameter_m / sigma_m) ** 2, 0.25 * diameter_m / sigma_m)
+    core = sigma_m < CORE_END_D * diameter_m
+    share: Array = np.where(core, (FIRST_D * diameter_m / sigma_m) ** 2, 0.25 * diameter_m / sigma_m)
     return np.minimum(share, 1.0)
 
 
@@ -86,8 +88,8 @@ def travel(
     takes the place of the spreading's own beyond the core.
     """
     wide = spreading.spread if spread is None else spread
-    first = _FIRST_D * diameter_m
-    end = _CORE_END_D * diameter_m
+    first = FIRST_D * diameter_m
+    end = CORE_END_D * diameter_m
     core = sigma_m < end
     # Core: dsigma/dt = c u (first/sigma)^2, so sigma^3 grows linearly, up to the core's end.
     rate = 3 * spreading.core_spread * speed_m_s * first**2

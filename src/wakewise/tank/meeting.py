@@ -105,7 +105,7 @@ class Meetings:
             sheet = self._sheet(key, middle, normal, sigma)
             turned = sheet.turned((share / one) * impulse[a : a + 1])
             place = sheet.local(middle[None])
-            born.append((sheet, rings_from_strikes(place, turned, np.array([sigma]), parcels.stream[a : a + 1])))
+            born.append((sheet, rings_from_strikes(place, turned, np.array([sigma]))))
             impulse[a] *= 1 - share / one
             impulse[b] *= 1 - share / two
             taken += 2 * float(share)

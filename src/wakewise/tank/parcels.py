@@ -13,9 +13,12 @@ import numpy as np
 from numba import njit
 
 from wakewise.arrays import Array, IntArray
+from wakewise.tank.closure import first_sigma_m
 from wakewise.tank.faces import Room
 from wakewise.tank.induction import impulse_velocity
 
+MERGE_SPACING = 0.7  # of sigma: a closer pair becomes one, so rows are no coarser than 1.4 sigma (ripple 1e-4),
+_OLD_D, _OLD_SPACING = 2.0, 1.4  # and from sigma over D of 2 to 2.8 on they are 1.4 times as coarse (ripple 1 %)
 _PARALLEL = 0.9  # cosine: opposite parcels would cancel instead of stirring each other, so they never merge
 
 
@@ -104,8 +107,28 @@ def confined_velocity(
     return u
 
 
+def row_widening(sigma_m: Array, diameter_m: Array) -> Array:
+    """How much coarser than a young jet's an old one's row may be, shape (n,): from 1 to 1.4."""
+    wide: Array = np.clip(sigma_m / (_OLD_D * diameter_m), 1.0, _OLD_SPACING)
+    return wide
+
+
+def gusty_impulse_m4_s(parcels: Parcels, scale: float) -> Array:
+    """Impulse with its turbulent part, which grows along the core and is full beyond it, shape (n, 3)."""
+    if scale == 0.0 or parcels.count == 0:
+        return parcels.impulse_m4_s
+    first = first_sigma_m(parcels.diameter_m)
+    share = np.clip((parcels.sigma_m - first) / (parcels.diameter_m / 2 - first), 0.0, 1.0)
+    # Of fewer parcels each may fluctuate less for their sum to fluctuate as much.
+    share *= scale / np.sqrt(row_widening(parcels.sigma_m, parcels.diameter_m))
+    gusty: Array = parcels.impulse_m4_s + (share * parcels.size_m4_s)[:, None] * parcels.gust
+    return gusty
+
+
 def merged(parcels: Parcels, spacing: float) -> Parcels:
     """Pairs of successive parcels of one jet closer than `spacing` sigma made one; their impulse is conserved.
+
+    For old parcels `row_widening` makes the distance longer.
 
     Sizes are averaged, not widened by the distance: in a row the distance lies along the jet, and widening would
     spread the jet sideways as well.
@@ -124,11 +147,12 @@ def merged_across(parcels: Parcels, spacing: float) -> Parcels:
     if len(old) < 2:
         return parcels
     level = np.floor(2 * np.log2(parcels.sigma_m[old])).astype(np.int64)
-    cell = np.floor(parcels.position_m[old] / (spacing * 2.0 ** (level / 2))[:, None]).astype(np.int64)
-    order = np.lexsort((old, cell[:, 2], cell[:, 1], cell[:, 0], level))
-    groups = np.cumsum(np.any(np.diff(np.column_stack([level, cell])[order], axis=0, prepend=0) != 0, axis=1))
+    cell = np.floor(parcels.position_m[old] / (_OLD_SPACING * spacing * 2.0 ** (level / 2))[:, None]).astype(np.int64)
+    # Eight bits for the level, eighteen for each of the others: cells of the size of their parcels never number more.
+    key = (((level + 128) * 2**18 + cell[:, 0] + 2**17) * 2**18 + cell[:, 1] + 2**17) * 2**18 + cell[:, 2] + 2**17
+    order = np.argsort(key, kind="stable")
     labels = np.empty(parcels.count, dtype=np.int64)
-    labels[old[order]] = groups - groups[0]
+    labels[old[order]] = np.cumsum(np.diff(key[order], prepend=key[order[0]]) != 0)
     return _merged(parcels, old[order], labels, spacing)
 
 
@@ -138,9 +162,11 @@ def _merged(parcels: Parcels, order: IntArray, label: IntArray, spacing: float) 
     sigma, gust, disk = parcels.sigma_m.copy(), parcels.gust.copy(), parcels.disk_m_s.copy()
     keep = np.ones(parcels.count, dtype=np.bool_)
     labels = int(label[order].max()) + 1
-    _merge_pairs(order, position, impulse, sigma, gust, disk, label, labels, spacing, keep)
+    reach = spacing * row_widening(sigma, parcels.diameter_m)
+    if not _merge_pairs(order, position, impulse, sigma, gust, disk, label, labels, reach, keep):
+        return parcels
     out = Parcels(position, impulse, sigma, parcels.diameter_m, parcels.stream, gust, disk)
-    return out if keep.all() else out.take(keep)
+    return out.take(keep)
 
 
 @njit(cache=True)
@@ -153,37 +179,42 @@ def _merge_pairs(
     disk: Array,
     label: IntArray,
     labels: int,
-    spacing: float,
+    spacing: Array,
     keep: np.ndarray,
-) -> None:
-    last = np.full(labels, -1)
+) -> bool:
+    last, found = np.full(labels, -1), False
     for j in order:
         i = last[label[j]]
         last[label[j]] = j
         if i < 0:
             continue
-        reach = spacing * min(sigma[i], sigma[j])
-        if np.sum((X[i] - X[j]) ** 2) > reach * reach:
-            continue
-        a, b = np.sqrt(np.sum(m[i] ** 2)), np.sqrt(np.sum(m[j] ** 2))
-        if np.sum(m[i] * m[j]) < _PARALLEL * a * b:
+        reach = min(spacing[i], spacing[j]) * min(sigma[i], sigma[j])
+        gap2 = aa = bb = ab = 0.0
+        for k in range(3):
+            gap2 += (X[i, k] - X[j, k]) ** 2
+            aa, bb, ab = aa + m[i, k] ** 2, bb + m[j, k] ** 2, ab + m[i, k] * m[j, k]
+        a, b = math.sqrt(aa), math.sqrt(bb)
+        if gap2 > reach * reach or ab < _PARALLEL * a * b:
             continue
         p = a / (a + b)
-        X[j] = p * X[i] + (1 - p) * X[j]
-        sigma[j] = p * sigma[i] + (1 - p) * sigma[j]
-        disk[j] = p * disk[i] + (1 - p) * disk[j]
-        gust[j] = (p * gust[i] + (1 - p) * gust[j]) / np.sqrt(p * p + (1 - p) * (1 - p))
-        m[j] += m[i]
-        keep[i] = False
+        q = 1 - p
+        sigma[j] = p * sigma[i] + q * sigma[j]
+        for k in range(3):
+            X[j, k] = p * X[i, k] + q * X[j, k]
+            disk[j, k] = p * disk[i, k] + q * disk[j, k]
+            gust[j, k] = (p * gust[i, k] + q * gust[j, k]) / math.sqrt(p * p + q * q)
+            m[j, k] += m[i, k]
+        keep[i], found = False, True
         # A merged parcel waits for the next step, so that rows thin evenly.
         last[label[j]] = -1
+    return found
 
 
 def _gust_per_turbulence() -> float:
     """Impulse fluctuation per parcel for a given relative fluctuation on the axis of a row of parcels.
 
-    Parcels d = 1.05 sigma apart (rows lie between 0.7 and 1.4) fluctuate independently; on the axis one adds 2 A, so
-    u'/u = a sqrt(sum (2A)^2) / sum 2A.
+    Parcels d = 1.05 sigma apart (young rows lie between 0.7 and 1.4) fluctuate independently; on the axis one adds
+    2 A, so u'/u = a sqrt(sum (2A)^2) / sum 2A.
     """
     x = 1.05 * np.arange(-200, 201)[:, None] * np.array([0.0, 0.0, 1.0]) + np.array([0.0, 0.0, 0.2])
     one = np.array([[0.0, 0.0, 1.0]])

@@ -95,6 +95,8 @@ def read_table(path: Path, what: str) -> tuple[list[str], Array]:
         raise InputError(f"{path}: cannot be read as text, {what} is needed") from None
     if not rows:
         raise InputError(f"{path}: empty, {what} is needed")
+    if len(rows[0]) == 1 and ";" in rows[0][0]:
+        raise InputError(f"{path}: columns are parted by semicolons, commas are needed")
     header = [name.strip() for name in rows[0]]
     if len(set(header)) < len(header):
         raise InputError(f"{path}: a column is named twice in {', '.join(header)}")
@@ -130,7 +132,10 @@ def read_thrusts(path: Path, vehicle: Vehicle) -> tuple[ThrustHistory, dict[str,
     n = len(vehicle.thrusters)
     columns = [name for name in header if name != "time_s"]
     if len(columns) != n:
-        raise InputError(f"{path}: {len(columns)} thrust columns, {vehicle.name} has {n} thrusters")
+        said = {_thruster_of(name, vehicle) for name in columns}
+        lacking = [f"thrust_{i + 1}_N" for i in range(n) if i not in said]
+        more = f", no column {', '.join(lacking)}" if len(columns) < n and None not in said else ""
+        raise InputError(f"{path}: {len(columns)} thrust columns, {vehicle.name} has {n} thrusters{more}")
     places = [_thruster_of(name, vehicle) for name in columns]
     if all(place is None for place in places):
         places = list(range(n))
@@ -244,7 +249,14 @@ def probe(
     origins = X_WB.apply(vehicle.thruster_positions_B_m)
     axes = vehicle.thruster_axes_B @ X_WB.R.T
     if floor_z_m is not None:
+        if not math.isfinite(floor_z_m):
+            raise InputError(f"floor: {floor_z_m:g} m, must be finite")
         _check_above(points, floor_z_m, "point")
+        lowest_z_m = float(X_WB.p_m[2] + np.abs(X_WB.R[2]) @ vehicle.size_m / 2)
+        if lowest_z_m > floor_z_m + 1e-9:
+            raise InputError(
+                f"pose: hull of {vehicle.name} reaches down to z = {lowest_z_m:.3f} m, the floor is at {floor_z_m:g} m"
+            )
         _check_above(origins, floor_z_m, "thruster")
     elif target is not None:
         raise InputError("target: stands on a floor, give its depth")

@@ -7,10 +7,11 @@ linger follow from the parcels' motion; nothing is prescribed for them. Bed, sur
 target turns water aside (`blockage`).
 
 What it does not hold: swirl shows in the width of a jet only; wall jets carry no turbulence of their own and do not
-collide; there is no boundary layer nor wake of hull and target; the bed right below a jet is struck in pulses (mean
-stress right, fluctuation about half of the mean). After a thruster has stopped, its wake dies sooner than
-the lattice's: the speed lasts 11 to 16 % less, its half-times are 18 to 29 % and the energy's life 26 to 33 % shorter.
-A crossflow of a fourth of the exit speed or more bends a jet too little (tests/tank/test_water_laws.py).
+collide (those on the same ground add their momentum); there is no boundary layer nor wake of hull and target; the bed
+right below a jet is struck in pulses (mean stress right, fluctuation about half of the mean). After a thruster has
+stopped, its wake dies sooner than the lattice's: the speed lasts 11 to 16 % less, its half-times are 18 to 29 % and the
+energy's life 26 to 33 % shorter. A crossflow of a fourth of the exit speed or more bends a jet too little
+(tests/tank/test_water_laws.py).
 """
 
 from __future__ import annotations
@@ -21,22 +22,22 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+from scipy.special import i0
 
 from wakewise.arrays import Array
 from wakewise.tank.bedjets import STRIKE_HEIGHT, Rings, layer_speed, rings_from_strikes
 from wakewise.tank.blockage import Blockage
-from wakewise.tank.closure import PLAIN, Spreading, bent_spread, carried_share, disk_share, first_sigma_m, travel
+from wakewise.tank.chunks import over_points
+from wakewise.tank.closure import PLAIN, Spreading, disk_share, first_sigma_m, travel
 from wakewise.tank.clusters import ImpulseField, in_space
+from wakewise.tank.drift import EMISSION_SPACING, drifted, gust_memory, slugs
 from wakewise.tank.faces import Face, Room
 from wakewise.tank.meeting import Meetings
-from wakewise.tank.parcels import GUST_PER_TURBULENCE, Parcels, merged, merged_across
+from wakewise.tank.parcels import GUST_PER_TURBULENCE, MERGE_SPACING, Parcels, gusty_impulse_m4_s, merged, merged_across
 from wakewise.tank.walljets import WallJets
 
-_EMISSION_SPACING = 0.6  # of the first sigma: Gaussians this close add up to a smooth row (ripple below 1e-6)
-_MERGE_SPACING = 0.7  # of sigma: a closer pair becomes one, so rows are no coarser than 1.4 sigma (ripple 1e-4)
 _MANY = 800  # parcels; with more, old ones of different jets merge over distances that grow in proportion
 _STEEPEST_GRAZE = math.sin(math.radians(10))  # parcels that come in flatter than this slide along the face
-_GUST_MEMORY = 1.0  # integral time of the turbulence, in sigma over speed at the parcel
 
 log = logging.getLogger(__name__)
 
@@ -193,8 +194,10 @@ class Water:
         """Circles (x, y, radius), shape (n, 3), round the bed where jets may be faster than a speed."""
         rings = self.rings
         rings = rings.take(layer_speed(rings) > least_speed_m_s)
-        # A leaning wall jet reaches w^(1/4) times farther ahead, at most 2.1 times at the steepest lean allowed.
-        reach = rings.radius_m * np.where(rings.kappa > 0.0, 2.1, 1.0) * 1.3
+        # A leaning wall jet reaches w^(1/4) times farther: a circle round its foremost and its hindmost place.
+        heading, kappa = rings.heading_kappa
+        ahead, behind = (1.3 * rings.radius_m * (np.exp(s * kappa) / i0(kappa)) ** 0.25 for s in (1.0, -1.0))
+        middle, reach = rings.centre_m + (0.5 * (ahead - behind))[:, None] * heading, 0.5 * (ahead + behind)
         parcels = self._parcels
         # On the bed a parcel and its image are at most twice as fast as one at its centre.
         fast = 4 * _CENTRE_SPEED * parcels.size_m4_s / parcels.sigma_m**3 > least_speed_m_s
@@ -202,7 +205,7 @@ class Water:
         low = parcels.take(near & fast)
         circles: Array = np.concatenate(
             [
-                np.column_stack([rings.centre_m, reach]),
+                np.column_stack([middle, reach]),
                 np.column_stack([low.position_m[:, :2], 4 * low.sigma_m]),
             ]
         )
@@ -229,21 +232,44 @@ class Water:
         self._time += dt_s
         self._field = self._answers = None
 
+    def _still_field(self) -> ImpulseField:
+        """The free jets without their turbulence."""
+        if self._field is not None and self._gust_scale == 0.0:
+            return self._field
+        return ImpulseField.of(
+            *self._room.with_images(self._parcels.position_m, self._parcels.impulse_m4_s, self._parcels.sigma_m)
+        )
+
     def _jets(self, points: Array) -> Array:
         """Free jets and wall jets with their images, without the body's answer."""
         if self._field is None:
             moved = self._parcels
-            sources = self._room.with_images(moved.position_m, self._gusty_impulse(moved), moved.sigma_m)
+            sources = self._room.with_images(
+                moved.position_m, gusty_impulse_m4_s(moved, self._gust_scale), moved.sigma_m
+            )
             self._field = ImpulseField.of(*sources)
         return self._sum_of(self._field, points)
 
     def _sum_of(self, field: ImpulseField, points: Array) -> Array:
         """Velocity of impulses and wall jets; points are taken in an order that suits both."""
         order = in_space(points)
-        sorted_points = points[order]
-        sums = field.velocity(sorted_points)
-        sums[sorted_points[:, 2] == self._bed, 2] = 0.0  # there is only rounding
-        sums += self._walls.velocity(sorted_points)
+        sorted_points = np.ascontiguousarray(points[order])
+        pairs = field.pairs(len(points))
+        if not pairs:
+            sums = field.velocity(sorted_points)
+            sums[sorted_points[:, 2] == self._bed, 2] = 0.0  # there is only rounding
+            sums += self._walls.velocity(sorted_points)
+        else:
+            walls, bed = self._walls, self._bed
+            sums = np.zeros_like(sorted_points)
+
+            def both(some: Array, result: Array) -> None:
+                field.write(some, result)
+                result[some[:, 2] == bed, 2] = 0.0
+                walls.add(some, result)
+
+            # On several threads at once; the rows of the wall jets are there before these begin.
+            over_points(both, sorted_points, sums, pairs + walls.pairs(len(points)))
         u = np.empty_like(sums)
         u[order] = sums
         return u
@@ -251,10 +277,14 @@ class Water:
     def _turned_aside(self, points: Array, u: Array, *, jets: bool, ambient: bool) -> Array:
         """Add the body's answer to the jets and to the ambient water, if any point is near enough to feel it."""
         body = self._body
-        if body is None or not body.near(points).any():
+        if body is None:
             return u
-        to_jets, to_ambient = self._answers_of(body)
-        return u + body.velocity(points, jets * to_jets + ambient * to_ambient)
+        near = body.near(points)
+        if len(near):
+            to_jets, to_ambient = self._answers_of(body)
+            u = u.copy()
+            body.add_velocity(points, near, jets * to_jets + ambient * to_ambient, u)
+        return u
 
     def _answers_of(self, body: Blockage) -> list[Array]:
         """Strengths of the body's sources against the jets and against the ambient water."""
@@ -266,84 +296,49 @@ class Water:
             ]
         return self._answers
 
-    def _gusty_impulse(self, parcels: Parcels) -> Array:
-        """Impulse with its turbulent part, which grows along the core and is full beyond it, shape (n, 3)."""
-        if self._gust_scale == 0.0 or parcels.count == 0:
-            return parcels.impulse_m4_s
-        first = first_sigma_m(parcels.diameter_m)
-        grown_share = np.clip((parcels.sigma_m - first) / (parcels.diameter_m / 2 - first), 0.0, 1.0)
-        gusty: Array = (
-            parcels.impulse_m4_s + (self._gust_scale * grown_share * parcels.size_m4_s)[:, None] * parcels.gust
-        )
-        return gusty
-
     def _drift(self, dt_s: float) -> None:
         """Carry parcels and rings, let them grow, and retire what has come to rest."""
         parcels = self._parcels
         if parcels.count:
-            X = parcels.position_m
             # Gusts are heard everywhere but do not carry parcels: the growth of sigma stands for that mixing already.
-            field = ImpulseField.of(*self._room.with_images(X, parcels.impulse_m4_s, parcels.sigma_m))
-            u = self._sum_of(field, X)
+            X = parcels.position_m
+            u = self._sum_of(self._still_field(), X)
             u = self._turned_aside(X, u, jets=True, ambient=False)
-            ambient = self.ambient_velocity(X)
-            speed = np.sqrt(np.einsum("ni,ni->n", u, u))
-            own = carried_share(parcels.sigma_m, parcels.diameter_m)[:, None] * u
-            spread = bent_spread(self._spreading.spread, own, ambient - parcels.disk_m_s)
-            path, sigma = travel(parcels.sigma_m, parcels.diameter_m, speed, dt_s, self._spreading, spread)
-            share = disk_share(0.5 * (parcels.sigma_m + sigma), parcels.diameter_m)[:, None]
-            carried = ambient + share * (parcels.disk_m_s - ambient)
-            position = X + (path / np.maximum(speed, 1e-12))[:, None] * u + carried * dt_s
-            # A mirrored world is mirrored again: nothing ends up behind a face.
-            for face in self._room.faces:
-                behind = face.gap_m(position) < 0.0
-                position[behind] = face.mirrored(position[behind], shift=True)
+            position, sigma, speed = drifted(
+                parcels, u, self.ambient_velocity(X), dt_s, self._spreading, self._room.faces
+            )
             gust = parcels.gust
             if self._gust_scale > 0.0:
-                memory = np.exp(-dt_s * np.maximum(speed, 1e-3) / (_GUST_MEMORY * parcels.sigma_m))[:, None]
+                memory = gust_memory(parcels.sigma_m, speed, dt_s)
                 gust = memory * gust + np.sqrt(1 - memory**2) * self._rng.standard_normal(gust.shape)
             moved = replace(parcels, position_m=position, sigma_m=sigma, gust=gust)
             resting = speed < self._rest_speed
-            self._retired += float(parcels.size_m4_s[resting].sum())
-            self._parcels = moved.take(~resting)
+            if resting.any():
+                self._retired += float(parcels.size_m4_s[resting].sum())
+                moved = moved.take(~resting)
+            self._parcels = moved
         self._walls.grow(dt_s, self._rest_speed, self.ambient_velocity)
 
     def _emit(self, dt_s: float, before: Array, after: Array, axes_W: Array, impulses_N_s: Array) -> None:
         """Send parcels at equal spacing along the slug of water that passed each disk, wherever the disk then was."""
         if not np.any(impulses_N_s > 0.0):
             return
-        first_D, disk_m_s = 1 / math.sqrt(8), (after - before) / dt_s
-        source, ages, exits, sent_each = [], [], [], []
-        for i, reverse in np.argwhere(impulses_N_s > 0.0):
-            spacing = _EMISSION_SPACING * first_D * self._diameters[i]
-            impulse = float(impulses_N_s[i, reverse]) / self._density
-            exit_speed = math.sqrt(impulse / (dt_s * self._areas[i]))
-            self._waiting_impulse[i, reverse] += impulse
-            self._waiting_slug_m[i, reverse] += exit_speed * dt_s
-            slug = float(self._waiting_slug_m[i, reverse])
-            n = int(slug / spacing)
-            if n == 0:
-                continue
-            sent = float(self._waiting_impulse[i, reverse]) * (n * spacing / slug)
-            self._waiting_impulse[i, reverse] -= sent
-            self._waiting_slug_m[i, reverse] -= n * spacing
-            source += [(i, reverse)] * n
-            ages += [min(max((slug - spacing * (k + 0.5)) / exit_speed, 0.0), dt_s) for k in range(n)]
-            exits += [exit_speed] * n
-            sent_each += [sent / n] * n
-        if source:
-            thruster, reversed_ = np.array(source).T
-            D, age, share = self._diameters[thruster], np.array(ages), np.array(ages)[:, None] / dt_s
-            path, sigma = travel(first_sigma_m(D), D, np.array(exits), age, self._spreading)
+        disk_m_s = (after - before) / dt_s
+        spacing = EMISSION_SPACING * first_sigma_m(self._diameters)
+        thruster, reversed_, age, exits, sent = slugs(
+            impulses_N_s / self._density, dt_s, self._areas, spacing, self._waiting_impulse, self._waiting_slug_m
+        )
+        if len(age):
+            D, ages = self._diameters[thruster], age[:, None]
+            path, sigma = travel(first_sigma_m(D), D, exits, age, self._spreading)
             jet_W = axes_W[thruster] * np.where(reversed_ == 1, 1.0, -1.0)[:, None]
             ambient, disk = self._ambient.velocity(after, self._time)[thruster], disk_m_s[thruster]
             carried = ambient + disk_share(sigma, D)[:, None] * (disk - ambient)
-            origin = after[thruster] * (1 - share) + before[thruster] * share + carried * age[:, None]
-            position = origin + path[:, None] * jet_W
+            position = after[thruster] + (carried - disk) * ages + path[:, None] * jet_W
             for face in self._room.faces:
                 position[:, face.axis] -= face.side * np.maximum(-face.gap_m(position), 0.0)
             gusts = self._rng.standard_normal if self._gust_scale > 0.0 else np.zeros
-            impulses = np.array(sent_each)[:, None] * jet_W
+            impulses = sent[:, None] * jet_W
             stream = 2 * thruster + reversed_
             self._parcels = self._parcels.joined(
                 Parcels(position, impulses, sigma, D, stream, gusts((len(D), 3)), disk)
@@ -354,7 +349,7 @@ class Water:
         self._parcels, born, taken = self._meetings.turn_aside(self._parcels)
         self._met += taken
         for sheet, rings in born:
-            self._walls.add(sheet, rings)
+            self._walls.start(sheet, rings)
 
     def _strike(self) -> None:
         """Hand parcels that come up to a face over to wall jets."""
@@ -367,7 +362,7 @@ class Water:
             self._struck += float(gone.size_m4_s.sum())
             self._parcels = parcels.take(~hit)
             position, impulse = face.local(gone.position_m), face.local(gone.impulse_m4_s)
-            self._walls.add(face, rings_from_strikes(position, impulse, gone.sigma_m, gone.stream))
+            self._walls.start(face, rings_from_strikes(position, impulse, gone.sigma_m))
 
     @staticmethod
     def _hits(face: Face, parcels: Parcels) -> np.ndarray:
@@ -377,10 +372,10 @@ class Water:
 
     def _thin(self) -> None:
         """Keep rows no finer than their parcels need, and the number of parcels bounded."""
-        rows = merged(self._parcels, _MERGE_SPACING)
-        self._parcels = merged_across(rows, _MERGE_SPACING * max(1.0, rows.count / _MANY))
+        rows = merged(self._parcels, MERGE_SPACING)
+        self._parcels = merged_across(rows, MERGE_SPACING * max(1.0, rows.count / _MANY))
         self._walls.thin()
-        spacing = _MERGE_SPACING
+        spacing = MERGE_SPACING
         while self._parcels.count > self._max_parcels:
             spacing *= 1.5
             if spacing > 50.0:

@@ -2,195 +2,181 @@
 
 Every method flies the same vehicle, the same unknown trim (drawn per seed, +-1 N), sensors, estimator and mission: a
 hover on an orbit of 40 deg and an arc of one of 20 deg, both legs and the way between them in one figure, over a silty
-bed in the default current. Seeds are pairs: seed k is the same draw for all methods. Intervals are 95 % of a bootstrap
-over seeds. Flow `parcels` is the tank's own water; flow `paper` is circular (`paper_world`) and says so.
+bed in the default current. Seed k is the same draw for all methods, so flights are compared in pairs; intervals are
+95 % of a bootstrap over pairs. Flow `parcels` is the tank's own water; flow `paper` is circular (`paper_world`) and
+says so.
 
-Levers are held against `wake-aware` without any, which is what they are added to. Ballast and standoff change vehicle
-and mission for everybody; `ballast and standoff (dp)` says what they do without any planner.
+How long, and how many. A jet of 0.1 N needs 5 s to a target 0.7 m away, and its remains drift there with 3 cm/s in 15
+to 20 s, so a flight needs settling and hover of 23 s and an arc of 15 s to show what a method does; 43 s it is. Methods
+fly all seeds. Levers fly fewer: they are large or they are nothing, and pairs tell which.
+
+Flights are kept (`flight_store`): a run that was stopped goes on, and a second one only flies what is new.
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable
-from concurrent.futures import ProcessPoolExecutor
+import time
+from collections.abc import Iterator
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass
 from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.errors import InputError
+from wakewise.errors import InputError, WakewiseError
+from wakewise.experiments.benches.flight_store import FlightStore, store_folder
+from wakewise.experiments.benches.gentle_figures import Row, flow_figures
+from wakewise.experiments.benches.gentle_levers import Entry, entries, method_trial
 from wakewise.experiments.benches.gentle_trial import FIGURES, Trial, World, fly_trial
 from wakewise.experiments.benches.timing import BenchOptions
 
 METHODS = ("dp", "pseudo-inverse", "unaware", "smooth", "wake-aware")
-SEEDS = {"paper": 10, "parcels": 10}
-LEVER_SEEDS = {"paper": 3, "parcels": 4}
-RESAMPLES = 2000
+WORLDS: tuple[World, ...] = ("parcels", "paper")
+LEVER_SEEDS = {"parcels": 3, "paper": 2}
+"""Levers fly the first seeds only. The first three hover abreast, upstream and downstream of the target; the intervals
+of so few pairs are narrower than their 95 %."""
 
-SPEED = "target_speed_mean_m_s"
-BALLAST: dict[str, Any] = {"float_N": 1.2, "shift_mm": 6.0}
-"""A float that outdoes the unknown trim of 1 N, and a centre of gravity that balances the vehicle at a pitch of
-atan(6 / 10) = 31 deg, half way between the mission's orbits of 20 and 40 deg."""
+Key = tuple[World, str, int]
 
-CONE: dict[str, Any] = {"wake.model": "paper-calibrated", "wake.edge_width_deg": 3.0}
-"""Belief in the paper's cone, much wider than a jet: it stands for where a jet's water may go later."""
 
-LEVERS: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
-    "no planning (instant)": ("instant", {}, {}),
-    "linear wake model": ("linear", {}, {}),
-    "wide cone": ("wake-aware", CONE, {}),
-    "halo": ("wake-aware", {"levers.halo": True}, {}),
-    "wide cone and halo": ("wake-aware", CONE | {"levers.halo": True}, {}),
-    "bed points and floor (instant)": ("instant", {"wake.floor": True, "levers.bed": True}, {}),
-    "bed points and floor": ("wake-aware", {"wake.floor": True, "levers.bed": True}, {}),
-    "incoherent sum": ("wake-aware", {"levers.incoherent": True}, {}),
-    "quiet windows": ("wake-aware", CONE | {"levers.quiet": True}, {}),
-    "attitude freedom": ("wake-aware", CONE | {"levers.tilt_deg": 3.0}, {}),
-    "standoff 0.65 m": ("wake-aware", {}, {"standoff_m": 0.65}),
-    "floats": ("wake-aware", {}, {"float_N": BALLAST["float_N"]}),
-    "centre of gravity forward": ("wake-aware", {}, {"shift_mm": BALLAST["shift_mm"]}),
-    "all": (
-        "wake-aware",
-        CONE | {"levers.halo": True, "levers.quiet": True},
-        {"shift_mm": BALLAST["shift_mm"], "standoff_m": 0.65},
-    ),
-    "all, at the same standoff": (
-        "wake-aware",
-        CONE | {"levers.halo": True, "levers.quiet": True},
-        {"shift_mm": BALLAST["shift_mm"]},
-    ),
-    "ballast and standoff (dp)": ("dp", {}, {"shift_mm": BALLAST["shift_mm"], "standoff_m": 0.65}),
-}
-"""Method, fields of its settings, and changes of vehicle or mission, by the lever's name. `all` leaves out what made
-things worse with seeds 1 and 2, so those who want figures that it was not chosen by must fly other seeds."""
-NOT_IN_PAPER = (
-    "wide cone",
-    "wide cone and halo",
-    "bed points and floor",
-    "bed points and floor (instant)",
-)
-"""Levers that the paper's world, which has no bed and is a wide cone, cannot reward or has already."""
+@dataclass(frozen=True)
+class Failure:
+    """A flight that gave no figures, and why."""
 
-Row = dict[str, float | None]
+    flow: str
+    name: str
+    seed: int
+    reason: str
 
 
 def run(options: BenchOptions) -> dict[str, Any]:
-    """Fly all trials on two processes and gather figures, reductions and levers of both flows."""
-    seeds = _wished_seeds()
-    trials: dict[tuple[str, str, int], Trial] = {}
-    worlds: tuple[World, ...] = ("paper", "parcels")
-    for world in worlds:
-        for seed in range(1, (seeds or SEEDS[world]) + 1):
-            for method in METHODS:
-                trials[world, method, seed] = Trial(world=world, method=method, seed=seed)
-        for name in levers_of(world):
-            for seed in range(1, min(seeds or SEEDS[world], LEVER_SEEDS[world]) + 1):
-                trials[world, name, seed] = lever_trial(world, name, seed)
-    keys = list(trials)
-    rows: dict[tuple[str, str, int], Row] = {}
-    with ProcessPoolExecutor(max_workers=2, mp_context=get_context("spawn")) as pool:
-        for key, row in zip(keys, pool.map(fly_trial, (trials[key] for key in keys)), strict=True):
-            rows[key] = row
-            options.progress(len(rows), len(keys), f"{key[0]}: {key[1]}, seed {key[2]}")
-    return {"flows": {world: flow_figures(world, rows) for world in ("parcels", "paper")}, "why": why(rows)}
+    """Fly what is wished and not known yet, and gather figures, reductions and levers of each flow.
 
-
-def levers_of(world: World) -> tuple[str, ...]:
-    """Names of the levers that are tried in a world."""
-    return tuple(name for name in LEVERS if world == "parcels" or name not in NOT_IN_PAPER)
-
-
-def lever_trial(world: World, name: str, seed: int) -> Trial:
-    """Trial of a lever."""
-    method, control, changes = LEVERS[name]
-    if world == "paper":
-        control = {key: value for key, value in control.items() if not key.startswith("wake.")}
-    return Trial(world=world, method=method, seed=seed, control=tuple(control.items()), **changes)
-
-
-def flow_figures(world: str, rows: dict[tuple[str, str, int], Row]) -> dict[str, Any]:
-    """Figures of one flow: means with intervals by method, reductions, levers."""
-    by_name: dict[str, dict[int, Row]] = {}
-    for (where, name, seed), row in rows.items():
-        if where == world:
-            by_name.setdefault(name, {})[seed] = row
-    methods = {name: _means(by_name[name].values()) for name in METHODS}
-    gentle = by_name["wake-aware"]
-    answer: dict[str, Any] = {"circular": world == "paper", "seeds": len(gentle), "methods": methods}
-    for base in ("dp", "unaware", "pseudo-inverse", "smooth"):
-        for figure, short in ((SPEED, ""), ("exposure_speed_mean_m_s", "_exposure"), ("disturbance", "_disturbance")):
-            value, interval = reduction_pct(by_name[base], gentle, figure)
-            tag = base.replace("-", "_")
-            answer[f"reduction_vs_{tag}{short}_pct"] = value
-            answer[f"reduction_vs_{tag}{short}_interval_pct"] = interval
-    answer["levers"], answer["lever_details"] = {}, {}
-    for name in (n for n in by_name if n in LEVERS):
-        value, interval = reduction_pct(gentle, by_name[name], SPEED)
-        shot, shot_interval = reduction_pct(gentle, by_name[name], "exposure_speed_mean_m_s")
-        dp, _ = reduction_pct(by_name["dp"], by_name[name], SPEED)
-        answer["levers"][name] = value
-        answer["lever_details"][name] = {
-            "seeds": len(by_name[name]),
-            "interval_pct": interval,
-            "exposure_reduction_pct": shot,
-            "exposure_interval_pct": shot_interval,
-            "reduction_vs_dp_pct": dp,
-            **_means(by_name[name].values()),
-        }
-    return answer
-
-
-def reduction_pct(
-    base: dict[int, Row], other: dict[int, Row], figure: str
-) -> tuple[float | None, tuple[float, float] | None]:
-    """How much smaller the mean of a figure is, in percent of the base's, over the seeds that both flew; 95 %."""
-    seeds = sorted(set(base) & set(other))
-    pairs = [(base[s][figure], other[s][figure]) for s in seeds]
-    values = np.array([pair for pair in pairs if None not in pair], dtype=np.float64)
-    if len(values) == 0 or not values[:, 0].mean() > 0.0:
-        return None, None
-    draws = values[np.random.default_rng(0).integers(0, len(values), (RESAMPLES, len(values)))].mean(axis=1)
-    spread = 100.0 * (1.0 - draws[:, 1] / draws[:, 0])
-    low, high = np.percentile(spread, [2.5, 97.5])
-    return 100.0 * (1.0 - float(values[:, 1].mean() / values[:, 0].mean())), (float(low), float(high))
-
-
-def why(rows: dict[tuple[str, str, int], Row]) -> dict[str, str]:
-    """Reasons of what could not be computed."""
-    missing = {
-        key: "no flight gave this figure" for row in rows.values() for key, value in row.items() if value is None
+    Raises
+    ------
+    InputError
+        If a method, flow or lever is not known.
+    """
+    methods = _known("methods", options.methods, METHODS)
+    worlds = _known("flows", options.flows, WORLDS)
+    tables = {world: _wished_levers(world, options.levers) for world in WORLDS if world in worlds}
+    trials = planned_trials(methods, tables, options.seeds)
+    began = time.monotonic()
+    rows, failures, kept = fly_all(trials, options)
+    flows: dict[str, Any] = {}
+    for world, table in tables.items():
+        flights: dict[str, dict[int, Row]] = {}
+        for (where, name, seed), row in rows.items():
+            if where == world:
+                flights.setdefault(name, {})[seed] = row
+        flows[world] = flow_figures(world, flights, methods, table)
+    return {
+        "flows": flows,
+        "flights": len(trials),
+        "flown": len(trials) - kept - len(failures),
+        "failed": len(failures),
+        "failures": [vars(failure) for failure in failures],
+        "flight_cpu_s": _cpu_s(rows),
+        "wall_s": time.monotonic() - began,
+        "why": why(rows, worlds, methods),
     }
-    if "bed_speed_p95_m_s" in missing:
-        missing["bed_speed_p95_m_s"] = "flow paper has no bed"
-    return missing
 
 
-def _means(rows: Iterable[Row]) -> dict[str, Any]:
-    """Mean of each figure over seeds, its interval, and how many seeds."""
-    listed = list(rows)
-    answer: dict[str, Any] = {}
-    for key in listed[0] if listed else FIGURES:
-        values = [row[key] for row in listed]
-        known = np.array([v for v in values if v is not None and np.isfinite(v)], dtype=np.float64)
-        answer[key] = float(known.mean()) if len(known) else None
-        if key in (SPEED, "exposure_speed_mean_m_s") and len(known) > 1:
-            answer[f"{key}_interval"] = _interval(known)
-    return answer
+def planned_trials(methods: tuple[str, ...], tables: dict[World, dict[str, Entry]], seeds: int) -> dict[Key, Trial]:
+    """Flights to make: each method on seeds 1 to `seeds`, each lever on the first few of them."""
+    trials: dict[Key, Trial] = {}
+    for world, table in tables.items():
+        for seed in range(1, seeds + 1):
+            for method in methods:
+                trials[world, method, seed] = method_trial(world, method, seed)
+        for entry in table.values():
+            for seed in range(1, min(seeds, LEVER_SEEDS[world]) + 1):
+                trials[world, entry.name, seed] = entry.trial(world, seed)
+    return trials
 
 
-def _interval(values: Array) -> tuple[float, float]:
-    draws = np.random.default_rng(0).choice(values, (RESAMPLES, len(values))).mean(axis=1)
-    low, high = np.percentile(draws, [2.5, 97.5])
-    return float(low), float(high)
+def fly_all(trials: dict[Key, Trial], options: BenchOptions) -> tuple[dict[Key, Row], list[Failure], int]:
+    """Figures of all flights, those that failed, and how many were known already."""
+    store = FlightStore(options.store or store_folder(), options.fresh)
+    rows: dict[Key, Row] = {}
+    for key, trial in trials.items():
+        figures = store.load(trial)
+        if figures is not None:
+            rows[key] = figures
+    kept = len(rows)
+    failures: list[Failure] = []
+    missing = [key for key in trials if key not in rows]
+    options.progress(kept, len(trials), f"{kept} flights known already")
+    if not missing:
+        return rows, failures, kept
+    began = time.monotonic()
+    with _pool(options.workers) as pool:
+        waiting: dict[Future[Row], Key] = {pool.submit(fly_trial, trials[key]): key for key in missing}
+        for done, future in enumerate(as_completed(waiting), start=1):
+            key = waiting[future]
+            try:
+                rows[key] = future.result()
+            except (WakewiseError, ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
+                failures.append(Failure(*key, reason=f"{type(error).__name__}: {error}"))
+            else:
+                store.save(trials[key], dict(rows[key]))
+            left_s = (time.monotonic() - began) * (len(missing) - done) / done
+            words = f"{key[0]}: {key[1]}, seed {key[2]}; {left_s / 60.0:.0f} min left"
+            options.progress(kept + done, len(trials), words)
+    return rows, failures, kept
 
 
-def _wished_seeds() -> int | None:
-    """Seeds per method from the environment, for a quick look (WAKEWISE_SEEDS)."""
-    text = os.environ.get("WAKEWISE_SEEDS", "")
-    if not text:
-        return None
-    if not text.isdigit() or not 1 <= int(text) <= 1000:
-        raise InputError(f"WAKEWISE_SEEDS: '{text}', allowed 1 to 1000")
-    return int(text)
+def why(rows: dict[Key, Row], worlds: tuple[World, ...], methods: tuple[str, ...]) -> dict[str, str]:
+    """Reasons of what could not be computed."""
+    reasons: dict[str, str] = {}
+    for figure in FIGURES:
+        without = sorted({key[0] for key, row in rows.items() if row.get(figure) is None})
+        if without:
+            reasons[figure] = f"no figure from flow {', '.join(without)}"
+    if "bed_speed_p95_m_s" in reasons:
+        reasons["bed_speed_p95_m_s"] = "flow paper has no bed"
+    for world in (w for w in WORLDS if w not in worlds):
+        reasons[world] = "this flow was left out"
+    for method in (m for m in METHODS if m not in methods):
+        reasons[method] = "this method was left out"
+    return reasons
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Worker processes of their own (no shared random state, no forked threads); what waits is dropped on trouble."""
+    pool = ProcessPoolExecutor(max_workers=workers, mp_context=get_context("spawn"))
+    try:
+        yield pool
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _known(what: str, wished: tuple[str, ...] | None, allowed: tuple[Any, ...]) -> tuple[Any, ...]:
+    """The wished names in the bench's order; all if None."""
+    for name in wished or ():
+        if name not in allowed:
+            raise InputError(f"{what}: '{name}' is not known, allowed: {', '.join(allowed)}")
+    return tuple(name for name in allowed if wished is None or name in wished)
+
+
+def _wished_levers(world: World, wished: tuple[str, ...] | None) -> dict[str, Entry]:
+    """Lines of the lever table, those that they are held against included; all if None, `none` for none."""
+    table = entries(world)
+    if wished is None:
+        return table
+    every = {name for w in WORLDS for name in entries(w)}
+    for name in wished:
+        if name not in every and name != "none":
+            raise InputError(f"levers: '{name}' is not known, allowed: none, {', '.join(sorted(every))}")
+    chosen = {name for name in wished if name in table}
+    chosen |= {table[name].base for name in chosen if table[name].base in table}
+    return {name: entry for name, entry in table.items() if name in chosen}
+
+
+def _cpu_s(rows: dict[Key, Row]) -> float | None:
+    """Mean CPU time of a flight."""
+    known = [row["cpu_s"] for row in rows.values() if row.get("cpu_s") is not None]
+    return float(np.mean(np.array(known, dtype=np.float64))) if known else None

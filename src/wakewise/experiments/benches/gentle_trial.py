@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Literal
@@ -13,7 +14,7 @@ from wakewise.control import WakeView
 from wakewise.control.trim import ballasted
 from wakewise.evaluation import flight_figures
 from wakewise.experiments.benches.paper_world import PaperWorld
-from wakewise.geometry import Pose
+from wakewise.geometry import Pose, matrix_from_quat
 from wakewise.missions import SETTLING, Leg, Route
 from wakewise.missions.route import rest_to_rest
 from wakewise.operation import FlightRecorder, Mission, fly
@@ -51,7 +52,12 @@ FIGURES = (
     "sign_flips_per_s",
     "fallbacks",
     "collisions",
+    "camera_rmse_mm",
+    "hover_speed_mean_m_s",
+    "orbit_speed_mean_m_s",
+    "cpu_s",
 )
+"""Of each flight. `camera_rmse_mm` is how far the camera is from where the mission wants it, attitude included."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,6 +76,8 @@ class Trial:
     shift_mm : float
         How far its centre of gravity is moved forward, known to everybody.
     standoff_m : float
+    with_current : bool
+        Fly the arc in that direction in which the mean current helps.
     """
 
     world: World
@@ -79,6 +87,7 @@ class Trial:
     float_N: float = 0.0
     shift_mm: float = 0.0
     standoff_m: float = STANDOFF_M
+    with_current: bool = False
 
 
 def scenario_of(trial: Trial) -> Scenario:
@@ -93,11 +102,11 @@ def scenario_of(trial: Trial) -> Scenario:
     return check_scenario({"method": trial.method, "seed": trial.seed, "control": control}, "gentle bench")
 
 
-def gentle_route(centre_W_m: Any, standoff_m: float, azimuth_rad: float) -> Route:
-    """Hover on a higher orbit, sink to a lower one, fly part of it."""
+def gentle_route(centre_W_m: Any, standoff_m: float, azimuth_rad: float, direction: float = 1.0) -> Route:
+    """Hover on a higher orbit, sink to a lower one, fly part of it: towards larger azimuths, or less for -1."""
     high = np.array([azimuth_rad, np.radians(HOVER_DEG), standoff_m])
     low = np.array([azimuth_rad, np.radians(ARC_DEG), standoff_m])
-    turn = ARC_SPEED_M_S * ARC_S / (standoff_m * np.cos(low[1]))
+    turn = direction * ARC_SPEED_M_S * ARC_S / (standoff_m * np.cos(low[1]))
     end = low + np.array([turn, 0.0, 0.0])
     hover = Leg(
         name="hover",
@@ -151,17 +160,35 @@ def true_disturbance(frame: pl.DataFrame, mission: Mission, world: World, rate_h
     return float(np.mean([disturbance(view.gram(Pose(p, q)), T) for p, q, T in steps]))
 
 
+def helped_by(current_m_s: tuple[float, float, float], azimuth_rad: float) -> float:
+    """1 if the current runs towards larger azimuths at an azimuth, else -1."""
+    north, east, _ = current_m_s
+    return 1.0 if east * np.cos(azimuth_rad) - north * np.sin(azimuth_rad) >= 0.0 else -1.0
+
+
+def camera_rmse_mm(frame: pl.DataFrame, X_BC: Pose) -> float:
+    """Root mean square distance of the true camera from the wished one, in mm."""
+    places = {}
+    for who in ("true", "goal"):
+        p = frame.select(f"{who}_x_m", f"{who}_y_m", f"{who}_z_m").to_numpy()
+        q = frame.select(f"{who}_qw", f"{who}_qx", f"{who}_qy", f"{who}_qz").to_numpy()
+        places[who] = p + matrix_from_quat(q) @ X_BC.p_m
+    return 1e3 * float(np.sqrt(np.mean(np.sum((places["true"] - places["goal"]) ** 2, axis=1))))
+
+
 def fly_trial(trial: Trial) -> dict[str, float | None]:
     """Figures of one flight, from the end of settling on, both legs and the way between them together."""
+    began = time.process_time()
     scenario = scenario_of(trial)
     target, region = paper_place(scenario.tank.size_m[2])
     # The wind rose of the current is not round: each seed hovers at its own azimuth.
     azimuth = float(np.random.default_rng([trial.seed, 7]).uniform(-np.pi, np.pi))
+    direction = helped_by(scenario.tank.current_m_s, azimuth) if trial.with_current else 1.0
     mission = Mission(
         vehicle=ballasted(load_vehicle(scenario.vehicle), trial.float_N, trial.shift_mm),
         target=target,
         region=region,
-        route=gentle_route(target.centre_W_m, trial.standoff_m, azimuth),
+        route=gentle_route(target.centre_W_m, trial.standoff_m, azimuth, direction),
         clearance_m=0.0,
     )
     flight = build_flight(scenario, mission)
@@ -201,4 +228,6 @@ def fly_trial(trial: Trial) -> dict[str, float | None]:
     for leg in ("hover", "orbit"):
         speed = frame.filter(pl.col("leg") == leg)["target_speed_mean_m_s"].mean()
         out[f"{leg}_speed_mean_m_s"] = float(speed)  # type: ignore[arg-type]
+    out["camera_rmse_mm"] = camera_rmse_mm(frame, mission.vehicle.X_BC)
+    out["cpu_s"] = time.process_time() - began
     return out

@@ -15,8 +15,10 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.control.paper_planner import PaperPlanner
-from wakewise.control.plan_problem import Horizon, PlanProblem, PlanSettings, Surroundings, reference_of
+from wakewise.control.plan_problem import Horizon, PlanProblem, PlanSettings
 from wakewise.control.planner import PlanModel, Planner, compile_plan, shifted
+from wakewise.control.reference import reference_of
+from wakewise.control.surroundings import Surroundings
 from wakewise.experiments.benches.cases import REGION, TARGET, VEHICLE
 from wakewise.experiments.benches.planner_load import deadline_misses
 from wakewise.experiments.benches.planner_reference import IpoptReference

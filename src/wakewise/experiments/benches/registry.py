@@ -15,8 +15,9 @@ BENCHES = {
     "dynamics": "one step of the vehicle, with and without Jacobians",
     "gentle": "what each method and each lever does to the target's water, in the tank and in the paper's own world",
     "planner": "the planner against the paper's recipe and IPOPT",
+    "reconstruction": "models of three corals from clear photographs: accuracy, completeness, time and memory",
     "operator": "an operator's velocity obeyed, against the water's disturbance, by w_track",
-    "imaging": "one photograph",
+    "imaging": "one photograph: speed by part, memory, geometry, flat port, features",
     "lattice": "the lattice-Boltzmann solver: cell updates per core, and its distance from the twin",
     "tank": "the world of a trial against the clock",
 }

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from wakewise.errors import InputError
 from wakewise.interfaces import Progress, no_progress
 
 
@@ -22,10 +23,32 @@ class BenchOptions:
     data : Path or None
         Folder of reference data that the package does not contain; None where there is none.
     progress : Progress
+    seeds : int
+        Flights per method of a bench that flies; seeds 1 to this.
+    methods, flows, levers : tuple of str or None
+        Which of them such a bench flies; None for all.
+    fresh : bool
+        Fly anew what an earlier run has flown.
+    workers : int
+        Processes that fly side by side.
+    store : Path or None
+        Folder where flights are kept; None for the user's cache folder.
     """
 
     data: Path | None = None
     progress: Progress = no_progress
+    seeds: int = 10
+    methods: tuple[str, ...] | None = None
+    flows: tuple[str, ...] | None = None
+    levers: tuple[str, ...] | None = None
+    fresh: bool = False
+    workers: int = 2
+    store: Path | None = None
+
+    def __post_init__(self) -> None:
+        for name, value, most in (("seeds", self.seeds, 1000), ("workers", self.workers, 64)):
+            if not 1 <= value <= most:
+                raise InputError(f"{name}: {value}, allowed 1 to {most}")
 
 
 def timed_us(work: Callable[[], Any], repeats: int) -> dict[str, float]:

@@ -1,0 +1,83 @@
+"""What the hull must not touch: walls, surface and floor as planes, target and obstacles as spheres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from wakewise.arrays import Array, freeze
+from wakewise.errors import InputError
+
+TANK_FACES = ("the south wall", "the west wall", "the water surface", "the north wall", "the east wall", "the floor")
+"""Names of the planes of `Surroundings.tank`, in their order."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Surroundings:
+    """What the hull must not touch.
+
+    Parameters
+    ----------
+    planes : ndarray, shape (n, 4)
+        Unit normal into the free water and offset: free where normal . p > offset.
+    spheres : ndarray, shape (n, 4)
+        Centre in W and radius: the target and other obstacles.
+    names : tuple of str
+        What planes and spheres are called, in this order; numbers for those that have none.
+    """
+
+    planes: Array = field(default_factory=lambda: np.zeros((0, 4)))
+    spheres: Array = field(default_factory=lambda: np.zeros((0, 4)))
+    names: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        freeze(self, planes=(None, 4), spheres=(None, 4))
+        if self.spheres.size and np.any(self.spheres[:, 3] < 0.0):
+            raise InputError(f"obstacle: radius {self.spheres[:, 3].min():g} m, must not be negative")
+        if self.planes.size and np.any(np.abs(np.linalg.norm(self.planes[:, :3], axis=1) - 1.0) > 1e-6):
+            raise InputError("plane: its normal is not of unit length")
+
+    @classmethod
+    def tank(
+        cls, low_W_m: Array, high_W_m: Array, spheres: Array | None = None, names: tuple[str, ...] = ()
+    ) -> Surroundings:
+        """Walls, surface and floor of a box from `low_W_m` to `high_W_m`, shape (3,) each; `names` of the spheres."""
+        eye = np.eye(3)
+        planes = np.vstack([np.column_stack([eye, low_W_m]), np.column_stack([-eye, -np.asarray(high_W_m)])])
+        return cls(planes=planes, spheres=np.zeros((0, 4)) if spheres is None else spheres, names=(*TANK_FACES, *names))
+
+    def name(self, number: int) -> str:
+        """What a plane or sphere is called, planes first."""
+        if number < len(self.names):
+            return self.names[number]
+        planes = len(self.planes)
+        return f"plane {number + 1}" if number < planes else f"sphere {number - planes + 1}"
+
+
+def covering_spheres(points_W_m: Array, most_radius_m: float = 0.15, most: int = 12) -> Array:
+    """Spheres, shape (k, 4), that cover points, shape (n, 3): as few as keep below a radius, and no more than `most`.
+
+    Centres are picked one after the other where the points are farthest from all before (T. F. Gonzalez, Theoretical
+    Computer Science 38 (1985) 293, doi 10.1016/0304-3975(85)90224-5), which needs at most twice the least radius.
+    """
+    points = np.asarray(points_W_m)
+    if len(points) == 0:
+        return np.zeros((0, 4))
+    owner = np.zeros(len(points), dtype=np.int64)
+    nearest = np.full(len(points), np.inf)
+    seed = int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))
+    for count in range(1, most + 1):
+        distance = np.linalg.norm(points - points[seed], axis=1)
+        owner[distance < nearest] = count - 1
+        nearest = np.minimum(nearest, distance)
+        spheres = np.array([_around(points[owner == k]) for k in range(count) if np.any(owner == k)])
+        if spheres[:, 3].max() <= most_radius_m:
+            break
+        seed = int(np.argmax(nearest))
+    return spheres
+
+
+def _around(points: Array) -> Array:
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return np.append(middle, np.linalg.norm(points - middle, axis=1).max())

@@ -1,0 +1,15 @@
+"""A neural radiance field on a hash grid, learnt from posed photos; PyTorch (extra `nerf`) is imported when it runs."""
+
+from wakewise.reconstruction.nerf.backend import DEVICES, pick_device, require_torch
+from wakewise.reconstruction.nerf.pipeline import build_field
+from wakewise.reconstruction.nerf.settings import PROFILES, FieldSettings, profile
+
+__all__ = [
+    "DEVICES",
+    "PROFILES",
+    "FieldSettings",
+    "build_field",
+    "pick_device",
+    "profile",
+    "require_torch",
+]
