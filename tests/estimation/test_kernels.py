@@ -24,7 +24,7 @@ BODY = compile_body(VEHICLE)
 PACKED, ALLOCATION = BODY.packed, np.array(VEHICLE.allocation_matrix)
 ERRORS, GRAVITY = GAINS + 8, np.array([0.0, 0.0, 9.80665])
 STEADY = np.zeros(ERRORS - CURRENT), np.full(ERRORS - CURRENT, 1e12)
-SILENT = np.zeros(7)
+SILENT = np.zeros(6)
 
 
 @pytest.fixture(autouse=True)
@@ -179,7 +179,7 @@ def test_lasting_errors_keep_their_spread():
 
 def test_noise_adds_up_over_steps():
     """Two steps of 10 ms give the covariance of one of 20 ms, within what the motion's curvature leaves."""
-    mean, noise = random_mean(), np.array([0.02, 0.2, 0.1, 0.01, 1e-3, 1e-2, 0.0])
+    mean, noise = random_mean(), np.array([0.02, 0.2, 0.1, 0.01, 1e-3, 1e-2])
     once, twice = np.zeros((ERRORS, ERRORS)), np.zeros((ERRORS, ERRORS))
     predict(PACKED, ALLOCATION, mean.copy(), once, np.zeros(8), 0.02, noise, *STEADY)
     walker = mean.copy()

@@ -125,7 +125,6 @@ class ErrorStateFilter:
                 s.moment_walk_N_m,
                 s.gyro_bias_walk_rad_s2,
                 s.accelerometer_bias_walk_m_s3,
-                s.moment_share,
             ]
         )
         self._gate = {n: float(chi2.isf(s.gate, n)) if s.gate > 0.0 else np.inf for n in (1, 3, 6)}
@@ -272,7 +271,7 @@ class ErrorStateFilter:
     def _take_force(self, walk: _Walk, force_B_m_s2: Array, time_s: float) -> None:
         """Accelerometer: dv/dt + omega x v - R' g, seen through tilt, the unmodelled force and the bias.
 
-        Drag's share in dv/dt is left out of the Jacobian, being small; the white error of the modelled acceleration,
+        The white error of the modelled acceleration,
         over one period of the sensor, counts as noise.
         """
         mean = walk.mean

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from wakewise.arrays import Array
-from wakewise.vehicles.kernels import INVERSE, LINEAR, QUADRATIC, coriolis, damping, rate_kernel, rotate
+from wakewise.vehicles.kernels import INVERSE, LINEAR, QUADRATIC, damping, rate_kernel, rotate
 from wakewise.vehicles.runge_kutta import rk4_jacobian_kernel
 
 MOVING, FORCE, MOMENT, GYRO, FELT, CURRENT, DRAG, INERTIA, GAINS = 12, 12, 15, 18, 21, 24, 27, 33, 39
@@ -251,16 +251,12 @@ def predict(
 ) -> None:
     """Advance mean and covariance in place by dt_s, some hundredths at most.
 
-    `noise`, shape (7,), are spectral densities (amplitudes) of the errors of the modelled linear and angular
-    acceleration, of the random walks of force, moment, gyro bias and accelerometer bias, and last of what is added to
-    the moment's walk per moment of Coriolis and Munk: gyros are so exact that they would otherwise turn products of two
-    unknowns, of which a linear filter knows nothing, into knowledge. What comes after the accelerometer's bias is a
-    first-order Gauss-Markov process each, of standard deviation `spread` and time `lasts_s`, both of shape (E - 24,).
+    `noise`, shape (6,), are spectral densities (amplitudes) of the errors of the modelled linear and angular
+    acceleration and of the random walks of force, moment, gyro bias and accelerometer bias. What comes after the
+    accelerometer's bias is a first-order Gauss-Markov process each, of standard deviation `spread` and time `lasts_s`,
+    both of shape (E - 24,).
     """
     q = mean[3:7].copy()
-    strays = noise.copy()
-    turning = coriolis(believed(packed, mean), _past(mean))
-    strays[3] = np.hypot(noise[3], noise[6] * np.sqrt(turning[3] ** 2 + turning[4] ** 2 + turning[5] ** 2))
     F = moved(packed, allocation, mean, thrusts_N, dt_s, P.shape[0])
     top = F @ P
     block = top @ F.T
@@ -270,7 +266,7 @@ def predict(
         for j in range(MOVING, P.shape[0]):
             P[i, j] = top[i, j]
             P[j, i] = top[i, j]
-    _add_noise(P, q, dt_s, strays)
+    _add_noise(P, q, dt_s, noise)
     _fade(mean, P, dt_s, spread, lasts_s)
 
 

@@ -73,12 +73,6 @@ class FilterSettings(Settings):
     moment_walk_N_m: float = Field(
         default=0.001, description="random walk of the unmodelled moment (N m/sqrt(s))", gt=0.0, le=1000.0
     )
-    moment_share: float = Field(
-        default=0.3,
-        description="random walk of the moment over the one of the hull's slide through water (1/sqrt(s))",
-        ge=0.0,
-        le=10.0,
-    )
     start_std_m: float = Field(default=0.02, description="error of the first position, per axis", gt=0.0, le=10.0)
     start_std_rad: float = Field(default=0.03, description="error of the first attitude, per axis", gt=0.0, le=1.0)
     start_std_m_s: float = Field(default=0.02, description="error of the first velocity, per axis", gt=0.0, le=10.0)
