@@ -29,7 +29,8 @@ Store = Annotated[
     typer.Option(help="gentle: folder that keeps flights; the user's cache if not given.", show_default=False),
 ]
 Plot = Annotated[
-    Path | None, typer.Option(help="gentle: draw methods and levers into this file (.png, .svg).", show_default=False)
+    Path | None,
+    typer.Option(help="gentle, operator: draw the figures into this file (.png, .svg).", show_default=False),
 ]
 
 
@@ -54,8 +55,8 @@ def bench(
     from wakewise.errors import InputError
     from wakewise.experiments.benches import BENCHES, BenchOptions, run_bench
 
-    if plot is not None and name != "gentle":
-        raise InputError("--plot: only `wakewise bench gentle` draws")
+    if plot is not None and name not in ("gentle", "operator"):
+        raise InputError("--plot: only `wakewise bench gentle` and `wakewise bench operator` draw")
     names = [name] if name else sorted(BENCHES)
     results: dict[str, Any] = {}
     bars = Bars()
@@ -75,8 +76,10 @@ def bench(
             results[each] = run_bench(each, options)
     if plot is not None:
         from wakewise.reports.levers import draw_levers
+        from wakewise.reports.operator import draw_operator
 
-        draw_levers(results["gentle"], plot)
+        draw = {"gentle": draw_levers, "operator": draw_operator}[name]
+        draw(results[name], plot)
     if json:
         print_json(results[name] if name else results)
         return
