@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -35,22 +36,30 @@ def draw_levers(result: Mapping[str, Any], path: Path) -> None:
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"{path}: ending '{path.suffix}', allowed {', '.join(SUFFIXES)}")
     flows: Mapping[str, Any] = result["flows"]
-    lines = max((len(lever_lines(figures)) for figures in flows.values()), default=0)
     methods = max((len(figures["methods"]) for figures in flows.values()), default=0)
-    figure = Figure(figsize=(WIDTH_IN, BAR_IN * (lines + methods) + 2.2), facecolor="white", layout="constrained")
-    grid = figure.add_gridspec(2, max(len(flows), 1), height_ratios=(methods + 1.5, lines + 1.5))
-    for column, (flow, figures) in enumerate(flows.items()):
-        _methods(figure.add_subplot(grid[0, column]), flow, figures)
-        _levers(figure.add_subplot(grid[1, column]), figures)
+    tables = {flow: lines for flow, figures in flows.items() if (lines := lever_lines(figures))}
+    heights = [methods + 3.5, *(len(lines) + 3.5 for lines in tables.values())]
+    figure = Figure(figsize=(WIDTH_IN, BAR_IN * sum(heights)), facecolor="white", layout="constrained")
+    rows = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
+    for axes, (flow, figures) in zip(
+        np.atleast_1d(rows[0].subplots(1, max(len(flows), 1))), flows.items(), strict=True
+    ):
+        _methods(axes, flow, figures)
+    for part, (flow, lines) in zip(rows[1:], tables.items(), strict=True):
+        _levers(part.subplots(), flow, lines)
     with whole_file(path) as temporary:
         figure.savefig(temporary, dpi=150)
 
 
 def lever_lines(figures: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any] | None]]:
-    """Names and figures of the lines to draw from top to bottom; a kind's heading has no figures."""
+    """Names and figures of the lines to draw from top to bottom; a kind's heading has no figures.
+
+    Lines without a reduction are left out: where the water is the model's own, what they are held against stands still.
+    """
     found: list[tuple[str, Mapping[str, Any] | None]] = []
     for group, heading in GROUPS.items():
-        own = [(name, row) for name, row in figures["lever_details"].items() if row["group"] == group]
+        rows = [(name, row) for name, row in figures["lever_details"].items() if row["group"] == group]
+        own = [(name, row) for name, row in rows if row["reduction_pct"] is not None]
         if own:
             found += [(heading, None), *own]
     return found
@@ -73,20 +82,20 @@ def _methods(axes: Axes, flow: str, figures: Mapping[str, Any]) -> None:
     _dress(axes, names, f"{flow} ({words}), {figures['seeds']} seeds", "mean speed at the target's surface (mm/s)")
 
 
-def _levers(axes: Axes, figures: Mapping[str, Any]) -> None:
-    lines = lever_lines(figures)
+def _levers(axes: Axes, flow: str, lines: list[tuple[str, Mapping[str, Any] | None]]) -> None:
     for place, (_, row) in enumerate(lines):
-        value = None if row is None else row["reduction_pct"]
-        if row is None or value is None:
+        if row is None:
             continue
+        value = row["reduction_pct"]
         axes.barh(place, value, height=0.62, color=GOOD if value > 0.0 else BAD)
-        if row["interval_pct"] is not None:
-            axes.plot(row["interval_pct"], [place, place], color=INK, linewidth=1.4)
+        low, high = row["interval_pct"] or (value, value)
+        axes.plot([low, high], [place, place], color=INK, linewidth=1.4)
+        words = f"  {value:+.0f} %, {row['position_rmse_mm']:.1f} mm off"
+        axes.annotate(words, (max(value, high, 0.0), place), va="center", fontsize=7, color=INK)
     axes.axvline(0.0, color=INK, linewidth=0.8)
-    axes.set_xlim(-110.0, 105.0)
-    _dress(
-        axes, [name for name, _ in lines], "", "target speed lower by (%), 95 % of a bootstrap over pairs of flights"
-    )
+    axes.margins(x=0.12)
+    names = [name for name, _ in lines]
+    _dress(axes, names, f"{flow}: levers", "target speed lower by (%), 95 % of a bootstrap over pairs of flights")
     for label, (_, row) in zip(axes.get_yticklabels(), lines, strict=True):
         if row is None:
             label.set_fontweight("bold")

@@ -57,6 +57,7 @@ MISSIONS: dict[str, Settings] = {
     "standoff 0.65 m": {"standoff_m": 0.65},
     "floats": {"float_N": BALLAST_FLOAT_N},
     "centre of gravity forward": {"shift_mm": BALLAST_SHIFT_MM},
+    "standoff and centre of gravity": {"standoff_m": 0.65, "shift_mm": BALLAST_SHIFT_MM},
     "arc with the current": {"with_current": True},
 }
 """Fields of `Trial` of each change of vehicle or mission."""
