@@ -172,7 +172,7 @@ def _planned(
 ) -> Controller[Any]:
     levers, plan = settings.levers, settings.plan
     changes: dict[str, Any] = {}
-    # Wall jets that cancel on paper give the coherent sum many minima within 2 % of one another, and plans jump between
+    # Wall jets that cancel on paper give the coherent sum many minima within 3 % of one another, and plans jump between
     # them (docs/decisions/0014); the sum of squares is convex, and plans stay.
     floor_in_plan = isinstance(wake, FloorJet) and not levers.spare
     if levers.incoherent or settings.wake.sum == "incoherent" or floor_in_plan:
