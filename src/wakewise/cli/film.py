@@ -69,8 +69,7 @@ def film(
         if path.parent == rows and (rows / "comparison.html").is_file():
             with Bars().stage("report"):
                 write_comparison(compared_trials(rows), rows)
-    else:
-        assert trial is not None
+    elif trial is not None:
         if view not in VIEWS:
             raise InputError(f"--view: '{view}', allowed are {', '.join(VIEWS)}")
         path = out or trial / "film.mp4"

@@ -107,7 +107,8 @@ class _Film:
             if part in self.trial.missing:
                 raise InputError(f"{folder / part}: {self.trial.missing[part]}, a film needs a finished trial")
         self.scenario: Scenario = read_scenario(folder / "scenario.yaml")
-        assert self.trial.steps is not None
+        if self.trial.steps is None:
+            raise InputError(f"{folder / 'steps.parquet'}: cannot be read, a film needs a finished trial")
         self.steps: pl.DataFrame = self.trial.steps
         self.motion = Motion.of(self.steps)
         duration_s = float(self.motion.time_s[-1])
