@@ -31,12 +31,13 @@ def frozen(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
         If the shape differs or an element is not finite.
     """
     array = np.array(value, dtype=np.float64, order="C")
-    if array.ndim != len(shape) or any(
-        want is not None and got != want for got, want in zip(array.shape, shape, strict=True)
+    if array.shape != shape and (
+        array.ndim != len(shape)
+        or any(want is not None and got != want for got, want in zip(array.shape, shape, strict=True))
     ):
         wanted = "(" + ", ".join("n" if s is None else str(s) for s in shape) + ")"
         raise InputError(f"{name}: shape {array.shape}, allowed {wanted}")
-    if not np.all(np.isfinite(array)):
+    if not np.isfinite(array).all():
         raise InputError(f"{name}: holds NaN or infinity, every element must be finite")
     array.setflags(write=False)
     return array

@@ -187,3 +187,35 @@ def test_threads_and_blocks_do_not_change_a_byte(monkeypatch):
     monkeypatch.setattr(chunks, "_THREADED_PAIRS", 1)
     monkeypatch.setattr("os.cpu_count", lambda: 4)
     assert ring_velocity(points, _rings(), BED_Z_M).tobytes() == one.tobytes()
+
+
+def test_pieces_of_a_list_give_the_same_bytes():
+    """Many rings, of all sizes and leans: which points are summed together does not change what each gets."""
+    rng = np.random.default_rng(7)
+    n = 200
+    rings = Rings(
+        rng.uniform(-1.0, 1.0, (n, 2)),
+        np.exp(rng.uniform(np.log(0.05), np.log(1.5), n)),
+        1e-3 * rng.uniform(0.01, 1.0, n),
+        rng.uniform(-0.65, 0.65, (n, 2)),
+    )
+    walk = np.cumsum(rng.normal(0.0, 0.03, (2048, 3)), axis=0)
+    points = np.clip(walk, [-1.2, -1.2, -0.3], [1.2, 1.2, 0.3])
+    points[:, 2] += 1.2
+    whole = ring_velocity(points, rings, BED_Z_M)
+    for size in (64, 192, 320, 1024):
+        pieces = [ring_velocity(points[s : s + size], rings, BED_Z_M) for s in range(0, len(points), size)]
+        assert np.concatenate(pieces).tobytes() == whole.tobytes()
+
+
+@pytest.mark.parametrize("least_m", [0.0, 0.03])
+def test_on_the_bed_the_short_sum_is_the_long_one(least_m):
+    """Blocks of points that all lie on the bed take a shorter way: the same as among points above it."""
+    points = np.random.default_rng(8).uniform([-0.6, -0.6, BED_Z_M], [0.6, 0.6, BED_Z_M], (64, 3))
+    above = points.copy()
+    above[::2, 2] -= 0.1
+    on_bed = ring_velocity(points, _rings(), BED_Z_M, least_m)
+    mixed = ring_velocity(above, _rings(), BED_Z_M, least_m)
+    assert np.abs(on_bed).max() > 0.05
+    assert on_bed[1::2] == pytest.approx(mixed[1::2], rel=1e-5, abs=1e-7)
+    assert np.all(on_bed[:, 2] == 0.0)

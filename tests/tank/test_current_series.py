@@ -105,3 +105,11 @@ def test_a_real_station_is_read_and_its_gaps_are_refused():
         read_current_series(path)
     with pytest.raises(InputError, match="no reader"):
         read_current_series(DATA / "Sig1000_tidal.nc")
+
+
+def test_a_column_named_twice_is_refused(tmp_path):
+    """Nobody can say which of the two is meant."""
+    path = tmp_path / "c.csv"
+    path.write_text("time_s,u,u,v\n0,0,1,0\n1,0,1,0\n")
+    with pytest.raises(InputError, match="named twice"):
+        read_current_series(path)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wakewise.tank.closure import PLAIN, SWIRLING, bent_spread, carried_share, disk_share, travel
-from wakewise.tank.drift import EMISSION_SPACING, drifted, slugs
+from wakewise.tank.drift import EMISSION_SPACING, HELD_S, drifted, due, slugs
 from wakewise.tank.faces import Room
 from wakewise.tank.parcels import Parcels
 
@@ -15,7 +15,7 @@ def _parcels(rng, n=200):
     D = np.full(n, 0.06)
     sigma = rng.uniform(0.36, 4.0, n) * D
     sigma[:20] = rng.uniform(0.36, 0.49, 20) * D[:20]
-    return Parcels(
+    return Parcels.sent(
         rng.uniform([-1, -1, 0.2], [1, 1, 1.4], (n, 3)),
         rng.normal(0, 1e-4, (n, 3)),
         sigma,
@@ -66,3 +66,13 @@ def test_slugs_send_all_of_the_impulse():
     assert sent + waiting.sum(axis=1) == pytest.approx(40 * given.sum(axis=1), rel=1e-12)
     exit_speed = math.sqrt(given[0, 0] / (dt_s * areas[0]))
     assert np.mean(np.diff(births)) * exit_speed == pytest.approx(spacing[0], rel=0.01)
+
+
+def test_young_parcels_are_looked_at_in_every_step_and_slow_ones_now_and_then():
+    """What moves by a twentieth of its size is due, so is what was never looked at; nobody waits longer than 0.2 s."""
+    flow = np.array([[0.5, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.0, 0.0], [0.01, 0.0, 0.0]])
+    held, sigma = np.array([0.0, 0.0, np.inf, 0.0]), np.array([0.03, 0.3, 0.3, 0.005])
+    seen = [due(flow, held, sigma, 0.05).tolist() for _ in range(8)]
+    assert seen[0] == [0, 2, 3]
+    assert sum(1 in step for step in seen) == 2 and 1 in seen[round(HELD_S / 0.05) - 1]
+    assert all(0 in step for step in seen)

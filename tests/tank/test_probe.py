@@ -2,18 +2,16 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_from_euler
-from wakewise.tank.probe import ThrustHistory, probe, read_points, read_thrusts, regular_times
+from wakewise.tank.probe import probe
+from wakewise.tank.probe_tables import ThrustHistory, read_points, regular_times
 from wakewise.targets import coral, place_on_bed
 from wakewise.vehicles import load_vehicle
 
 VEHICLE = load_vehicle("paper")
 AT_REST = Pose(np.zeros(3))
-NAMES = ",".join(f"thrust_{i + 1}_N" for i in range(8))
 
 
 def _one(thruster, thrust_N, until_s=15.0):
@@ -98,44 +96,6 @@ def test_a_target_turns_the_water_aside():
         probe(VEHICLE, X, history, points, target=target)
 
 
-def test_columns_are_found_by_name_in_any_order(tmp_path):
-    """Numbers as in steps.parquet, the thrusters' own names, or no known names in the vehicle's order."""
-    path = tmp_path / "t.csv"
-    shuffled = [7, 0, 3, 1, 2, 6, 5, 4]
-    row = ",".join(str(i) for i in shuffled)
-    for names in ([f"thrust_{i + 1}_N" for i in shuffled], [f"T{i + 1}" for i in shuffled],
-                  [VEHICLE.thrusters[i].name for i in shuffled]):  # fmt: skip
-        path.write_text(",".join(names) + f",time_s\n{row},0\n{row},1\n")
-        history, taken = read_thrusts(path, VEHICLE)
-        assert history.thrusts_N[0].tolist() == list(range(8))
-        assert taken[names[0]] == VEHICLE.thrusters[7].name
-    path.write_text("time_s,a,b,c,d,e,f,g,h\n0,0,1,2,3,4,5,6,7\n1,0,1,2,3,4,5,6,7\n")
-    assert read_thrusts(path, VEHICLE)[0].thrusts_N[0].tolist() == list(range(8))
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (f"{NAMES}\n0,0,0,0,0,0,0,0\n", "no column time_s"),
-        ("time_s,thrust_1_N\n0,0\n1,0\n", "1 thrust columns, paper has 8 thrusters"),
-        (f"time_s,{NAMES}\n1,0,0,0,0,0,0,0,0\n0,0,0,0,0,0,0,0,0\n", "does not come after"),
-        (f"time_s,{NAMES}\n0,nan,0,0,0,0,0,0,0\n1,0,0,0,0,0,0,0,0\n", "must be finite"),
-        (f"time_s,{NAMES}\n0,x,0,0,0,0,0,0,0\n1,0,0,0,0,0,0,0,0\n", "a number is needed"),
-        (f"time_s,{NAMES}\n0,0,0,0,0,0,0,0,0\n", "at least 2 are needed"),
-        (f"time_s,{NAMES.replace('_8_', '_1_')}\n", "named twice"),
-        (f"time_s,{NAMES.replace('_8_', '_9_')}\n0,0,0,0,0,0,0,0,0\n", "not one thruster's alone"),
-        ("", "empty"),
-    ],
-)
-def test_bad_thrusts_are_refused(tmp_path, text, message):
-    """Missing columns, a wrong number of them, unsorted times and values that are none: one line, with the file."""
-    path = tmp_path / "t.csv"
-    path.write_text(text)
-    with pytest.raises(InputError, match=message) as fault:
-        read_thrusts(path, VEHICLE)
-    assert str(path) in str(fault.value)
-
-
 def test_bad_points_are_refused(tmp_path):
     """A missing column, no rows, a point below the floor."""
     path = tmp_path / "p.csv"
@@ -157,19 +117,6 @@ def test_bad_points_are_refused(tmp_path):
         probe(VEHICLE, AT_REST, _one(4, 1.0), read_points(path), times_s=np.array([0.0, 99.0]))
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
-@given(st.text(alphabet='time_s,x_m1.0-\n"NaT', max_size=120))
-def test_no_text_breaks_the_reader(tmp_path, text):
-    """Whatever the files hold, they are read or bad input."""
-    path = tmp_path / "any.csv"
-    path.write_text(text, encoding="utf-8")
-    for read in (read_points, lambda p: read_thrusts(p, VEHICLE)):
-        try:
-            read(path)
-        except InputError as fault:
-            assert "\n" not in str(fault)
-
-
 def test_a_hull_in_the_floor_is_refused():
     """Though all its thrusters are above the floor; and so is a floor that is no number."""
     points = np.array([[0.5, 0.0, 0.5]])
@@ -179,12 +126,29 @@ def test_a_hull_in_the_floor_is_refused():
         probe(VEHICLE, AT_REST, _one(4, 1.0), points, floor_z_m=float("nan"))
 
 
-def test_what_a_table_lacks_is_named(tmp_path):
-    """A column too few is named, and so are semicolons."""
-    path = tmp_path / "T.csv"
-    path.write_text("time_s," + NAMES.removesuffix(",thrust_8_N") + "\n")
-    with pytest.raises(InputError, match="7 thrust columns, paper has 8 thrusters, no column thrust_8_N"):
-        read_thrusts(path, VEHICLE)
-    path.write_text("time_s;thrust_1_N\n0;1\n")
-    with pytest.raises(InputError, match="semicolons, commas are needed"):
-        read_thrusts(path, VEHICLE)
+def test_a_hull_in_the_target_is_refused():
+    """Above the floor but over the coral's branches; a hand's breadth higher it is answered."""
+    target = place_on_bed("branching", coral("branching"), 1.5)
+    points = np.array([[0.5, 0.0, 0.5]])
+    with pytest.raises(InputError, match=r"hull of paper at \(0, 0, 1\.3\) m is inside the target branching"):
+        probe(VEHICLE, Pose(np.array([0.0, 0.0, 1.3])), _one(4, 1.0, 0.1), points, floor_z_m=1.5, target=target)
+    clear = Pose(np.array([0.0, 0.0, 1.1]))
+    assert probe(VEHICLE, clear, _one(4, 1.0, 0.1), points, floor_z_m=1.5, target=target).known.all()
+
+
+def test_the_lattice_says_where_it_knows_nothing():
+    """On a jet's axis it knows the flow, half a metre off it nothing; with no thruster running water is at rest."""
+    place, axis = VEHICLE.thruster_positions_B_m[4], VEHICLE.thruster_axes_B[4]
+    off = np.cross(axis, [1.0, 0.0, 0.0])
+    points = place - 0.5 * axis + np.array([[0.0], [0.5], [0.3]]) * off
+    thrusts = np.zeros((3, 8))
+    thrusts[0, 4] = 2.0
+    history = ThrustHistory(times_s=np.array([0.0, 1.0, 2.0]), thrusts_N=thrusts)
+    found = probe(VEHICLE, AT_REST, history, points, flow="lattice")
+    assert found.known.tolist() == [[True, False, True], [True] * 3, [True] * 3]
+    assert found.speeds_m_s[0, 0] > 0.1
+    assert not found.speeds_m_s[1].any()
+    far = place - 3.0 * axis + np.array([[0.9], [2.0]]) * off  # the box goes on as a cone
+    assert probe(VEHICLE, AT_REST, history, far, flow="lattice").known[0].tolist() == [True, False]
+    with pytest.raises(InputError, match="swirl need parcels"):
+        probe(VEHICLE, AT_REST, history, points, flow="lattice", swirl=True)

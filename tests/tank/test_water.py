@@ -173,7 +173,7 @@ def test_merging_conserves_impulse():
     n = 60
     position = np.column_stack([np.linspace(0, 0.4, n), np.zeros((n, 2))])
     impulse = np.array([1.0, 0.0, 0.0]) + 0.1 * rng.normal(size=(n, 3))
-    row = Parcels(
+    row = Parcels.sent(
         position,
         impulse,
         np.full(n, 0.05),
@@ -185,7 +185,7 @@ def test_merging_conserves_impulse():
     fewer = merged(row, 0.5)
     assert fewer.count < 0.6 * n
     assert fewer.impulse_m4_s.sum(axis=0) == pytest.approx(impulse.sum(axis=0), rel=1e-12)
-    back = Parcels(
+    back = Parcels.sent(
         position,
         impulse * (-1.0) ** np.arange(n)[:, None],
         row.sigma_m,

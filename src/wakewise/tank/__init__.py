@@ -28,7 +28,7 @@ from wakewise.tank.sensors import Sensors
 from wakewise.tank.settings import TankSettings, ThrusterFailure
 from wakewise.tank.tank import Tank
 from wakewise.tank.tether import Tether
-from wakewise.tank.water import Ambient, Water, WaterCounts
+from wakewise.tank.water import Water, WaterCounts
 
 __all__ = [
     "AiryWave",

@@ -43,6 +43,8 @@ LEAST_RING_IMAGE_M_S = 2e-4  # images whose crest would not reach this speed at 
 WALL_JET_SPEED = 1.16  # u_max r / sqrt(M), Rajaratnam 1976
 STRIKE_HEIGHT = 1.75  # of the parcel's sigma: 0.14 H, where the bed's pressure begins to turn the jet (Beltaos 1974)
 _LAYER_CONVECTION = 1 / math.sqrt(2)  # mean of u weighted with u over a Gaussian layer, as a share of u_max
+STRENGTH = _LAYER_CONVECTION * WALL_JET_SPEED**2 / (math.sqrt(2 * math.pi) * LOG_WIDTH)
+"""A of a ring in m2/s over its impulse, times its radius squared."""
 # Rings become one that are less than this apart, counted in widths L of their crests: then rows are no coarser than
 # 2 sqrt(2) L, where Gaussians still sum to a constant within 17 % (Poisson summation, 2 exp(-2 pi^2 / 8)), and mostly
 # no coarser than 2 L, where they do within 1.4 %.
@@ -125,12 +127,22 @@ def packed_rings(rings: Rings, least_m: float = 0.0, per_height: float = 0.0) ->
     root of the ratio, so that it carries the same momentum. `per_height` is one over
     the distance to the opposite face, where F ends with a factor 1 - h per_height; 0 for none.
     """
+    heading, kappa = rings.heading_kappa
     rows = np.empty((rings.count, COLUMNS))
-    rows[:, 0:2], rows[:, 2], rows[:, 3] = rings.centre_m, rings.radius_m, ring_strength(rings)
-    rows[:, 4:6], rows[:, 6] = rings.heading_kappa
-    rows[:, 11], rows[:, 12] = least_m, per_height
+    _fill(rows, rings.centre_m, rings.radius_m, rings.impulse_m4_s, heading, kappa, least_m, per_height)
     finish_rows(rows)
     return rows
+
+
+@njit(cache=True)
+def _fill(
+    rows: Array, centre: Array, R: Array, impulse: Array, heading: Array, kappa: Array, least: float, per_height: float
+) -> None:
+    for j in range(rows.shape[0]):
+        rows[j, 0], rows[j, 1], rows[j, 2] = centre[j, 0], centre[j, 1], R[j]
+        rows[j, 3] = STRENGTH * impulse[j] / R[j] ** 2
+        rows[j, 4], rows[j, 5], rows[j, 6] = heading[j, 0], heading[j, 1], kappa[j]
+        rows[j, 11], rows[j, 12] = least, per_height
 
 
 def packed_velocity(points_W_m: Array, packed: Array, bed_z_m: float, *, exact: bool = False) -> Array:
@@ -175,8 +187,8 @@ def with_ring_images(packed: Array, face: Face, room: Room) -> Array:
 
 def ring_strength(rings: Rings) -> Array:
     """A of each ring in m2/s, shape (n,): such that rings sent at a steady rate add up to u_max = 1.16 sqrt(M) / r."""
-    scale = _LAYER_CONVECTION * WALL_JET_SPEED**2 / (math.sqrt(2 * math.pi) * LOG_WIDTH)
-    return scale * rings.impulse_m4_s / rings.radius_m**2
+    strength: Array = STRENGTH * rings.impulse_m4_s / rings.radius_m**2
+    return strength
 
 
 def layer_speed(rings: Rings) -> Array:
@@ -186,7 +198,7 @@ def layer_speed(rings: Rings) -> Array:
     centres meet along less and less of their crests as the centres part, and hardly at all a radius apart; those that
     lean different ways lend each other speed as far as their directions overlap.
     """
-    speed = np.zeros(rings.count)
+    speed = np.empty(rings.count)
     _sum_layers(rings.centre_m, rings.radius_m, ring_strength(rings), *rings.heading_kappa, speed)
     return speed
 
@@ -266,15 +278,24 @@ def _merge_rings(
 @njit(cache=True)
 def _sum_layers(centre: Array, radius: Array, strength: Array, heading: Array, kappa: Array, out: Array) -> None:
     """For each ring, strengths weighted with nearness in log radius, centre and direction, over its radius."""
+    n, per_L = radius.shape[0], 1.0 / LOG_WIDTH
     logs, bessel = np.log(radius), log_i0s(kappa)
-    for i in range(radius.shape[0]):
-        total = 0.0
-        for j in range(radius.shape[0]):
-            apart = (logs[i] - logs[j]) / LOG_WIDTH
+    out[:] = strength
+    for i in range(n):
+        for j in range(i + 1, n):
+            apart = (logs[i] - logs[j]) * per_L
+            alike = 0.5 * apart * apart
+            if alike >= 12.0:
+                continue
             dx, dy = centre[i, 0] - centre[j, 0], centre[i, 1] - centre[j, 1]
-            exponent = 0.5 * apart * apart + 2.0 * (dx * dx + dy * dy) / (radius[i] * radius[i])
-            if exponent < 12.0:
-                if i != j:
-                    exponent -= log_overlap(heading[i], kappa[i], bessel[i], heading[j], kappa[j], bessel[j])
-                total += strength[j] * math.exp(-exponent)
-        out[i] = total / radius[i]
+            off = 2.0 * (dx * dx + dy * dy)
+            for_i, for_j = alike + off / (radius[i] * radius[i]), alike + off / (radius[j] * radius[j])
+            if min(for_i, for_j) >= 12.0:
+                continue
+            shared = log_overlap(heading[i], kappa[i], bessel[i], heading[j], kappa[j], bessel[j])
+            if for_i < 12.0:
+                out[i] += strength[j] * math.exp(shared - for_i)
+            if for_j < 12.0:
+                out[j] += strength[i] * math.exp(shared - for_j)
+    for i in range(n):
+        out[i] /= radius[i]

@@ -35,6 +35,7 @@ _LEAST_EXPONENT = _SINGLE(-15.0)
 _ZERO, _ONE, _TWO, _HALF = _SINGLE(0.0), _SINGLE(1.0), _SINGLE(2.0), _SINGLE(0.5)
 _PER_L2, _PER_SPREAD = _SINGLE(LOG_WIDTH**-2), _SINGLE(1 / WALL_JET_SPREAD)
 _THICK, _TINY = _SINGLE(WALL_JET_SPREAD * math.sqrt(math.pi / 2)), _SINGLE(1e-12)
+_REACH, _LOG_WIDTH = _SINGLE(REACH), _SINGLE(LOG_WIDTH)
 _Z_MIN, _Z_MAX, _H_MAX = _SINGLE(math.exp(-REACH)), _SINGLE(math.exp(REACH)), _SINGLE(HIGHEST)
 
 
@@ -57,11 +58,15 @@ def sum_planes(points: Array, planes: Array, starts: IntArray, rings: Array, kin
     work = np.zeros((6, _BLOCK), kind.dtype)
     X, Y, H, U, V, W = work[0], work[1], work[2], work[3], work[4], work[5]
     flip = np.empty(_BLOCK)
-    near, felt = np.empty(rings.shape[0], np.int64), np.empty(rings.shape[0], np.int64)
+    reaches, some = _reaches(rings), np.empty((10, rings.shape[0]), np.float32)
+    near, seen = np.empty(rings.shape[0], np.int64), np.empty(rings.shape[0], np.float32)
     low, high = np.empty(3), np.empty(3)
     for group in range(0, points.shape[0], _GROUP):
         end = min(group + _GROUP, points.shape[0])
         for i in range(planes.shape[0]):
+            first, many = starts[i], starts[i + 1] - starts[i]
+            if many == 0:
+                continue
             o, a, b, c = planes[i, 0:3], planes[i, 3:6], planes[i, 6:9], planes[i, 9:12]
             low[:], high[:] = 1e9, -1e9
             for p in range(group, end):
@@ -72,12 +77,16 @@ def sum_planes(points: Array, planes: Array, starts: IntArray, rings: Array, kin
                 low[0], high[0] = min(low[0], px), max(high[0], px)
                 low[1], high[1] = min(low[1], py), max(high[1], py)
                 low[2] = min(low[2], height)
-            # The whole group must never leave out what one of its blocks feels, not even by rounding.
+            # The group must never leave out what one of its blocks feels, not even by rounding. A circle round a block
+            # in a corner of the group's box reaches beyond the circle round the box, but never by half as much again.
+            _feel(reaches, first, many, low, high, 1.42, 1e-4, seen)
             nears = 0
-            for j in range(starts[i], starts[i + 1]):
-                near[nears] = j
-                nears += 1
-            nears = _felt(rings, near, nears, low, high, 1e-6, near)
+            for j in range(many):
+                if seen[j] > _ZERO:
+                    near[nears] = first + j
+                    for k in range(10):
+                        some[k, nears] = reaches[k, first + j]
+                    nears += 1
             if nears == 0:
                 continue
             for block in range(group, end, _BLOCK):
@@ -94,12 +103,17 @@ def sum_planes(points: Array, planes: Array, starts: IntArray, rings: Array, kin
                     low[0], high[0] = min(low[0], px), max(high[0], px)
                     low[1], high[1] = min(low[1], py), max(high[1], py)
                     low[2] = min(low[2], height)
-                count = _felt(rings, near, nears, low, high, 0.0, felt)
-                if count == 0:
+                if _feel(some, 0, nears, low, high, 1.0, 1e-5, seen) == _ZERO:
                     continue
                 U[:], V[:], W[:] = _ZERO, _ZERO, _ZERO
-                for q in range(count):
-                    _add_ring(rings[felt[q]], lanes, X, Y, H, U, V, W)
+                on_plane = True
+                for p in range(n):
+                    on_plane &= H[p] == _ZERO
+                for q in range(nears):
+                    if seen[q] > _ZERO and on_plane:
+                        _add_ring_on_plane(rings[near[q]], lanes, X, Y, U, V)
+                    elif seen[q] > _ZERO:
+                        _add_ring(rings[near[q]], lanes, X, Y, H, U, V, W)
                 for p in range(n):
                     u, v, up = U[p], V[p], W[p] * flip[p]
                     out[block + p, 0] += u * a[0] + v * b[0] - up * c[0]
@@ -161,6 +175,28 @@ def _add_ring(ring: Array, lanes: int, X: Array, Y: Array, H: Array, U: Array, V
 
 
 @njit(inline="always")
+def _add_ring_on_plane(ring: Array, lanes: int, X: Array, Y: Array, U: Array, V: Array) -> None:
+    """`_add_ring` for points on the plane itself, where the water only runs along it."""
+    x, y, per_R = _SINGLE(ring[0]), _SINGLE(ring[1]), _SINGLE(1.0 / ring[2])
+    ahead_x, ahead_y = _SINGLE(0.25 * ring[4] * ring[6]), _SINGLE(0.25 * ring[5] * ring[6])
+    log_weight, least2 = _SINGLE(0.25 * ring[13]), _SINGLE((ring[11] / (WALL_JET_SPREAD * ring[2])) ** 2)
+    strength = _SINGLE(ring[3] / (ring[2] * ring[2]))
+    for p in range(lanes):
+        dx, dy = X[p] - x, Y[p] - y
+        r2 = dx * dx + dy * dy + _TINY
+        per_r = _ONE / math.sqrt(r2)
+        shrunk = _exp(-min(log_weight + (dx * ahead_x + dy * ahead_y) * per_r, _ONE))
+        z = r2 * per_r * shrunk * per_R
+        inverse = _ONE / (z * z * (z + _ONE))
+        t = _log((z - _ONE) * z * z * inverse)
+        slower = _ONE / math.sqrt(math.sqrt(_ONE + least2 * shrunk * shrunk))
+        g = strength * slower * _exp(-_HALF * _PER_L2 * t * t) * (z + _ONE) * inverse
+        g = g if z > _Z_MIN and z < _Z_MAX else _ZERO
+        U[p] += dx * g
+        V[p] += dy * g
+
+
+@njit(inline="always")
 def _log(f: Any) -> Any:
     """Logarithm of z from f = (z - 1) / (z + 1) by its series, good to 2e-5 in a ring's reach."""
     f2 = f * f
@@ -174,45 +210,65 @@ def _erf_rest(x: Any) -> Any:
     return k * (_ERF[0] + k * (_ERF[1] + k * (_ERF[2] + k * (_ERF[3] + k * _ERF[4]))))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _felt(rings: Array, some: IntArray, many: int, low: Array, high: Array, margin: float, felt: IntArray) -> int:
-    """List those of some rings that reach a box at a speed that matters; `felt` may be `some` itself.
+@njit(inline="always")
+def _reaches(rings: Array) -> np.ndarray:
+    """What `_feel` must know of each ring, shape (10, n): one row for each quantity, so that several go at once."""
+    out = np.empty((10, rings.shape[0]), np.float32)
+    for j in range(rings.shape[0]):
+        kappa = 0.25 * rings[j, 6]
+        out[0, j], out[1, j], out[2, j], out[3, j] = rings[j, 0], rings[j, 1], rings[j, 4], rings[j, 5]
+        out[4, j], out[5, j], out[6, j] = kappa, math.log(rings[j, 2]) + 0.25 * rings[j, 13], rings[j, 14]
+        out[7, j], out[8, j], out[9, j] = rings[j, 8], rings[j, 9], rings[j, 10]
+    return out
 
-    The box goes from `low` to `high` in the plane and from `low[2]` up.
+
+@njit(inline="always")
+def _feel(
+    reaches: np.ndarray,
+    first: int,
+    many: int,
+    low: Array,
+    high: Array,
+    wider: float,
+    margin_m: float,
+    seen: np.ndarray,
+) -> Any:
+    """Mark those of `many` rings, from `first` on, that reach a box at a speed that matters, and count them.
+
+    The box goes from `low` to `high` in the plane and from `low[2]` up, taken as the circle round it, made `wider`,
+    with a margin: 1e-5 m is more than single precision loses.
     """
-    x, y = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])
-    about = 0.5 * math.sqrt((high[0] - low[0]) ** 2 + (high[1] - low[1]) ** 2) + 1e-9 + margin
-    height = max(low[2] - margin, 0.0)
-    count = 0
+    x, y = _SINGLE(0.5 * (low[0] + high[0])), _SINGLE(0.5 * (low[1] + high[1]))
+    about = _SINGLE(0.5 * wider * math.sqrt((high[0] - low[0]) ** 2 + (high[1] - low[1]) ** 2) + margin_m)
+    height = _SINGLE(max(low[2] - margin_m, 0.0))
+    least_left = -_SINGLE(10.0 * margin_m)
+    RX, RY, HX, HY, KAPPA = reaches[0], reaches[1], reaches[2], reaches[3], reaches[4]
+    LOG_R, LEFT, INNER2, OUTER2, TOP = reaches[5], reaches[6], reaches[7], reaches[8], reaches[9]
+    count = _ZERO
     for q in range(many):
-        j = some[q]
-        dx, dy = x - rings[j, 0], y - rings[j, 1]
+        j = first + q
+        dx, dy, kappa = x - RX[j], y - RY[j], KAPPA[j]
         r = math.sqrt(dx * dx + dy * dy)
-        near, far = max(r - about, 0.0), r + about
-        if (
-            near * near > rings[j, 9] * (1.0 + margin)
-            or far * far * (1.0 + margin) < rings[j, 8]
-            or height > rings[j, 10] * (1.0 + margin)
-        ):
-            continue
-        most, least, kappa = 1.0, -1.0, rings[j, 6]
-        if kappa > 0.0 and r > about:
-            # The box is seen from the ring's centre within an angle of its middle, whose sine is s.
-            s = about / r
-            c = math.sqrt(1.0 - s * s)
-            cosine = (dx * rings[j, 4] + dy * rings[j, 5]) / r
-            sine = math.sqrt(max(1.0 - cosine * cosine, 0.0))
-            most = 1.0 if cosine >= c else cosine * c + sine * s
-            least = -1.0 if cosine <= -c else cosine * c - sine * s
-        wide = rings[j, 2] * math.exp(0.25 * (rings[j, 13] + kappa * most))
-        left = rings[j, 14] + margin - 0.25 * kappa * (1.0 - most) - height / wide
-        if left < 0.0 or height > HIGHEST * wide * (1.0 + 1e-6 + margin):
-            continue
-        reach = math.exp(min(REACH, LOG_WIDTH * math.sqrt(2.0 * left)) + 1e-6 + margin)
-        if near > reach * wide or far * reach < wide * math.exp(-0.25 * kappa * (most - least)):
-            continue
-        felt[count] = j
-        count += 1
+        near, far = max(r - about, _ZERO), r + about
+        # The box is seen from the ring's centre within an angle of its middle, whose sine is s.
+        per_r = _ONE / max(r, about)
+        s = about * per_r
+        c = math.sqrt(_ONE - s * s)
+        cosine = (dx * HX[j] + dy * HY[j]) * per_r
+        sine = math.sqrt(max(_ONE - cosine * cosine, _ZERO))
+        most = _ONE if cosine >= c else cosine * c + sine * s
+        least = -_ONE if cosine <= -c else cosine * c - sine * s
+        most, least = (_ONE, -_ONE) if r <= about else (most, least)
+        wide = _exp(LOG_R[j] + kappa * most)
+        left = LEFT[j] - kappa * (_ONE - most) - height / wide - least_left
+        reach = _exp(min(_REACH, _LOG_WIDTH * math.sqrt(max(_TWO * left, _ZERO))))
+        narrow = wide * _exp(-min(kappa * (most - least), _SINGLE(15.0)))
+        # The least of what each condition has left: all hold if it is not negative.
+        spare = min(left, _H_MAX * wide - height, reach * wide - near, far * reach - narrow)
+        spare = min(spare, OUTER2[j] - near * near, far * far - INNER2[j], TOP[j] - height)
+        felt = _ONE if spare >= _ZERO else _ZERO
+        seen[q] = felt
+        count += felt
     return count
 
 

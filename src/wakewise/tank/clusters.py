@@ -29,7 +29,7 @@ _DIPOLE = 4.2
 _SERIES = 3.0
 _BLOCK = 32
 _FEW_SOURCES = 150  # and
-_FEW_POINTS = 128  # below which clusters are not worth their making
+_FEW_POINTS = 40  # below which clusters are not worth their making
 _SIDE = 32  # cells along each side of the cube in which points are put in order
 _KEYS = 65536  # keys of two bytes are sorted digit by digit, which is quick
 

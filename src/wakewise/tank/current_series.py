@@ -114,6 +114,8 @@ def read_current_series(
 def _read_csv(path: Path) -> tuple[Array, Array]:
     rows = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
     header = [cell.strip() for cell in rows[0]] if rows else []
+    if len(set(header)) < len(header):
+        raise InputError(f"{path}: a column is named twice in {', '.join(header)}")
     for names in _COLUMNS:
         if "time_s" in header and names[0] in header and names[1] in header:
             picked = [header.index(name) for name in ("time_s", *names) if name in header]

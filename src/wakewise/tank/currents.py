@@ -19,8 +19,8 @@ from wakewise.tank.closure import PLAIN
 from wakewise.tank.current_series import CurrentSeries, read_current_series
 from wakewise.tank.faces import Room
 from wakewise.tank.induction import impulse_velocity
+from wakewise.tank.instant import Ambient
 from wakewise.tank.settings import TankSettings
-from wakewise.tank.water import Ambient
 
 _GRAVITY_M_S2 = 9.80665
 _ROW_SPACING = 0.6  # of sigma: a row of Gaussians this dense is smooth to 1e-6

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -43,6 +44,11 @@ class Face:
     def depth_m(self) -> float:
         """Third coordinate of the face in its own frame."""
         return self.side * self.at_m
+
+    @cached_property
+    def frame(self) -> Array:
+        """Origin, the rows of the turn from the world into the face's frame, depth there, and 0: shape (14,)."""
+        return np.concatenate([np.zeros(3), self.turned(np.eye(3)).T.ravel(), [self.depth_m, 0.0]])
 
     def local(self, vectors_W: Array) -> Array:
         """Vectors or points of the world, shape (n, 3), in the face's frame: two along it, one out of the tank."""

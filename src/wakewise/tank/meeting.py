@@ -10,17 +10,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numba import njit
 
 from wakewise.arrays import Array, IntArray
 from wakewise.tank.bedjets import STRIKE_HEIGHT, Rings, rings_from_strikes
-from wakewise.tank.parcels import Parcels
+from wakewise.tank.parcels import CENTRE_SPEED, Parcels
 
 _OPPOSED = -0.5  # cosine of 120 degrees; jets that cross at less merge
 _LEAST_SPEED_M_S = 0.03  # of a parcel alone at its centre; meetings of weaker ones are let be
-_CENTRE_SPEED = 2 / (3 * (2 * math.pi) ** 1.5)
 _SAME_PLACE = 1.0  # sheets of the same two jets closer than this many sigma are one
 _SAME_NORMAL = math.cos(math.radians(15))
 _MOST_SHEETS = 8
@@ -45,6 +45,11 @@ class Sheet:
     R: Array
     thickness_m: float
     depth_m: float = 0.0
+
+    @cached_property
+    def frame(self) -> Array:
+        """Origin, the rows of the turn from the world, depth in that frame, and 1 for both sides: shape (14,)."""
+        return np.concatenate([self.origin_m, self.R.ravel(), [self.depth_m, 1.0]])
 
     @classmethod
     def across(cls, origin_m: Array, normal: Array, thickness_m: float) -> Sheet:
@@ -82,7 +87,7 @@ class Meetings:
     def turn_aside(self, parcels: Parcels) -> tuple[Parcels, list[tuple[Sheet, Rings]], float]:
         """Take from parcels what meets head-on: those left, rings of each plane, and the impulse taken (m4/s)."""
         size = parcels.size_m4_s
-        strong = np.flatnonzero(_CENTRE_SPEED * size > _LEAST_SPEED_M_S * parcels.sigma_m**3)
+        strong = np.flatnonzero(CENTRE_SPEED * size > _LEAST_SPEED_M_S * parcels.sigma_m**3)
         if len(strong) < 2:
             return parcels, [], 0.0
         pairs = _meeting_pairs(

@@ -20,6 +20,8 @@ from wakewise.tank.induction import impulse_velocity
 MERGE_SPACING = 0.7  # of sigma: a closer pair becomes one, so rows are no coarser than 1.4 sigma (ripple 1e-4),
 _OLD_D, _OLD_SPACING = 2.0, 1.4  # and from sigma over D of 2 to 2.8 on they are 1.4 times as coarse (ripple 1 %)
 _PARALLEL = 0.9  # cosine: opposite parcels would cancel instead of stirring each other, so they never merge
+CENTRE_SPEED = 2 / (3 * (2 * math.pi) ** 1.5)
+"""Speed at the centre of a parcel of unit impulse and size: two thirds of its impulse's density there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +42,10 @@ class Parcels:
         Turbulent share of the impulse, a standard normal variable before scaling.
     disk_m_s : ndarray, shape (n, 3)
         Velocity of the disk when it was sent: its water starts with it and loses it to what is entrained.
+    flow_m_s : ndarray, shape (n, 3)
+        Velocity of the jets' water there when it was last looked at.
+    held_s : ndarray, shape (n,)
+        How long ago that was; infinite if never.
     """
 
     position_m: Array
@@ -49,12 +55,30 @@ class Parcels:
     stream: IntArray
     gust: Array
     disk_m_s: Array
+    flow_m_s: Array
+    held_s: Array
 
     @classmethod
     def none(cls) -> Parcels:
         """No parcels at all: still water."""
         v = np.zeros((0, 3))
-        return cls(v, v, np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64), v, v)
+        return cls(v, v, np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64), v, v, v, np.zeros(0))
+
+    @classmethod
+    def sent(
+        cls,
+        position_m: Array,
+        impulse_m4_s: Array,
+        sigma_m: Array,
+        diameter_m: Array,
+        stream: IntArray,
+        gust: Array,
+        disk_m_s: Array,
+    ) -> Parcels:
+        """New ones, at which the water has not been looked at yet."""
+        never = np.full(len(sigma_m), np.inf)
+        flow = np.zeros((len(sigma_m), 3))
+        return cls(position_m, impulse_m4_s, sigma_m, diameter_m, stream, gust, disk_m_s, flow, never)
 
     @property
     def count(self) -> int:
@@ -160,12 +184,13 @@ def _merged(parcels: Parcels, order: IntArray, label: IntArray, spacing: float) 
     """Walk through parcels in an order; each may take up the one before it with the same label."""
     position, impulse = parcels.position_m.copy(), parcels.impulse_m4_s.copy()
     sigma, gust, disk = parcels.sigma_m.copy(), parcels.gust.copy(), parcels.disk_m_s.copy()
+    flow, held = parcels.flow_m_s.copy(), parcels.held_s.copy()
     keep = np.ones(parcels.count, dtype=np.bool_)
     labels = int(label[order].max()) + 1
     reach = spacing * row_widening(sigma, parcels.diameter_m)
-    if not _merge_pairs(order, position, impulse, sigma, gust, disk, label, labels, reach, keep):
+    if not _merge_pairs(order, position, impulse, sigma, gust, disk, flow, held, label, labels, reach, keep):
         return parcels
-    out = Parcels(position, impulse, sigma, parcels.diameter_m, parcels.stream, gust, disk)
+    out = Parcels(position, impulse, sigma, parcels.diameter_m, parcels.stream, gust, disk, flow, held)
     return out.take(keep)
 
 
@@ -177,6 +202,8 @@ def _merge_pairs(
     sigma: Array,
     gust: Array,
     disk: Array,
+    flow: Array,
+    held: Array,
     label: IntArray,
     labels: int,
     spacing: Array,
@@ -198,10 +225,11 @@ def _merge_pairs(
             continue
         p = a / (a + b)
         q = 1 - p
-        sigma[j] = p * sigma[i] + q * sigma[j]
+        sigma[j], held[j] = p * sigma[i] + q * sigma[j], max(held[i], held[j])
         for k in range(3):
             X[j, k] = p * X[i, k] + q * X[j, k]
             disk[j, k] = p * disk[i, k] + q * disk[j, k]
+            flow[j, k] = p * flow[i, k] + q * flow[j, k]
             gust[j, k] = (p * gust[i, k] + q * gust[j, k]) / math.sqrt(p * p + q * q)
             m[j, k] += m[i, k]
         keep[i], found = False, True

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from wakewise.settings import Settings
 
 Length = Annotated[float, Field(gt=0.3, le=100.0)]
-Speed = Annotated[float, Field(ge=-1.0, le=1.0)]
+Speed = Annotated[float, Field(ge=-3.0, le=3.0)]  # beyond what most vehicles hold, which is said with the margin
 Place = tuple[float, float, float]
 
 WATERS: dict[str, dict[str, float]] = {
@@ -55,7 +56,7 @@ class TankSettings(Settings):
     density_kg_m3: float = Field(1000.0, gt=900.0, lt=1100.0, description="of the water; vehicles are trimmed in 1000")
     current_m_s: tuple[Speed, Speed, Speed] = Field((0.03, 0.02, 0.0), description="steady current: north, east, down")
     current_file: str | None = Field(
-        None, description="series in place of current_m_s: CSV (time_s,u,v[,w] in m/s) or NOAA's JSON"
+        None, min_length=1, description="series in place of current_m_s: CSV (time_s,u,v[,w] in m/s) or NOAA's JSON"
     )
     current_file_from_s: float = Field(0.0, ge=0.0, description="where in the series the trial starts")
     current_file_to_s: float | None = Field(None, gt=0.0, description="where the part used ends, null for all")
@@ -142,3 +143,43 @@ class TankSettings(Settings):
         if isinstance(given, dict) and isinstance(given.get("water"), str):
             return WATERS.get(given["water"], {}) | given
         return given
+
+    @field_validator("pose_outages_s")
+    @classmethod
+    def _spans_run_forwards(cls, spans: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+        for begin, end in spans:
+            if not 0.0 <= begin < end:
+                raise ValueError(f"from {begin:g} to {end:g} s, each span must start at 0 or later and end after that")
+        return spans
+
+    @model_validator(mode="after")
+    def _water_holds_it(self) -> TankSettings:
+        """Refuse waves that break, a pump that blows out of the water and a winch outside it."""
+        length, width, depth = self.size_m
+        if self.wave_amplitude_m > 0.0:
+            self._check_wave(depth)
+        sides = (length / 2, width / 2)
+        if self.pump_speed_m_s > 0.0:
+            for name, at, towards, side in zip("xy", self.pump_at_m, self.pump_towards, sides, strict=False):
+                if abs(at) >= side and at * towards > 0.0:
+                    raise ValueError(f"pump_towards: blows out of the tank through the wall at {name} = {at:g} m")
+        if self.tether_diameter_m > 0.0:
+            x, y, z = self.tether_from_m
+            if abs(x) > sides[0] or abs(y) > sides[1] or z > depth:
+                raise ValueError(
+                    f"tether_from_m: ({x:g}, {y:g}, {z:g}) m is outside the walls or below the floor of "
+                    f"{length:g} x {width:g} x {depth:g} m; give the place at which the cable enters the water"
+                )
+        return self
+
+    def _check_wave(self, depth_m: float) -> None:
+        from wakewise.tank.currents import wave_number_per_m
+
+        # Steepest wave over a level bed: H / L = 0.142 tanh(k h) (R. Miche 1944, Ann. Ponts Chauss. 114).
+        k = wave_number_per_m(self.wave_period_s, depth_m)
+        most_m = 0.5 * 0.142 * (2 * math.pi / k) * math.tanh(k * depth_m)
+        if self.wave_amplitude_m > most_m:
+            raise ValueError(
+                f"wave_amplitude_m: {self.wave_amplitude_m:g} m, a wave of {self.wave_period_s:g} s in {depth_m:g} m "
+                f"of water breaks above {most_m:.3f} m"
+            )

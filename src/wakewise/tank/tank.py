@@ -10,6 +10,7 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.interfaces import BodyState, Measurement, ScalarGrid
+from wakewise.tank.beside import Beside
 from wakewise.tank.blockage import Blockage
 from wakewise.tank.closure import PLAIN, SWIRLING
 from wakewise.tank.currents import build_ambient
@@ -103,8 +104,9 @@ class Tank:
             settings.erosion_threshold_Pa,
             settings.pickup,
         )
-        self.silt = Silt(laws, settings.silt, settings.size_m, settings.max_silt_particles, silt_rng)
-        self.silt.suspend(1e-3 * settings.suspended_mg_l, target.centre_W_m)
+        self._silt = Silt(laws, settings.silt, settings.size_m, settings.max_silt_particles, silt_rng)
+        self._silt.suspend(1e-3 * settings.suspended_mg_l, target.centre_W_m)
+        self._silt_moves = Beside()
         _say_when_it_clears(settings, laws)
         self._stirring_speed = _STIRRING_SHARE * speed_at_stress_m_s(
             laws.threshold_Pa / settings.density_kg_m3, SHEAR_HEIGHT_M, laws.grain_m
@@ -115,6 +117,8 @@ class Tank:
         self._flow_time = 0.0
         self._flow_steps = 0
         self._silt_every = max(1, math.floor(_SILT_STEP_S / settings.flow_step_s + 1e-9))
+        # The silt moves with the water of the middle of its step, while the water goes on to the step's end.
+        self._silt_middle = -(-self._silt_every // 2) % self._silt_every
         self._disks_before_m = self._plant.disks()[0]
         # The water at the disks is looked at once for each of its own steps.
         self._inflow = self.ambient.velocity(self._disks_before_m, 0.0) if settings.inflow_loss else None
@@ -122,6 +126,12 @@ class Tank:
         self._touching = ""
         self._measured: WaterMeasure | None = None
         self._turbidity_per_m = self._probes.turbidity_per_m(laws, self._silt_grid())
+
+    @property
+    def silt(self) -> Silt:
+        """Silt on the bed and in the water."""
+        self._silt_moves.wait()
+        return self._silt
 
     @property
     def time_s(self) -> float:
@@ -235,12 +245,25 @@ class Tank:
         self._flow_steps += 1
         if self._inflow is not None:
             self._inflow = self._inflow_W_m_s()
-        if self._muddy and self._flow_steps % self._silt_every == 0:
-            circles = np.concatenate([self.water.stirred_bed(self._stirring_speed), self.ambient.stirred_bed()])
-            self.silt.step(self.water, circles, self._silt_every * dt_s)
-            if self._flow_steps % round(_TURBIDITY_EVERY_S / dt_s) == 0:
-                self._turbidity_per_m = self._probes.turbidity_per_m(self.silt.laws, self._silt_grid())
+        if self._muddy:
+            self._move_silt()
         self._measured = None
+
+    def _move_silt(self) -> None:
+        """Start the silt's step in its middle, have it done at its end."""
+        dt_s = self.settings.flow_step_s
+        if self._flow_steps % self._silt_every == self._silt_middle:
+            water, step_s = self.water.now, self._silt_every * dt_s
+
+            def move() -> None:
+                circles = np.concatenate([water.stirred_bed(self._stirring_speed), self.ambient.stirred_bed()])
+                self._silt.step(water, circles, step_s)
+
+            self._silt_moves.start(move)
+        if self._flow_steps % self._silt_every == 0:
+            self._silt_moves.wait()
+            if self._flow_steps % round(_TURBIDITY_EVERY_S / dt_s) == 0:
+                self._turbidity_per_m = self._probes.turbidity_per_m(self._silt.laws, self._silt_grid())
 
 
 def _tether(settings: TankSettings) -> Tether | None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from wakewise.arrays import Array, IntArray
 from wakewise.tank.bedjets import Rings, coarsened, grown, layer_speed, packed_rings, planes_velocity, with_ring_images
@@ -20,14 +22,38 @@ _REST = 3.0  # wall jets rest at this many times the parcels' rest speed: on the
 _SHEET_REST = 10.0  # and the jets of a meeting, of which there may be many, at this many
 
 
+@dataclass(frozen=True, eq=False)
+class WallRows:
+    """Rings and their images at one instant, packed for the kernel; arguments of `bedjets.planes_velocity`."""
+
+    planes: Array
+    starts: IntArray
+    packed: Array
+
+    def velocity(self, points_W_m: Array) -> Array:
+        """Velocity of all of them, shape (n, 3), at points, shape (n, 3)."""
+        return planes_velocity(points_W_m, self.planes, self.starts, self.packed)
+
+    def pairs(self, points: int) -> int:
+        """How many pairs of a point and an impulse take as long as the sum at so many points."""
+        return 2 * points * len(self.packed)
+
+    def add(self, points_W_m: Array, out: Array) -> None:
+        """Add the velocity at points to `out`, both shape (n, 3), on this thread."""
+        sum_planes(points_W_m, self.planes, self.starts, self.packed, _SINGLE, out)
+
+
 class WallJets:
     """Rings by the plane that they run along."""
 
     def __init__(self, room: Room) -> None:
         self._room = room
         self._reach_m = 2 * max((abs(face.at_m) for face in room.faces if face.axis != 2), default=np.inf)
+        faces = [(face.axis, face.side, face.depth_m) for face in room.faces]
+        self._faces = np.array(faces, dtype=np.float64).reshape(-1, 3)
+        self._per_height = {face: _per_height(face, room) for face in room.faces}
         self._rings: dict[Plane, Rings] = {}
-        self._seen: tuple[Array, IntArray, Array] | None = None  # planes, rings and images, packed for the kernel
+        self._seen: WallRows | None = None
 
     @property
     def count(self) -> int:
@@ -54,21 +80,17 @@ class WallJets:
         """
         if not self._rings:
             return
-        centres = [
-            plane.world(np.column_stack([rings.centre_m, np.full(rings.count, plane.depth_m)]))
-            for plane, rings in self._rings.items()
-        ]
-        carried = ambient(np.concatenate(centres))
+        frames = [plane.frame for plane in self._rings]
+        places = [_to_world(rings.centre_m, frame) for rings, frame in zip(self._rings.values(), frames, strict=True)]
+        carried = ambient(np.concatenate(places))
         kept: dict[Plane, Rings] = {}
         at = 0
-        for (plane, rings), places in zip(self._rings.items(), centres, strict=True):
-            current, at = plane.turned(carried[at : at + rings.count]), at + rings.count
+        for (plane, rings), frame, place in zip(self._rings.items(), frames, places, strict=True):
+            current, at = _to_plane(carried[at : at + rings.count], frame), at + rings.count
             thickness = plane.thickness_m if isinstance(plane, Sheet) else 0.0
             wider, layer = grown(rings, current, dt_s, thickness)
             rest = rest_speed_m_s * (_SHEET_REST if isinstance(plane, Sheet) else _REST)
-            keep = (layer >= rest) & (wider.radius_m < self._reach_m)
-            for face in self._room.faces:
-                keep &= face.gap_m(places) > -0.5 * rings.radius_m
+            keep = (layer >= rest) & (wider.radius_m < self._reach_m) & _inside(place, rings.radius_m, self._faces)
             if not keep.all():
                 wider = wider.take(keep)
             if wider.count:
@@ -85,38 +107,60 @@ class WallJets:
             self._rings = {plane: rings.take(speeds[plane] >= least) for plane, rings in self._rings.items()}
         self._seen = None
 
-    def velocity(self, points_W_m: Array) -> Array:
-        """Velocity of all of them with their images, shape (n, 3), at points, shape (n, 3)."""
-        return planes_velocity(points_W_m, *self._rows())
-
-    def pairs(self, points: int) -> int:
-        """How many pairs of a point and an impulse take as long as the sum at so many points."""
-        return 2 * points * len(self._rows()[2])
-
-    def add(self, points_W_m: Array, out: Array) -> None:
-        """Add the velocity at points to `out`, both shape (n, 3), on this thread."""
-        sum_planes(points_W_m, *self._rows(), _SINGLE, out)
-
-    def _rows(self) -> tuple[Array, IntArray, Array]:
+    def rows(self) -> WallRows:
+        """All of them with their images, as they are now."""
         if self._seen is None:
             self._seen = self._packed()
         return self._seen
 
-    def _packed(self) -> tuple[Array, IntArray, Array]:
+    def _packed(self) -> WallRows:
         planes, rows = [np.zeros((0, 14))], [np.zeros((0, COLUMNS))]
         for plane, rings in self._rings.items():
             if not rings.count:
                 continue
             if isinstance(plane, Face):
-                rows.append(with_ring_images(packed_rings(rings, 0.0, self._per_height(plane)), plane, self._room))
-                origin, turn, both = np.zeros(3), plane.turned(np.eye(3)).T, 0.0
+                rows.append(with_ring_images(packed_rings(rings, 0.0, self._per_height[plane]), plane, self._room))
             else:
                 rows.append(packed_rings(rings, plane.thickness_m))
-                origin, turn, both = plane.origin_m, plane.R, 1.0
-            planes.append(np.concatenate([origin, turn.ravel(), [plane.depth_m, both]])[None])
+            planes.append(plane.frame[None])
         starts = np.cumsum([len(row) for row in rows])
-        return np.concatenate(planes), starts, np.concatenate(rows)
+        return WallRows(np.concatenate(planes), starts, np.concatenate(rows))
 
-    def _per_height(self, face: Face) -> float:
-        opposite = [other for other in self._room.faces if other.axis == face.axis and other.side != face.side]
-        return 1.0 / abs(opposite[0].at_m - face.at_m) if opposite else 0.0
+
+def _per_height(face: Face, room: Room) -> float:
+    """One over the distance from a face to the opposite one; 0 without one."""
+    opposite = [other for other in room.faces if other.axis == face.axis and other.side != face.side]
+    return 1.0 / abs(opposite[0].at_m - face.at_m) if opposite else 0.0
+
+
+@njit(cache=True)
+def _to_world(centre: Array, frame: Array) -> Array:
+    """Places in a plane's frame, shape (n, 2), in the world, shape (n, 3)."""
+    out = np.empty((centre.shape[0], 3))
+    for j in range(centre.shape[0]):
+        for k in range(3):
+            along = frame[3 + k] * centre[j, 0] + frame[6 + k] * centre[j, 1] + frame[9 + k] * frame[12]
+            out[j, k] = frame[k] + along
+    return out
+
+
+@njit(cache=True)
+def _to_plane(vectors: Array, frame: Array) -> Array:
+    """Vectors of the world, shape (n, 3), in a plane's frame."""
+    out = np.empty((vectors.shape[0], 3))
+    for j in range(vectors.shape[0]):
+        for i in range(3):
+            a = 3 + 3 * i
+            out[j, i] = frame[a] * vectors[j, 0] + frame[a + 1] * vectors[j, 1] + frame[a + 2] * vectors[j, 2]
+    return out
+
+
+@njit(cache=True)
+def _inside(places: Array, radius: Array, faces: Array) -> np.ndarray:
+    """Which rings' centres are no farther behind any face (axis, side, depth) than half their radius."""
+    keep = np.ones(radius.shape[0], np.bool_)
+    for j in range(radius.shape[0]):
+        for f in range(faces.shape[0]):
+            if faces[f, 2] - faces[f, 1] * places[j, int(faces[f, 0])] <= -0.5 * radius[j]:
+                keep[j] = False
+    return keep

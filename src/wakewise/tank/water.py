@@ -19,35 +19,26 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
-from scipy.special import i0
 
 from wakewise.arrays import Array
-from wakewise.tank.bedjets import STRIKE_HEIGHT, Rings, layer_speed, rings_from_strikes
+from wakewise.tank.bedjets import STRIKE_HEIGHT, Rings, rings_from_strikes
 from wakewise.tank.blockage import Blockage
-from wakewise.tank.chunks import over_points
 from wakewise.tank.closure import PLAIN, Spreading, disk_share, first_sigma_m, travel
-from wakewise.tank.clusters import ImpulseField, in_space
-from wakewise.tank.drift import EMISSION_SPACING, drifted, gust_memory, slugs
+from wakewise.tank.drift import EMISSION_SPACING, drifted, due, gust_memory, slugs
 from wakewise.tank.faces import Face, Room
+from wakewise.tank.instant import Ambient, Instant
 from wakewise.tank.meeting import Meetings
-from wakewise.tank.parcels import GUST_PER_TURBULENCE, MERGE_SPACING, Parcels, gusty_impulse_m4_s, merged, merged_across
+from wakewise.tank.parcels import GUST_PER_TURBULENCE, MERGE_SPACING, Parcels, merged, merged_across
 from wakewise.tank.walljets import WallJets
 
 _MANY = 800  # parcels; with more, old ones of different jets merge over distances that grow in proportion
+_THIN_EVERY = 2  # steps after which rows are looked through for what may become one
+_ANSWER_EVERY = 2  # steps after which the body's answer to what carries parcels is found anew
 _STEEPEST_GRAZE = math.sin(math.radians(10))  # parcels that come in flatter than this slide along the face
 
 log = logging.getLogger(__name__)
-
-
-class Ambient(Protocol):
-    """The water's own motion, which no thruster made."""
-
-    def velocity(self, points_W_m: Array, time_s: float) -> Array:
-        """Velocity in m/s, shape (n, 3), at points, shape (n, 3), and a time after the start."""
-        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,8 +128,9 @@ class Water:
         self._waiting_slug_m = np.zeros(streams)  # length of the jet's core that it stands for
         self._retired = self._struck = self._met = 0.0
         self._forced_merges = 0
-        self._field: ImpulseField | None = None
-        self._answers: list[Array] | None = None
+        self._now: Instant | None = None
+        self._held_answer: Array | None = None  # of the body, to what carries parcels
+        self._steps = 0
 
     @property
     def bed_z_m(self) -> float:
@@ -172,44 +164,24 @@ class Water:
             forced_merges=self._forced_merges,
         )
 
+    @property
+    def now(self) -> Instant:
+        """The flow at this instant; it stays as it is when the water moves on."""
+        if self._now is None:
+            self._now = self._instant(self._gust_scale)
+        return self._now
+
     def velocity(self, points_W_m: Array) -> Array:
         """Velocity of the water in m/s, shape (n, 3), at points, shape (n, 3)."""
-        points = np.atleast_2d(np.asarray(points_W_m, dtype=np.float64))
-        u = self._jets(points) + self._ambient.velocity(points, self._time)
-        return self._turned_aside(points, u, jets=True, ambient=True)
+        return self.now.velocity(points_W_m)
 
     def ambient_velocity(self, points_W_m: Array) -> Array:
         """Velocity of the same water without thrusters, shape (n, 3), at points, shape (n, 3)."""
-        points = np.atleast_2d(np.asarray(points_W_m, dtype=np.float64))
-        u = self._ambient.velocity(points, self._time)
-        return self._turned_aside(points, u, jets=False, ambient=True)
+        return self.now.ambient_velocity(points_W_m)
 
     def excess_velocity(self, points_W_m: Array) -> Array:
         """Velocity less that of the same water without thrusters, shape (n, 3), at points, shape (n, 3)."""
-        points = np.atleast_2d(np.asarray(points_W_m, dtype=np.float64))
-        u = self._jets(points)
-        return self._turned_aside(points, u, jets=True, ambient=False)
-
-    def stirred_bed(self, least_speed_m_s: float) -> Array:
-        """Circles (x, y, radius), shape (n, 3), round the bed where jets may be faster than a speed."""
-        rings = self.rings
-        rings = rings.take(layer_speed(rings) > least_speed_m_s)
-        # A leaning wall jet reaches w^(1/4) times farther: a circle round its foremost and its hindmost place.
-        heading, kappa = rings.heading_kappa
-        ahead, behind = (1.3 * rings.radius_m * (np.exp(s * kappa) / i0(kappa)) ** 0.25 for s in (1.0, -1.0))
-        middle, reach = rings.centre_m + (0.5 * (ahead - behind))[:, None] * heading, 0.5 * (ahead + behind)
-        parcels = self._parcels
-        # On the bed a parcel and its image are at most twice as fast as one at its centre.
-        fast = 4 * _CENTRE_SPEED * parcels.size_m4_s / parcels.sigma_m**3 > least_speed_m_s
-        near = self._bed - parcels.position_m[:, 2] < 4 * parcels.sigma_m
-        low = parcels.take(near & fast)
-        circles: Array = np.concatenate(
-            [
-                np.column_stack([middle, reach]),
-                np.column_stack([low.position_m[:, :2], 4 * low.sigma_m]),
-            ]
-        )
-        return circles
+        return self.now.excess_velocity(points_W_m)
 
     def step(self, dt_s: float, origins_before_m: Array, origins_m: Array, axes_W: Array, impulses_N_s: Array) -> None:
         """Move the water on by dt_s and send what the thrusters pushed meanwhile.
@@ -228,96 +200,61 @@ class Water:
         self._emit(dt_s, origins_before_m, origins_m, axes_W, impulses_N_s)
         self._meet()
         self._strike()
-        self._thin()
+        if self._steps % _THIN_EVERY == 0:
+            self._thin()
         self._time += dt_s
-        self._field = self._answers = None
+        self._now = None
+        self._steps += 1
+        if self._steps % _ANSWER_EVERY == 0:
+            self._held_answer = None
 
-    def _still_field(self) -> ImpulseField:
-        """The free jets without their turbulence."""
-        if self._field is not None and self._gust_scale == 0.0:
-            return self._field
-        return ImpulseField.of(
-            *self._room.with_images(self._parcels.position_m, self._parcels.impulse_m4_s, self._parcels.sigma_m)
+    def _instant(self, gust_scale: float) -> Instant:
+        return Instant(
+            time_s=self._time,
+            parcels=self._parcels,
+            rings=self._walls.on_bed(),
+            rows=self._walls.rows(),
+            room=self._room,
+            bed_z_m=self._bed,
+            ambient=self._ambient,
+            body=self._body,
+            gust_scale=gust_scale,
         )
 
-    def _jets(self, points: Array) -> Array:
-        """Free jets and wall jets with their images, without the body's answer."""
-        if self._field is None:
-            moved = self._parcels
-            sources = self._room.with_images(
-                moved.position_m, gusty_impulse_m4_s(moved, self._gust_scale), moved.sigma_m
-            )
-            self._field = ImpulseField.of(*sources)
-        return self._sum_of(self._field, points)
-
-    def _sum_of(self, field: ImpulseField, points: Array) -> Array:
-        """Velocity of impulses and wall jets; points are taken in an order that suits both."""
-        order = in_space(points)
-        sorted_points = np.ascontiguousarray(points[order])
-        pairs = field.pairs(len(points))
-        if not pairs:
-            sums = field.velocity(sorted_points)
-            sums[sorted_points[:, 2] == self._bed, 2] = 0.0  # there is only rounding
-            sums += self._walls.velocity(sorted_points)
-        else:
-            walls, bed = self._walls, self._bed
-            sums = np.zeros_like(sorted_points)
-
-            def both(some: Array, result: Array) -> None:
-                field.write(some, result)
-                result[some[:, 2] == bed, 2] = 0.0
-                walls.add(some, result)
-
-            # On several threads at once; the rows of the wall jets are there before these begin.
-            over_points(both, sorted_points, sums, pairs + walls.pairs(len(points)))
-        u = np.empty_like(sums)
-        u[order] = sums
-        return u
-
-    def _turned_aside(self, points: Array, u: Array, *, jets: bool, ambient: bool) -> Array:
-        """Add the body's answer to the jets and to the ambient water, if any point is near enough to feel it."""
+    def _carrying(self, mean: Instant, points: Array) -> Array:
+        """Velocity of the jets' water, shape (n, 3); the body's answer to them is found anew every second step."""
+        u = mean.jets(points)
         body = self._body
-        if body is None:
-            return u
-        near = body.near(points)
-        if len(near):
-            to_jets, to_ambient = self._answers_of(body)
-            u = u.copy()
-            body.add_velocity(points, near, jets * to_jets + ambient * to_ambient, u)
+        if body is not None and len(near := body.near(points)):
+            if self._held_answer is None:
+                self._held_answer = mean.answer_to_jets()
+            body.add_velocity(points, near, self._held_answer, u)
         return u
-
-    def _answers_of(self, body: Blockage) -> list[Array]:
-        """Strengths of the body's sources against the jets and against the ambient water."""
-        if self._answers is None:
-            on_body = body.points_m
-            self._answers = [
-                body.strengths_m3_s(self._jets(on_body)),
-                body.strengths_m3_s(self._ambient.velocity(on_body, self._time)),
-            ]
-        return self._answers
 
     def _drift(self, dt_s: float) -> None:
         """Carry parcels and rings, let them grow, and retire what has come to rest."""
         parcels = self._parcels
+        mean = self.now if self._gust_scale == 0.0 else self._instant(0.0)
         if parcels.count:
             # Gusts are heard everywhere but do not carry parcels: the growth of sigma stands for that mixing already.
-            X = parcels.position_m
-            u = self._sum_of(self._still_field(), X)
-            u = self._turned_aside(X, u, jets=True, ambient=False)
+            X, u, held = parcels.position_m, parcels.flow_m_s.copy(), parcels.held_s.copy()
+            look = due(u, held, parcels.sigma_m, dt_s)
+            if len(look):
+                u[look] = self._carrying(mean, X[look])
             position, sigma, speed = drifted(
-                parcels, u, self.ambient_velocity(X), dt_s, self._spreading, self._room.faces
+                parcels, u, mean.ambient_velocity(X), dt_s, self._spreading, self._room.faces
             )
             gust = parcels.gust
             if self._gust_scale > 0.0:
                 memory = gust_memory(parcels.sigma_m, speed, dt_s)
                 gust = memory * gust + np.sqrt(1 - memory**2) * self._rng.standard_normal(gust.shape)
-            moved = replace(parcels, position_m=position, sigma_m=sigma, gust=gust)
+            moved = replace(parcels, position_m=position, sigma_m=sigma, gust=gust, flow_m_s=u, held_s=held)
             resting = speed < self._rest_speed
             if resting.any():
                 self._retired += float(parcels.size_m4_s[resting].sum())
                 moved = moved.take(~resting)
             self._parcels = moved
-        self._walls.grow(dt_s, self._rest_speed, self.ambient_velocity)
+        self._walls.grow(dt_s, self._rest_speed, mean.ambient_velocity)
 
     def _emit(self, dt_s: float, before: Array, after: Array, axes_W: Array, impulses_N_s: Array) -> None:
         """Send parcels at equal spacing along the slug of water that passed each disk, wherever the disk then was."""
@@ -341,7 +278,7 @@ class Water:
             impulses = sent[:, None] * jet_W
             stream = 2 * thruster + reversed_
             self._parcels = self._parcels.joined(
-                Parcels(position, impulses, sigma, D, stream, gusts((len(D), 3)), disk)
+                Parcels.sent(position, impulses, sigma, D, stream, gusts((len(D), 3)), disk)
             )
 
     def _meet(self) -> None:
@@ -389,7 +326,3 @@ class Water:
                 self._parcels = merged_across(merged(self._parcels, spacing), spacing)
             self._forced_merges += 1
             log.warning("more than %d parcels: rows made coarser (%.2f sigma apart)", self._max_parcels, spacing)
-
-
-_CENTRE_SPEED = 2 / (3 * (2 * math.pi) ** 1.5)
-"""Speed at the centre of a parcel of unit impulse and size: two thirds of its impulse's density there."""
