@@ -15,6 +15,8 @@ from wakewise.tank.bedjets import (
     coarsened,
     grown,
     layer_speed,
+    packed_rings,
+    planes_velocity,
     ring_strength,
     ring_velocity,
     rings_from_strikes,
@@ -219,3 +221,24 @@ def test_on_the_bed_the_short_sum_is_the_long_one(least_m):
     assert np.abs(on_bed).max() > 0.05
     assert on_bed[1::2] == pytest.approx(mixed[1::2], rel=1e-5, abs=1e-7)
     assert np.all(on_bed[:, 2] == 0.0)
+
+
+@pytest.mark.parametrize(("stretch", "least_m"), [(3.0, 0.0), (1.0, 0.1)])
+def test_a_thicker_jet_carries_the_same_momentum(stretch, least_m):
+    """A layer made thicker runs slower by the root of that: speed squared times thickness stays within 12 %."""
+    M, dt_s, at = 1e-3, 0.05, []
+    for widening, least in ((1.0, 0.0), (stretch, least_m)):
+        rings = Rings.none()
+        for _ in range(1600):
+            rings, _ = grown(rings, np.zeros(3), dt_s, least, widening)
+            new = rings_from_strikes(np.array([[0.0, 0.0, 1.4]]), np.array([[0.0, 0.0, M * dt_s]]), np.array([0.03]))
+            rings = coarsened(rings.joined(new))
+        packed = packed_rings(rings, least, stretch=widening)
+        frame = np.concatenate([np.zeros(3), np.eye(3).ravel(), [BED_Z_M, widening]])
+        points = np.column_stack([np.linspace(0.25, 0.45, 21), np.zeros(21), np.full(21, BED_Z_M)])
+        u = planes_velocity(points, frame[None], np.array([0, len(packed)]), packed)[:, 0]
+        at.append(np.mean(u * points[:, 0]) / math.sqrt(M))
+    r = 0.35
+    thicker = math.hypot(stretch * WALL_JET_SPREAD * r, least_m) / (WALL_JET_SPREAD * r)
+    assert at[0] == pytest.approx(WALL_JET_SPEED, rel=0.12)
+    assert at[1] * math.sqrt(thicker) == pytest.approx(at[0], rel=0.12)

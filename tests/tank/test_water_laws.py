@@ -111,24 +111,24 @@ def test_water_that_left_the_disk_is_not_at_once_in_the_current():
 
 
 def test_head_on_jets_turn_aside():
-    """Two 1 N jets 0.6 m apart run out between them; mean outflow is 0.7 to 2.6 times the lattice's.
+    """Two 1 N jets 0.6 m apart run out between them; mean outflow is 0.8 to 1.6 times the lattice's near the axis.
 
-    Lattice: 0.20, 0.17 and 0.13 m/s at 5.2, 9.8 and 12.8 cm from the axis. Its plane of meeting swings wildly (0.29
-    m/s rms at the very middle); here it stands, so that the outflow is too strong and the middle too quiet (0.04).
-    Farther out the lattice's outflow falls faster (0.05 m/s at 20 cm, here 0.16), which is not tested.
+    Lattice: 0.20, 0.17 and 0.13 m/s at 5.2, 9.8 and 12.8 cm from the axis, here 1.5, 1.2 and 1.3 times that, and 0.05
+    m/s at 20 cm, where 2.1 times that is left: the lattice's outflow falls faster. Its plane of meeting swings wildly
+    (0.29 m/s rms at the very middle); here it stands, and the middle is too quiet (0.04).
     """
     origins, jets = [[0, 0, 0], [0.6, 0, 0]], [[1, 0, 0], [-1, 0, 0]]
     water = _push(_water(2, turbulence=0.25), 6.0, [1.0, 1.0], origins, jets)
-    r, turn = np.array([0.052, 0.098, 0.128]), np.linspace(0, 2 * np.pi, 8, endpoint=False)
+    r, turn = np.array([0.052, 0.098, 0.128, 0.2]), np.linspace(0, 2 * np.pi, 8, endpoint=False)
     out = np.stack([0 * turn, np.cos(turn), np.sin(turn)], axis=1)
     points = np.array([0.3, 0.0, 0.0]) + r[:, None, None] * out
     speeds = []
     for _ in range(20):
         _push(water, 0.1, [1.0, 1.0], origins, jets)
-        u = water.velocity(points.reshape(-1, 3)).reshape(3, 8, 3)
+        u = water.velocity(points.reshape(-1, 3)).reshape(4, 8, 3)
         speeds.append(np.einsum("rti,ti->r", u, out) / 8)
-    ratio = np.mean(speeds, axis=0) / [0.20, 0.17, 0.13]
-    assert np.all((ratio > 0.7) & (ratio < 2.6))
+    ratio = np.mean(speeds, axis=0) / [0.20, 0.17, 0.13, 0.05]
+    assert np.all((ratio > 0.8) & (ratio < [1.6, 1.6, 1.6, 2.3]))
     given = 2 * (6.0 + 2.0)
     held = water.parcels.size_m4_s.sum() * DENSITY
     assert water.counts.met_N_s + held + water.counts.retired_N_s == pytest.approx(given, rel=0.03)

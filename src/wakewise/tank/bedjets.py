@@ -120,16 +120,18 @@ def ring_velocity(
     return packed_velocity(points_W_m, packed_rings(rings, least_m), bed_z_m, exact=exact)
 
 
-def packed_rings(rings: Rings, least_m: float = 0.0, per_height: float = 0.0) -> Array:
+def packed_rings(rings: Rings, least_m: float = 0.0, per_height: float = 0.0, stretch: float = 1.0) -> Array:
     """One row per ring, as the kernel reads it, for several calls of `packed_velocity`, shape (n, 15).
 
-    A layer has the thickness hypot(0.093 R, least_m). Where that is more than the law's, it is slower by the square
-    root of the ratio, so that it carries the same momentum. `per_height` is one over
-    the distance to the opposite face, where F ends with a factor 1 - h per_height; 0 for none.
+    A layer has the thickness hypot(0.093 R, least_m), or `stretch` times 0.093 R in that. It is slower in proportion to
+    what that is more than the law's: each ring then carries its impulse, and the jet of many its momentum, which makes
+    the whole slower by the square root. `per_height` is one over the distance to the opposite face, where F ends with a
+    factor 1 - h per_height; 0 for none.
     """
     heading, kappa = rings.heading_kappa
     rows = np.empty((rings.count, COLUMNS))
-    _fill(rows, rings.centre_m, rings.radius_m, rings.impulse_m4_s, heading, kappa, least_m, per_height)
+    _fill(rows, rings.centre_m, rings.radius_m, rings.impulse_m4_s, heading, kappa, least_m / stretch, per_height)
+    rows[:, 3] /= stretch
     finish_rows(rows)
     return rows
 
@@ -158,8 +160,8 @@ def planes_velocity(points_W_m: Array, planes: Array, starts: IntArray, packed: 
     ----------
     points_W_m : ndarray, shape (n, 3)
     planes : ndarray, shape (k, 14)
-        Of each: origin, the three rows of the turn from the world into its frame, depth there, and 1 if it has the
-        same rings on both sides, else 0.
+        Of each: origin, the three rows of the turn from the world into its frame, depth there, and 0 if its rings are
+        those of a wall jet; if it has the same rings on both sides, how many times higher than a wall jet's they are.
     starts : ndarray of int, shape (k + 1,)
         Plane i has the rings from starts[i] to starts[i + 1].
     packed : ndarray, shape (m, 15)
@@ -203,14 +205,16 @@ def layer_speed(rings: Rings) -> Array:
     return speed
 
 
-def grown(rings: Rings, current_m_s: Array, dt_s: float, least_m: float = 0.0) -> tuple[Rings, Array]:
+def grown(
+    rings: Rings, current_m_s: Array, dt_s: float, least_m: float = 0.0, stretch: float = 1.0
+) -> tuple[Rings, Array]:
     """Rings after dt_s, and the layer speed they had, shape (n,). Exact in dt for a speed that falls as 1/R.
 
-    The current carries the centres: velocity in the face's frame, shape (3,) or (n, 3). `least_m` as in
-    `ring_velocity`.
+    The current carries the centres: velocity in the face's frame, shape (3,) or (n, 3). `least_m` and `stretch` as in
+    `packed_rings`.
     """
     thin = WALL_JET_SPREAD * rings.radius_m
-    speed = layer_speed(rings) * np.sqrt(thin / np.hypot(thin, least_m))
+    speed = layer_speed(rings) * thin / np.hypot(stretch * thin, least_m)
     radius = np.sqrt(rings.radius_m**2 + 2 * rings.radius_m * _LAYER_CONVECTION * speed * dt_s)
     centre = rings.centre_m + current_m_s[..., :2] * dt_s
     return Rings(centre, radius, rings.impulse_m4_s, rings.lean), speed

@@ -68,12 +68,13 @@ def sum_planes(points: Array, planes: Array, starts: IntArray, rings: Array, kin
             if many == 0:
                 continue
             o, a, b, c = planes[i, 0:3], planes[i, 3:6], planes[i, 6:9], planes[i, 9:12]
+            stretch = planes[i, 13] if planes[i, 13] > 0.0 else 1.0
             low[:], high[:] = 1e9, -1e9
             for p in range(group, end):
                 x, y, z = points[p, 0] - o[0], points[p, 1] - o[1], points[p, 2] - o[2]
                 px, py = a[0] * x + a[1] * y + a[2] * z, b[0] * x + b[1] * y + b[2] * z
                 height = planes[i, 12] - (c[0] * x + c[1] * y + c[2] * z)
-                height = abs(height) if planes[i, 13] > 0.0 else height
+                height = abs(height) / planes[i, 13] if planes[i, 13] > 0.0 else height
                 low[0], high[0] = min(low[0], px), max(high[0], px)
                 low[1], high[1] = min(low[1], py), max(high[1], py)
                 low[2] = min(low[2], height)
@@ -98,7 +99,7 @@ def sum_planes(points: Array, planes: Array, starts: IntArray, rings: Array, kin
                     px, py = a[0] * x + a[1] * y + a[2] * z, b[0] * x + b[1] * y + b[2] * z
                     height = planes[i, 12] - (c[0] * x + c[1] * y + c[2] * z)
                     flip[p] = -1.0 if planes[i, 13] > 0.0 and height < 0.0 else 1.0
-                    height = max(flip[p] * height, 0.0)
+                    height = max(flip[p] * height, 0.0) / stretch
                     X[p], Y[p], H[p] = px, py, height
                     low[0], high[0] = min(low[0], px), max(high[0], px)
                     low[1], high[1] = min(low[1], py), max(high[1], py)
@@ -115,7 +116,7 @@ def sum_planes(points: Array, planes: Array, starts: IntArray, rings: Array, kin
                     elif seen[q] > _ZERO:
                         _add_ring(rings[near[q]], lanes, X, Y, H, U, V, W)
                 for p in range(n):
-                    u, v, up = U[p], V[p], W[p] * flip[p]
+                    u, v, up = U[p], V[p], W[p] * flip[p] * stretch
                     out[block + p, 0] += u * a[0] + v * b[0] - up * c[0]
                     out[block + p, 1] += u * a[1] + v * b[1] - up * c[1]
                     out[block + p, 2] += u * a[2] + v * b[2] - up * c[2]
@@ -166,7 +167,7 @@ def _add_ring(ring: Array, lanes: int, X: Array, Y: Array, H: Array, U: Array, V
         above = h * _PER_SPREAD / stretch
         slope = _exp(-_HALF * above * above)
         thick = _THICK * stretch * (_ONE - _erf_rest(above) * slope) if H[p] > _ZERO else _ZERO
-        g = strength * _exp(-_HALF * _PER_L2 * t * t - h) * (z + _ONE) * inverse / math.sqrt(stretch)
+        g = strength * _exp(-_HALF * _PER_L2 * t * t - h) * (z + _ONE) * inverse / stretch
         g = g if z > _Z_MIN and z < _Z_MAX and h < _H_MAX else _ZERO
         radial = g * (slope - thick)
         U[p] += dx * radial
@@ -189,7 +190,7 @@ def _add_ring_on_plane(ring: Array, lanes: int, X: Array, Y: Array, U: Array, V:
         z = r2 * per_r * shrunk * per_R
         inverse = _ONE / (z * z * (z + _ONE))
         t = _log((z - _ONE) * z * z * inverse)
-        slower = _ONE / math.sqrt(math.sqrt(_ONE + least2 * shrunk * shrunk))
+        slower = _ONE / math.sqrt(_ONE + least2 * shrunk * shrunk)
         g = strength * slower * _exp(-_HALF * _PER_L2 * t * t) * (z + _ONE) * inverse
         g = g if z > _Z_MIN and z < _Z_MAX else _ZERO
         U[p] += dx * g
@@ -251,7 +252,8 @@ def _feel(
         r = math.sqrt(dx * dx + dy * dy)
         near, far = max(r - about, _ZERO), r + about
         # The box is seen from the ring's centre within an angle of its middle, whose sine is s.
-        per_r = _ONE / max(r, about)
+        away: Any = max(r, about)
+        per_r = _ONE / away
         s = about * per_r
         c = math.sqrt(_ONE - s * s)
         cosine = (dx * HX[j] + dy * HY[j]) * per_r

@@ -16,6 +16,7 @@ from wakewise.tank.closure import PLAIN, SWIRLING
 from wakewise.tank.currents import build_ambient
 from wakewise.tank.grains import speed_at_stress_m_s
 from wakewise.tank.induction import impulse_velocity
+from wakewise.tank.instant import Instant
 from wakewise.tank.measuring import TargetProbes, WaterMeasure
 from wakewise.tank.plant import VehiclePlant
 from wakewise.tank.probes import surface_points
@@ -84,7 +85,7 @@ class Tank:
             failures=settings.failures,
             tether=_tether(settings),
         )
-        self.water = Water(
+        self._water = Water(
             vehicle.disk_areas_m2,
             density_kg_m3=settings.density_kg_m3,
             bed_z_m=depth,
@@ -106,7 +107,7 @@ class Tank:
         )
         self._silt = Silt(laws, settings.silt, settings.size_m, settings.max_silt_particles, silt_rng)
         self._silt.suspend(1e-3 * settings.suspended_mg_l, target.centre_W_m)
-        self._silt_moves = Beside()
+        self._water_moves, self._silt_moves = Beside(), Beside()
         _say_when_it_clears(settings, laws)
         self._stirring_speed = _STIRRING_SHARE * speed_at_stress_m_s(
             laws.threshold_Pa / settings.density_kg_m3, SHEAR_HEIGHT_M, laws.grain_m
@@ -117,7 +118,6 @@ class Tank:
         self._flow_time = 0.0
         self._flow_steps = 0
         self._silt_every = max(1, math.floor(_SILT_STEP_S / settings.flow_step_s + 1e-9))
-        # The silt moves with the water of the middle of its step, while the water goes on to the step's end.
         self._silt_middle = -(-self._silt_every // 2) % self._silt_every
         self._disks_before_m = self._plant.disks()[0]
         # The water at the disks is looked at once for each of its own steps.
@@ -129,9 +129,16 @@ class Tank:
 
     @property
     def silt(self) -> Silt:
-        """Silt on the bed and in the water."""
+        """Silt on the bed and in the water, when its step under way is done."""
+        self._water_moves.wait()
         self._silt_moves.wait()
         return self._silt
+
+    @property
+    def water(self) -> Water:
+        """The water, when its step under way is done."""
+        self._water_moves.wait()
+        return self._water
 
     @property
     def time_s(self) -> float:
@@ -238,32 +245,30 @@ class Tank:
             self._sensors.sample(self._time, self._plant.state, self._plant.force_B_m_s2, self._turbidity_per_m)
 
     def _move_water(self) -> None:
+        """Start the water's step; the vehicle does not wait for it, whoever asks for `water` or `silt` does."""
         origins, axes = self._plant.disks()
-        dt_s = self.settings.flow_step_s
-        self.water.step(dt_s, self._disks_before_m, origins, axes, self._plant.take_impulse_N_s())
-        self._disks_before_m = origins
+        dt_s, before, impulses = self.settings.flow_step_s, self._disks_before_m, self._plant.take_impulse_N_s()
         self._flow_steps += 1
+        # The silt moves with the water of the middle of its step, while the water goes on to the step's end.
+        middle = self._muddy and self._flow_steps % self._silt_every == self._silt_middle
+
+        def move() -> None:
+            self._water.step(dt_s, before, origins, axes, impulses)
+            if middle:
+                now = self._water.now
+                self._silt_moves.start(lambda: self._move_silt(now))
+
+        self._water_moves.start(move)
+        self._disks_before_m = origins
         if self._inflow is not None:
             self._inflow = self._inflow_W_m_s()
-        if self._muddy:
-            self._move_silt()
+        if self._muddy and self._flow_steps % round(_TURBIDITY_EVERY_S / dt_s) == 0:
+            self._turbidity_per_m = self._probes.turbidity_per_m(self.silt.laws, self._silt_grid())
         self._measured = None
 
-    def _move_silt(self) -> None:
-        """Start the silt's step in its middle, have it done at its end."""
-        dt_s = self.settings.flow_step_s
-        if self._flow_steps % self._silt_every == self._silt_middle:
-            water, step_s = self.water.now, self._silt_every * dt_s
-
-            def move() -> None:
-                circles = np.concatenate([water.stirred_bed(self._stirring_speed), self.ambient.stirred_bed()])
-                self._silt.step(water, circles, step_s)
-
-            self._silt_moves.start(move)
-        if self._flow_steps % self._silt_every == 0:
-            self._silt_moves.wait()
-            if self._flow_steps % round(_TURBIDITY_EVERY_S / dt_s) == 0:
-                self._turbidity_per_m = self._probes.turbidity_per_m(self._silt.laws, self._silt_grid())
+    def _move_silt(self, now: Instant) -> None:
+        circles = np.concatenate([now.stirred_bed(self._stirring_speed), self.ambient.stirred_bed()])
+        self._silt.step(now, circles, self._silt_every * self.settings.flow_step_s)
 
 
 def _tether(settings: TankSettings) -> Tether | None:

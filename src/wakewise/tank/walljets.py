@@ -87,8 +87,8 @@ class WallJets:
         at = 0
         for (plane, rings), frame, place in zip(self._rings.items(), frames, places, strict=True):
             current, at = _to_plane(carried[at : at + rings.count], frame), at + rings.count
-            thickness = plane.thickness_m if isinstance(plane, Sheet) else 0.0
-            wider, layer = grown(rings, current, dt_s, thickness)
+            thickness, stretch = (plane.thickness_m, plane.stretch) if isinstance(plane, Sheet) else (0.0, 1.0)
+            wider, layer = grown(rings, current, dt_s, thickness, stretch)
             rest = rest_speed_m_s * (_SHEET_REST if isinstance(plane, Sheet) else _REST)
             keep = (layer >= rest) & (wider.radius_m < self._reach_m) & _inside(place, rings.radius_m, self._faces)
             if not keep.all():
@@ -121,7 +121,7 @@ class WallJets:
             if isinstance(plane, Face):
                 rows.append(with_ring_images(packed_rings(rings, 0.0, self._per_height[plane]), plane, self._room))
             else:
-                rows.append(packed_rings(rings, plane.thickness_m))
+                rows.append(packed_rings(rings, plane.thickness_m, stretch=plane.stretch))
             planes.append(plane.frame[None])
         starts = np.cumsum([len(row) for row in rows])
         return WallRows(np.concatenate(planes), starts, np.concatenate(rows))

@@ -34,7 +34,7 @@ from wakewise.tank.parcels import GUST_PER_TURBULENCE, MERGE_SPACING, Parcels, m
 from wakewise.tank.walljets import WallJets
 
 _MANY = 800  # parcels; with more, old ones of different jets merge over distances that grow in proportion
-_THIN_EVERY = 2  # steps after which rows are looked through for what may become one
+_ACROSS_EVERY = 2  # steps after which different jets and rings are looked through for what may become one
 _ANSWER_EVERY = 2  # steps after which the body's answer to what carries parcels is found anew
 _STEEPEST_GRAZE = math.sin(math.radians(10))  # parcels that come in flatter than this slide along the face
 
@@ -200,8 +200,7 @@ class Water:
         self._emit(dt_s, origins_before_m, origins_m, axes_W, impulses_N_s)
         self._meet()
         self._strike()
-        if self._steps % _THIN_EVERY == 0:
-            self._thin()
+        self._thin()
         self._time += dt_s
         self._now = None
         self._steps += 1
@@ -309,9 +308,10 @@ class Water:
 
     def _thin(self) -> None:
         """Keep rows no finer than their parcels need, and the number of parcels bounded."""
-        rows = merged(self._parcels, MERGE_SPACING)
-        self._parcels = merged_across(rows, MERGE_SPACING * max(1.0, rows.count / _MANY))
-        self._walls.thin()
+        self._parcels = merged(self._parcels, MERGE_SPACING)
+        if self._steps % _ACROSS_EVERY == 0:
+            self._parcels = merged_across(self._parcels, MERGE_SPACING * max(1.0, self._parcels.count / _MANY))
+            self._walls.thin()
         spacing = MERGE_SPACING
         while self._parcels.count > self._max_parcels:
             spacing *= 1.5
