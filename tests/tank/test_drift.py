@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from wakewise.tank.closure import PLAIN, SWIRLING, bent_spread, carried_share, disk_share, travel
+from wakewise.tank.closure import PLAIN, SWIRLING, across_row_m_s, bent_spread, carried_share, share_left, travel
 from wakewise.tank.drift import EMISSION_SPACING, HELD_S, drifted, due, slugs
 from wakewise.tank.faces import Room
 from wakewise.tank.parcels import Parcels
@@ -32,13 +32,16 @@ def test_the_compiled_step_is_the_closure_as_written(spreading):
     rng = np.random.default_rng(0)
     parcels, dt_s = _parcels(rng), 0.05
     u, ambient = rng.normal(0, 0.3, (200, 3)), rng.normal(0, 0.05, (200, 3))
-    position, sigma, speed = drifted(parcels, u, ambient, dt_s, spreading, ())
+    position, sigma, kept, speed = drifted(parcels, u, ambient, dt_s, spreading, ())
     own = carried_share(parcels.sigma_m, parcels.diameter_m)[:, None] * u
     spread = bent_spread(spreading.spread, own, ambient - parcels.disk_m_s)
     length = np.linalg.norm(u, axis=1)
     path, size = travel(parcels.sigma_m, parcels.diameter_m, length, dt_s, spreading, spread)
-    share = disk_share(0.5 * (parcels.sigma_m + size), parcels.diameter_m)[:, None]
+    across = across_row_m_s(own, ambient - parcels.disk_m_s)
+    left = share_left(parcels.sigma_m, size, parcels.diameter_m, across, dt_s)
+    share = (0.5 * (1 + left) * parcels.share)[:, None]
     carried = ambient + share * (parcels.disk_m_s - ambient)
+    assert kept == pytest.approx(left * parcels.share, rel=1e-12)
     assert speed == pytest.approx(length, rel=1e-12)
     assert sigma == pytest.approx(size, rel=1e-12)
     assert position == pytest.approx(parcels.position_m + (path / length)[:, None] * u + carried * dt_s, abs=1e-12)
@@ -48,7 +51,7 @@ def test_nothing_ends_up_behind_a_face():
     """Parcels pushed through walls, bed or surface come back mirrored."""
     rng = np.random.default_rng(1)
     parcels, room = _parcels(rng), Room.of(1.5, (1.0, 1.0), surface=True)
-    position, _, _ = drifted(parcels, rng.normal(0, 4.0, (200, 3)), np.zeros((200, 3)), 0.1, PLAIN, room.faces)
+    position, *_ = drifted(parcels, rng.normal(0, 4.0, (200, 3)), np.zeros((200, 3)), 0.1, PLAIN, room.faces)
     assert np.all(np.abs(position[:, :2]) <= 1.0) and np.all((position[:, 2] >= 0.0) & (position[:, 2] <= 1.5))
 
 

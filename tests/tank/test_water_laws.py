@@ -72,15 +72,14 @@ def test_after_a_stop_the_wake_dies_as_in_the_lattice():
     assert lasted[:, 1] == pytest.approx([19.8, 25.7, 33.0], rel=0.25)
 
 
-@pytest.mark.parametrize("current_m_s", [0.06, 0.1])
+@pytest.mark.parametrize("current_m_s", [0.06, 0.1, 0.15])
 def test_a_jet_bends_in_a_crossflow_as_measured(current_m_s):
     """The path is z/lM = C (x/lM)^(1/2) near and C (x/lM)^(1/3) far, lM = sqrt(M)/U, with C as in Fischer et al.
 
     H. B. Fischer et al., Mixing in Inland and Coastal Waters, Academic Press 1979, have C from 1.8 to 2.5 near and
-    from 1.4 to 2.1 far, here held to 8 %; slopes in between.
+    from 1.4 to 2.1 far, the latter held to 4 %; slopes in between. 0.15 m/s is a fourth of the exit speed.
 
-    Not met, and not tested: at 0.15 m/s, a fourth of the exit speed, C is 2.7 near and 2.4 far; and the path of Fearn
-    and Weston (1974) lies lower by 1.0, 1.26 and 1.6 times at 0.06, 0.1 and 0.15 m/s.
+    Not met, and not tested: the path of Fearn and Weston (1974) lies lower, 1.0, 1.2 and 1.4 times at the three speeds.
     """
     water = _water(current_W_m_s=np.array([current_m_s, 0.0, 0.0]))
     length = math.sqrt(1.0 / DENSITY) / current_m_s
@@ -94,8 +93,8 @@ def test_a_jet_bends_in_a_crossflow_as_measured(current_m_s):
     near, far = np.array([0.1, 0.2, 0.5]), np.array([2.0, 3.0, 4.0])
     constant_near = [height(x) / x**0.5 for x in near]
     constant_far = [height(x) / x ** (1 / 3) for x in far]
-    assert min(constant_near) > 1.8 / 1.08 and max(constant_near) < 2.5 * 1.08
-    assert min(constant_far) > 1.4 / 1.08 and max(constant_far) < 2.1 * 1.08
+    assert min(constant_near) > 1.8 and max(constant_near) < 2.5
+    assert min(constant_far) > 1.4 and max(constant_far) < 2.1 * 1.04
     slope = math.log(height(4.0) / height(2.0)) / math.log(2.0)
     assert slope == pytest.approx(1 / 3, abs=0.06)
 

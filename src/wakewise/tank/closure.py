@@ -12,10 +12,13 @@ doi 10.1017/S002211209400323X). A propeller's swirling jet is about twice as wid
 Roemisch 1977, Blaauw and van de Kaa 1978: profiles exp(-22.2 (r/x)^2) and exp(-15.4 (r/x)^2), sigma 0.15 and 0.18 x).
 
 In a current, a jet's water starts with the velocity of its disk and takes on the current's with what it entrains: of
-the volume flux Q at a place the share Q0/Q came through the disk, eta in the core and D/(4 sigma) beyond. Once bent
-over, so that it moves sideways to its own length, a jet spreads as a line puff does: the radius 2 sigma of a top-hat
-profile grows by 0.34 of the path (J. H. W. Lee and V. H. Chu, Turbulent Jets and Plumes: A Lagrangian Approach, Kluwer
-2003). In between both add up, each weighted with how much of the motion is along the row and across it.
+the volume flux Q at a place the share Q0/Q came through the disk, eta in the core and D/(4 sigma) beyond where the jet
+entrains by its own motion only. A strong current blows more into its side than it would draw in: 2 b U across per
+length, b = 2 sigma the top-hat radius and U the current across the row; the larger of the two counts (projected area
+entrainment: J. H. W. Lee and V. Cheung 1990, J. Environ. Eng. 116, 1085, and the book below; both from memory). Once
+bent over, so that it moves sideways to its own length, a jet spreads as a line puff does: the radius 2 sigma of a
+top-hat profile grows by 0.34 of the path (J. H. W. Lee and V. H. Chu, Turbulent Jets and Plumes: A Lagrangian Approach,
+Kluwer 3). In between both add up, each weighted with how much of the motion is along the row and across it.
 """
 
 from __future__ import annotations
@@ -73,6 +76,18 @@ def disk_share(sigma_m: Array, diameter_m: Array) -> Array:
     return np.minimum(share, 1.0)
 
 
+def share_left(sigma_m: Array, grown_m: Array, diameter_m: Array, across_m_s: Array, dt_s: float) -> Array:
+    """Part of a parcel's disk water, shape (n,), that is not yet diluted after a step in which it grew.
+
+    The smaller of what its own entrainment leaves and of what a current across the row, shape (n,), does: dQ = 2 b U
+    times the length of row that passes leaves exp(-U dt / (pi sigma)).
+    """
+    own = disk_share(grown_m, diameter_m) / disk_share(sigma_m, diameter_m)
+    blown = np.exp(-across_m_s * dt_s / (math.pi * 0.5 * (sigma_m + grown_m)))
+    left: Array = np.minimum(own, blown)
+    return left
+
+
 def travel(
     sigma_m: Array,
     diameter_m: Array,
@@ -102,6 +117,14 @@ def travel(
     after = np.sqrt(start**2 + wide * start * speed_m_s * left_s)
     path = np.where(core, (start - sigma_m) / spreading.core_spread, 0.0) + (after - start) / wide
     return path, after
+
+
+def across_row_m_s(own_m_s: Array, past_m_s: Array) -> Array:
+    """Speed of the water past the disk across the row, shape (n,); arguments as in `bent_spread`."""
+    row = own_m_s + past_m_s
+    along = np.einsum("ni,ni->n", row, past_m_s) ** 2 / np.maximum(np.einsum("ni,ni->n", row, row), 1e-20)
+    across: Array = np.sqrt(np.maximum(np.einsum("ni,ni->n", past_m_s, past_m_s) - along, 0.0))
+    return across
 
 
 def bent_spread(spread: float, own_m_s: Array, past_m_s: Array) -> Array:

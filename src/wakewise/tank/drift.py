@@ -40,8 +40,8 @@ def due(flow: Array, held_s: Array, sigma: Array, dt_s: float) -> IntArray:
 
 def drifted(
     parcels: Parcels, u_m_s: Array, ambient_m_s: Array, dt_s: float, spreading: Spreading, faces: tuple[Face, ...]
-) -> tuple[Array, Array, Array]:
-    """Where parcels are after dt_s, their size, and the jets' speed where they were: shapes (n, 3), (n,), (n,).
+) -> tuple[Array, Array, Array, Array]:
+    """Where parcels are after dt_s, shape (n, 3), their size, their disk's share, and the jets' speed where they were.
 
     Parameters
     ----------
@@ -53,11 +53,12 @@ def drifted(
     faces : tuple of Face
         A parcel that would end behind one is mirrored in it.
     """
-    position, sigma, speed = parcels.position_m.copy(), parcels.sigma_m.copy(), np.empty(parcels.count)
+    position, sigma, share = parcels.position_m.copy(), parcels.sigma_m.copy(), parcels.share.copy()
+    speed = np.empty(parcels.count)
     walls = np.array([(face.axis, face.side, face.at_m) for face in faces], dtype=np.float64).reshape(-1, 3)
     laws = np.array([spreading.core_spread, spreading.spread, max(PUFF_SPREAD, spreading.spread), dt_s])
-    _drift(position, sigma, speed, parcels.diameter_m, parcels.disk_m_s, u_m_s, ambient_m_s, laws, walls)
-    return position, sigma, speed
+    _drift(position, sigma, share, speed, parcels.diameter_m, parcels.disk_m_s, u_m_s, ambient_m_s, laws, walls)
+    return position, sigma, share, speed
 
 
 def gust_memory(sigma_m: Array, speed_m_s: Array, dt_s: float) -> Array:
@@ -70,6 +71,7 @@ def gust_memory(sigma_m: Array, speed_m_s: Array, dt_s: float) -> Array:
 def _drift(
     X: Array,
     sigma: Array,
+    share: Array,
     speed: Array,
     D: Array,
     disk: Array,
@@ -85,11 +87,12 @@ def _drift(
         core = s < end
         eta = (first / s) ** 2 if core else 0.5
         # A row that is bent over spreads as a puff.
-        rr = ro = oo = 0.0
+        rr = ro = oo = rp = pp = 0.0
         for k in range(3):
-            own = eta * u[i, k]
-            row = own + ambient[i, k] - disk[i, k]
+            own, past = eta * u[i, k], ambient[i, k] - disk[i, k]
+            row = own + past
             rr, ro, oo = rr + row * row, ro + row * own, oo + own * own
+            rp, pp = rp + row * past, pp + past * past
         sine2 = min(max(1.0 - ro * ro / max(rr * oo, 1e-30), 0.0), 1.0) if rr * oo > 1e-20 else 0.0
         wide = spread * math.sqrt(1.0 - sine2) + puff * math.sqrt(sine2)
         # `closure.travel`
@@ -103,12 +106,16 @@ def _drift(
             path = (start - s) / core_spread
         after = math.sqrt(start * start + wide * start * speed[i] * left_s)
         path += (after - start) / wide
-        # `closure.disk_share` half way
-        middle = 0.5 * (s + after)
-        share = min((first / middle) ** 2 if middle < end else 0.25 * D[i] / middle, 1.0)
+        # `closure.share_left`; the mean of the step's ends counts.
+        before = min((first / s) ** 2 if core else 0.25 * D[i] / s, 1.0)
+        grown = min((first / after) ** 2 if after < end else 0.25 * D[i] / after, 1.0)
+        across = math.sqrt(max(pp - rp * rp / max(rr, 1e-20), 0.0))
+        left = min(grown / before, math.exp(-across * dt_s / (math.pi * 0.5 * (s + after))))
+        kept = 0.5 * share[i] * (1.0 + left)
+        share[i] *= left
         step = path / max(speed[i], 1e-12)
         for k in range(3):
-            X[i, k] += step * u[i, k] + (ambient[i, k] + share * (disk[i, k] - ambient[i, k])) * dt_s
+            X[i, k] += step * u[i, k] + (ambient[i, k] + kept * (disk[i, k] - ambient[i, k])) * dt_s
         sigma[i] = after
         # A mirrored world is mirrored again: nothing ends up behind a face.
         for f in range(walls.shape[0]):

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from wakewise.arrays import Array, IntArray
-from wakewise.tank.closure import first_sigma_m
+from wakewise.tank.closure import disk_share, first_sigma_m
 from wakewise.tank.faces import Room
 from wakewise.tank.induction import impulse_velocity
 
@@ -42,6 +42,8 @@ class Parcels:
         Turbulent share of the impulse, a standard normal variable before scaling.
     disk_m_s : ndarray, shape (n, 3)
         Velocity of the disk when it was sent: its water starts with it and loses it to what is entrained.
+    share : ndarray, shape (n,)
+        Of the parcel's water, what came through the disk.
     flow_m_s : ndarray, shape (n, 3)
         Velocity of the jets' water there when it was last looked at.
     held_s : ndarray, shape (n,)
@@ -55,6 +57,7 @@ class Parcels:
     stream: IntArray
     gust: Array
     disk_m_s: Array
+    share: Array
     flow_m_s: Array
     held_s: Array
 
@@ -62,7 +65,8 @@ class Parcels:
     def none(cls) -> Parcels:
         """No parcels at all: still water."""
         v = np.zeros((0, 3))
-        return cls(v, v, np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64), v, v, v, np.zeros(0))
+        s = np.zeros(0)
+        return cls(v, v, s, s, np.zeros(0, dtype=np.int64), v, v, s, v, s)
 
     @classmethod
     def sent(
@@ -76,9 +80,9 @@ class Parcels:
         disk_m_s: Array,
     ) -> Parcels:
         """New ones, at which the water has not been looked at yet."""
-        never = np.full(len(sigma_m), np.inf)
-        flow = np.zeros((len(sigma_m), 3))
-        return cls(position_m, impulse_m4_s, sigma_m, diameter_m, stream, gust, disk_m_s, flow, never)
+        never, flow = np.full(len(sigma_m), np.inf), np.zeros((len(sigma_m), 3))
+        share = disk_share(sigma_m, diameter_m)
+        return cls(position_m, impulse_m4_s, sigma_m, diameter_m, stream, gust, disk_m_s, share, flow, never)
 
     @property
     def count(self) -> int:
@@ -184,13 +188,13 @@ def _merged(parcels: Parcels, order: IntArray, label: IntArray, spacing: float) 
     """Walk through parcels in an order; each may take up the one before it with the same label."""
     position, impulse = parcels.position_m.copy(), parcels.impulse_m4_s.copy()
     sigma, gust, disk = parcels.sigma_m.copy(), parcels.gust.copy(), parcels.disk_m_s.copy()
-    flow, held = parcels.flow_m_s.copy(), parcels.held_s.copy()
+    share, flow, held = parcels.share.copy(), parcels.flow_m_s.copy(), parcels.held_s.copy()
     keep = np.ones(parcels.count, dtype=np.bool_)
     labels = int(label[order].max()) + 1
     reach = spacing * row_widening(sigma, parcels.diameter_m)
-    if not _merge_pairs(order, position, impulse, sigma, gust, disk, flow, held, label, labels, reach, keep):
+    if not _merge_pairs(order, position, impulse, sigma, gust, disk, share, flow, held, label, labels, reach, keep):
         return parcels
-    out = Parcels(position, impulse, sigma, parcels.diameter_m, parcels.stream, gust, disk, flow, held)
+    out = Parcels(position, impulse, sigma, parcels.diameter_m, parcels.stream, gust, disk, share, flow, held)
     return out.take(keep)
 
 
@@ -202,6 +206,7 @@ def _merge_pairs(
     sigma: Array,
     gust: Array,
     disk: Array,
+    share: Array,
     flow: Array,
     held: Array,
     label: IntArray,
@@ -225,7 +230,8 @@ def _merge_pairs(
             continue
         p = a / (a + b)
         q = 1 - p
-        sigma[j], held[j] = p * sigma[i] + q * sigma[j], max(held[i], held[j])
+        sigma[j], share[j] = p * sigma[i] + q * sigma[j], p * share[i] + q * share[j]
+        held[j] = max(held[i], held[j])
         for k in range(3):
             X[j, k] = p * X[i, k] + q * X[j, k]
             disk[j, k] = p * disk[i, k] + q * disk[j, k]
