@@ -11,7 +11,7 @@ from wakewise.tank.beside import Beside
 def test_work_is_done_when_waited_for(monkeypatch, cores):
     """After `wait` everything that was started has been done, in order, however many cores there are."""
     monkeypatch.setattr("os.cpu_count", lambda: cores)
-    beside, done = Beside(), []
+    beside, done = Beside("work"), []
     for k in range(5):
         beside.start(lambda k=k: done.append((k, threading.current_thread() is threading.main_thread())))
     beside.wait()
@@ -22,7 +22,7 @@ def test_work_is_done_when_waited_for(monkeypatch, cores):
 def test_what_went_wrong_is_raised_once(monkeypatch):
     """An error of the work comes out of `wait`; afterwards new work may begin."""
     monkeypatch.setattr("os.cpu_count", lambda: 2)
-    beside, done = Beside(), []
+    beside, done = Beside("work"), []
     beside.start(lambda: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         beside.wait()

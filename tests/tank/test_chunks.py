@@ -1,5 +1,7 @@
 """Splitting a sum among threads changes neither a byte nor what is computed."""
 
+import multiprocessing
+import os
 import threading
 
 import numpy as np
@@ -39,3 +41,28 @@ def test_an_error_in_a_piece_is_told(monkeypatch):
     points = np.linspace(0.0, 1.0, 3 * 2000).reshape(2000, 3)
     with pytest.raises(ValueError, match="no such point"):
         over_points(kernel, points, np.zeros_like(points), chunks._THREADED_PAIRS)
+
+
+def _sum_in_child(queue):
+    points = np.ones((5000, 3))
+    out = np.zeros_like(points)
+    over_points(lambda some, result: np.copyto(result, 2.0 * some), points, out, chunks._THREADED_PAIRS)
+    queue.put(float(out.sum()))
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
+def test_a_forked_child_has_threads_of_its_own(monkeypatch):
+    """After sums on threads in the parent, a forked child sums as well instead of waiting for threads it has not."""
+    monkeypatch.setattr("os.cpu_count", lambda: 3)
+    forking = multiprocessing.get_context("fork")
+    queue = forking.Queue()
+    _sum_in_child(queue)
+    assert queue.get(timeout=20) == 30000.0
+    child = forking.Process(target=_sum_in_child, args=(queue,))
+    child.start()
+    try:
+        assert queue.get(timeout=20) == 30000.0
+    finally:
+        child.kill()
+        child.join()

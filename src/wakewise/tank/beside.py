@@ -3,42 +3,31 @@
 from __future__ import annotations
 
 import os
-import threading
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 
 
 class Beside:
     """Starts work and waits for it; with one core the work is done at once.
 
-    A thread lives for one piece of work only: one that waited for the next would not survive a fork, and one that
-    waited by spinning would take its core from other trials.
+    The thread sleeps between two pieces of work and ends with its owner. Starting one for each piece would make the
+    caller wait until it runs, for up to a millisecond.
     """
 
-    def __init__(self) -> None:
-        self._thread: threading.Thread | None = None
-        self._failure: BaseException | None = None
+    def __init__(self, name: str) -> None:
+        self._pool = ThreadPoolExecutor(1, thread_name_prefix=name) if (os.cpu_count() or 1) > 1 else None
+        self._under_way: Future[None] | None = None
 
     def start(self, work: Callable[[], None]) -> None:
         """Begin a piece of work, after the one before it has ended."""
         self.wait()
-        if (os.cpu_count() or 1) == 1:
+        if self._pool is None:
             work()
-            return
-
-        def run() -> None:
-            try:
-                work()
-            except BaseException as failure:  # handed on by `wait`
-                self._failure = failure
-
-        self._thread = threading.Thread(target=run, name="wakewise-silt")
-        self._thread.start()
+        else:
+            self._under_way = self._pool.submit(work)
 
     def wait(self) -> None:
         """Return when the work has ended; what it raised is raised here."""
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
-        if self._failure is not None:
-            failure, self._failure = self._failure, None
-            raise failure
+        if self._under_way is not None:
+            ended, self._under_way = self._under_way, None
+            ended.result()

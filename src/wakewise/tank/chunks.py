@@ -5,13 +5,15 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
+from functools import cache
 
 from wakewise.arrays import Array
 
 _CHUNK = 192  # least points of a piece
 _BLOCKS = 64
 _THREADED_PAIRS = 700_000  # about 0.7 ms of work; below it threads cost more than they save
+_MOST = 8  # threads
 _PIECES = 4  # per thread: they are not all as long
 
 
@@ -19,12 +21,11 @@ def over_points(kernel: Callable[[Array, Array], None], points: Array, out: Arra
     """Call `kernel(points, out)` on all points, in pieces on several threads if there are many pairs.
 
     The kernel must release the interpreter's lock and compute each row of `out` from its own point alone, or from its
-    own block of successive points whose length divides 64; then the result does not depend on the pieces. Threads live
-    for one call only: a pool that waits by spinning takes the cores from other trials that run beside this one, and a
-    pool that stays does not survive a fork. The caller takes pieces, too: a thread that only waited would leave its
-    core to the one that it has just woken, and the others idle for the milliseconds that all this takes.
+    own block of successive points whose length divides 64; then the result does not depend on the pieces. The caller
+    takes pieces, too: a thread that only waited would leave its core to the one that it has just woken, and the others
+    idle for the milliseconds that all this takes.
     """
-    if pairs < _THREADED_PAIRS or len(points) < 2 * _CHUNK or (workers := min(os.cpu_count() or 1, 8)) == 1:
+    if pairs < _THREADED_PAIRS or len(points) < 2 * _CHUNK or (workers := min(os.cpu_count() or 1, _MOST)) == 1:
         kernel(points, out)
         return
     # Whole blocks: kernels may look up to `_BLOCKS` successive points up together.
@@ -39,8 +40,23 @@ def over_points(kernel: Callable[[Array, Array], None], points: Array, out: Arra
                 return
             kernel(points[s : s + size], out[s : s + size])
 
-    with ThreadPoolExecutor(workers - 1) as pool:
-        others = [pool.submit(take_pieces) for _ in range(workers - 1)]
+    others = [_helpers().submit(take_pieces) for _ in range(workers - 1)]
+    try:
         take_pieces()
-        for other in others:
-            other.result()
+    finally:
+        # One that has not begun has nothing left to do.
+        begun = [other for other in others if not other.cancel()]
+        wait(begun)
+    for other in begun:
+        other.result()
+
+
+@cache
+def _helpers() -> ThreadPoolExecutor:
+    """Threads that sleep until there is work: waiting by spinning would take the cores from other trials."""
+    return ThreadPoolExecutor(_MOST - 1, thread_name_prefix="sums")
+
+
+# Threads do not survive a fork, where there is such a thing; the child starts its own.
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_helpers.cache_clear)

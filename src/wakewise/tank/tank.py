@@ -107,7 +107,7 @@ class Tank:
         )
         self._silt = Silt(laws, settings.silt, settings.size_m, settings.max_silt_particles, silt_rng)
         self._silt.suspend(1e-3 * settings.suspended_mg_l, target.centre_W_m)
-        self._water_moves, self._silt_moves = Beside(), Beside()
+        self._water_moves, self._silt_moves = Beside("water"), Beside("silt")
         _say_when_it_clears(settings, laws)
         self._stirring_speed = _STIRRING_SHARE * speed_at_stress_m_s(
             laws.threshold_Pa / settings.density_kg_m3, SHEAR_HEIGHT_M, laws.grain_m
