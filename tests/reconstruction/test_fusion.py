@@ -5,7 +5,7 @@ import pytest
 from relief import CENTRE, FOCAL, HEIGHT, WIDTH, height, photo, poses, texture
 
 from wakewise.geometry import Pose, look_at
-from wakewise.reconstruction.fusion import fuse, lonely, thin_mean
+from wakewise.reconstruction.fusion import facing_normals, fuse, lonely
 from wakewise.reconstruction.stereo import DepthMap, pair_depth, rectifiable, rectify_axes
 from wakewise.reconstruction.views import Ball, View, rank_partners
 
@@ -141,7 +141,8 @@ def test_kernel_equals_its_twin():
     maps = [random_map(k, rng) for k in range(5)]
     mean, votes, against = slow_votes(maps[2], [maps[k] for k in (0, 1, 3, 4)], 0.4)
     assert against.sum() > 0 and votes.max() >= 2
-    points, _, towards = fuse(maps, 2, [0, 1, 3, 4], 2, 0.4)
+    rows = fuse(maps, 2, [0, 1, 3, 4], 2, 0.4)
+    points, towards = rows[:, :3], rows[:, 6:]
     keep = maps[2].wanted & (votes >= 2) & (against <= votes)
     v, u = np.nonzero(keep)
     rays = np.stack([(u - 9.0) / 60, (v - 7.0) / 60, np.ones(len(u))], axis=1)
@@ -152,14 +153,22 @@ def test_kernel_equals_its_twin():
 
 def test_no_voters_no_points():
     """A map that nobody can confirm gives nothing."""
-    assert len(fuse([random_map(0, np.random.default_rng(0))], 0, [], 2, 1.0)[0]) == 0
+    assert len(fuse([random_map(0, np.random.default_rng(0))], 0, [], 2, 1.0)) == 0
 
 
-def test_lonely_points_are_found_and_cells_averaged():
-    """A stray point is lonely, points of an even sheet are not; a cell's points become their mean."""
+def test_lonely_points_are_found():
+    """A stray point is lonely, points of an even sheet are not."""
     x, y = np.meshgrid(np.arange(30.0), np.arange(30.0))
     sheet = np.stack([x.ravel(), y.ravel(), np.zeros(900)], axis=1)
     flags = lonely(np.concatenate([sheet, [[15.0, 15.0, 40.0]]]))
     assert flags[-1] and flags[:-1].mean() < 0.05
-    mean, values, count = thin_mean(np.array([[0.2, 0, 0], [0.4, 0, 0], [3, 0, 0]]), np.array([[1.0], [3], [5]]), 1.0)
-    assert np.allclose(mean[:, 0], [0.3, 3]) and values.ravel().tolist() == [2, 5] and count.tolist() == [2, 1]
+
+
+def test_normals_face_the_cameras_on_any_number_of_threads():
+    """Normals of a sheet stand on it, on the side told, the same bytes from one thread and from three."""
+    rng = np.random.default_rng(3)
+    sheet = np.column_stack([rng.random((500, 2)), np.zeros(500)])
+    towards = np.tile([0.0, 0.6, -0.8], (500, 1))
+    normals = facing_normals(sheet, towards)
+    assert np.allclose(normals, [0, 0, -1], atol=1e-6)
+    assert np.array_equal(normals, facing_normals(sheet, towards, threads=3))

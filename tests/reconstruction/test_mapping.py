@@ -1,12 +1,16 @@
 """Mapping by either mapper, with and without priors; what does not belong together is told."""
 
+import os
+import time
+
 import numpy as np
+import pycolmap
 import pytest
 from relief import FOCAL
 
 from wakewise.errors import InputError, StageError
 from wakewise.interfaces import no_progress
-from wakewise.reconstruction import ReconstructionSettings, read_photos, reconstruct
+from wakewise.reconstruction import Lens, ReconstructionSettings, colmap, read_photos, reconstruct
 from wakewise.reconstruction.features import match_photos
 from wakewise.reconstruction.mapping import map_photos
 from wakewise.reconstruction.pairs import choose_pairs
@@ -108,7 +112,6 @@ def test_two_photos_are_enough(relief_photos, tmp_path):
 def test_photos_of_one_size_share_a_camera_and_others_have_their_own(relief_photos, tmp_path, detector):
     """Four photos as they are and two made smaller are two cameras; one focal length cannot hold for both."""
     import cv2
-    import pycolmap
 
     folder, _ = relief_photos
     (tmp_path / "mixed").mkdir()
@@ -129,3 +132,69 @@ def test_photos_of_one_size_share_a_camera_and_others_have_their_own(relief_phot
     assert sizes == {f"{k:02d}.png": 240 if k % 3 == 1 else 320 for k in range(6)}
     with pytest.raises(InputError, match="different sizes"):
         match_photos(tmp_path / "mixed", photos, out, settings, focal_px=300.0, pairs=pairs, progress=no_progress)
+
+
+def test_names_may_have_spaces_and_numbers(relief_photos, tmp_path):
+    """Photos whose names COLMAP's list of pairs could not hold are matched, and keep their names."""
+    folder, _ = relief_photos
+    names = ["a photo (1).png", "2.png", "1.png"]
+    (tmp_path / "photos").mkdir()
+    for k, name in enumerate(names):
+        (tmp_path / "photos" / name).write_bytes((folder / f"{k:02d}.png").read_bytes())
+    photos, out = read_photos(tmp_path / "photos"), tmp_path / "database.db"
+    pairs = [(names[0], names[1]), (names[1], names[2])]
+    found = match_photos(tmp_path / "photos", photos, out, SETTINGS, focal_px=FOCAL, pairs=pairs, progress=no_progress)
+    assert found["verified_pairs"] == 2
+    link = pycolmap.Database.open(out)
+    assert sorted(image.name for image in link.read_all_images()) == sorted(names)
+    link.close()
+
+
+def test_a_disk_that_fills_ends_the_call_before_colmap_ends_the_process(tmp_path, monkeypatch):
+    """With less room than the reserve a call is cancelled and says why; the room it worked in is gone."""
+    monkeypatch.setattr(colmap, "RESERVE_MB", 1e15)
+    cancelled = []
+
+    def work(cancellation_token):
+        while not cancellation_token.is_cancelled:
+            time.sleep(0.01)
+        cancelled.append(True)
+
+    with pytest.raises(StageError, match=r"matching: the disk of .* is full"):
+        colmap.call(work, "matching", disk=tmp_path)
+    assert cancelled == [True]
+    with colmap.workroom(tmp_path / "database.db", 1e3) as room:
+        assert room.parent == tmp_path  # memory has no such reserve either
+    assert not room.exists()
+
+
+def test_a_killed_processs_room_in_memory_is_swept(tmp_path, monkeypatch):
+    """A database goes to memory when it is small; what a process that is gone left there is removed, no other's."""
+    monkeypatch.setattr(colmap, "MEMORY", tmp_path / "memory")
+    mine, dead = tmp_path / "memory" / f".wakewise-{os.getpid()}-a", tmp_path / "memory" / ".wakewise-999999999-b"
+    mine.mkdir(parents=True)
+    dead.mkdir()
+    with colmap.workroom(tmp_path / "database.db", 1e3) as room:
+        assert room.parent == tmp_path / "memory" and mine.exists() and not dead.exists()
+    with colmap.workroom(tmp_path / "database.db", 1e12) as room:
+        assert room.parent == tmp_path
+
+
+def test_a_given_camera_is_used_and_must_fit(relief_photos, tmp_path):
+    """A camera of another size is refused; one that is kept comes out as it went in."""
+    folder, truth = relief_photos
+    params = [FOCAL, FOCAL, 160.0, 120.0, 1e-9, 0.0, 0.0, 0.0]
+    centres = {name: X.p_m for name, X in truth.items()}
+    wrong = Lens(width=100, height=120, params=np.array(params))
+    with pytest.raises(InputError, match="100 x 120 px"):
+        reconstruct(folder, tmp_path, SETTINGS, lens=wrong)
+    lens = Lens(width=320, height=240, params=np.array(params))
+    with pytest.raises(InputError, match="not both"):
+        reconstruct(folder, tmp_path, SETTINGS, lens=lens, focal_px=FOCAL)
+    kept = SETTINGS.model_copy(
+        update={"detector": "colmap", "refine_camera": False, "mesh": False, "agreeing_views": 1}
+    )
+    model = reconstruct(folder, tmp_path, kept, lens=lens, reference_positions=centres)
+    assert model.registered_images == 6 and model.focal_px == FOCAL and model.cameras_rmse_mm < 2.0
+    camera = next(iter(pycolmap.Reconstruction(tmp_path / "sparse").cameras.values()))
+    assert camera.model.name == "OPENCV" and camera.params.tolist() == params

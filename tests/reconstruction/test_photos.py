@@ -9,9 +9,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from wakewise.errors import InputError
+from wakewise.errors import InputError, StageError
 from wakewise.reconstruction import match_references, read_photos, read_reference_cameras
-from wakewise.reconstruction.photos import decode, jpeg_is_whole, without_duplicates
+from wakewise.reconstruction.photos import PhotoStore, decode, jpeg_is_whole, png_is_whole, without_duplicates
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[3] / "shared" / "data"))
 
@@ -42,7 +42,7 @@ def test_what_is_no_folder_of_photos_is_named(tmp_path, what, capfd):
         "none": "notes.txt is none",
         "few": "holds 1 photos, at least 2",
         "broken": "b.png: is no image",
-        "cut": "b.png: is no image",
+        "cut": "b.png: is cut short",
     }[what]
     if what == "file":
         folder.write_text("x")
@@ -173,3 +173,38 @@ def test_references_match_by_name_or_stem():
     assert set(match_references(references, ["0.png", "1.jpg", "2.png", "9.png"])) == {"0.png", "1.jpg", "2.png"}
     with pytest.raises(InputError, match=r"2 of 3 photos .*0\.png for 0\.png"):
         match_references(references, ["0.png", "1.png", "x.png"])
+
+
+def test_a_png_is_whole_only_with_all_its_bytes():
+    """Any cut and any changed byte is noticed, what follows the end is not looked at."""
+    data = cv2.imencode(".png", np.random.default_rng(0).integers(0, 255, (9, 9, 3), dtype=np.uint8))[1].tobytes()
+    assert png_is_whole(data) and png_is_whole(data + b"tail")
+    assert not any(png_is_whole(data[:k]) for k in range(8, len(data)))
+    for k in range(8, len(data)):
+        assert not png_is_whole(data[:k] + bytes([data[k] ^ 1]) + data[k + 1 :])
+
+
+def test_images_of_other_kinds_and_folders_of_folders_are_told(tmp_path):
+    """A WebP under a JPEG's name, and photos one folder further down."""
+    (tmp_path / "a.jpg").write_bytes(cv2.imencode(".webp", np.zeros((9, 9, 3), np.uint8))[1].tobytes())
+    with pytest.raises(InputError, match=r"a\.jpg: holds an image of another kind than JPEG"):
+        read_photos(tmp_path)
+    (tmp_path / "all" / "left").mkdir(parents=True)
+    put(tmp_path / "all" / "left", "1.png", "2.png")
+    with pytest.raises(InputError, match=r"holds only folders \(left\)"):
+        read_photos(tmp_path / "all")
+
+
+def test_a_store_decodes_once_and_only_as_much_as_it_may_keep(tmp_path):
+    """What is kept outlives its file; what has no room is read again, and a file that went is told."""
+    put(tmp_path, "a.png", "b.png")
+    size = decode((tmp_path / "a.png").read_bytes()).nbytes
+    store = PhotoStore(tmp_path, most_bytes=size)
+    assert [photo.name for photo in read_photos(tmp_path, store, threads=1)] == ["a.png", "b.png"]
+    kept, other = store.image("a.png"), store.image("b.png")
+    assert kept is store.image("a.png") and not kept.flags.writeable and other is not store.image("b.png")
+    for name in ("a.png", "b.png"):
+        (tmp_path / name).unlink()
+    assert store.image("a.png") is kept
+    with pytest.raises(StageError, match=r"b\.png: can no longer be read"):
+        store.image("b.png")

@@ -29,6 +29,11 @@ Sets = Annotated[
     typer.Option("--set", metavar="FIELD=VALUE", help="Change one setting of the reconstruction, such as "
                  "matching=sequential (docs/scenario.md lists them); may be repeated."),
 ]  # fmt: skip
+Camera = Annotated[
+    Path | None,
+    typer.Option("--camera", help="Camera to begin with: COLMAP's cameras.txt or a folder that holds it, such as a "
+                 "trial's.", show_default=False),
+]  # fmt: skip
 Region = Annotated[
     tuple[float, float, float, float] | None,
     typer.Option("--region", metavar="X Y Z R", help="Dense points only within R of this place, m, in the references' "
@@ -42,6 +47,7 @@ def reconstruct_photos(
     out: Out = Path("runs/photos"),
     reference_cameras: References = None,
     focal_px: Focal = None,
+    camera: Camera = None,
     region: Region = None,
     sets: Sets = None,
     no_mesh: NoMesh = False,
@@ -54,7 +60,7 @@ def reconstruct_photos(
     import numpy as np
 
     from wakewise.operation.scenario import check_scenario, parse_overrides
-    from wakewise.reconstruction import read_reference_cameras, reconstruct
+    from wakewise.reconstruction import read_lens, read_reference_cameras, reconstruct
 
     changes = ({"mesh": False} if no_mesh else {}) | parse_overrides(sets or [])
     settings = check_scenario({"reconstruction": changes}, "--set").reconstruction
@@ -65,6 +71,7 @@ def reconstruct_photos(
             out,
             settings,
             focal_px=focal_px,
+            lens=read_lens(camera) if camera else None,
             reference_positions=references,
             region=(np.array(region[:3]), region[3]) if region else None,
             progress=progress,

@@ -176,7 +176,7 @@ def refine_icp(
     """
     target = small_gicp.PointCloud(np.asarray(surface_m, dtype=np.float64))
     # Estimating makes room for normals; the true ones then take their place.
-    small_gicp.estimate_normals(target, num_neighbors=10, num_threads=1)
+    small_gicp.estimate_normals(target, num_neighbors=10, num_threads=2)
     target.normals()[:, :3] = normals
     tree = small_gicp.KdTree(target, num_threads=1)
     source = small_gicp.voxelgrid_sampling(np.asarray(cloud_m, dtype=np.float64), voxel_m, num_threads=1)

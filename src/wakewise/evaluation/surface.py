@@ -139,7 +139,9 @@ def sample_surface(mesh: Mesh, crop: Crop, rng: np.random.Generator, samples: in
     return Surface(points_m=points[keep], normals=normals[keep])
 
 
-def count_views(surface: Surface, mesh: Mesh, centres_W_m: Array, min_cosine: float = 0.2) -> IntArray:
+def count_views(
+    surface: Surface, mesh: Mesh, centres_W_m: Array, min_cosine: float = 0.2, enough: int | None = None
+) -> IntArray:
     """How many cameras saw each sample: nothing of the mesh in between, and not at a grazing angle.
 
     Parameters
@@ -148,20 +150,25 @@ def count_views(surface: Surface, mesh: Mesh, centres_W_m: Array, min_cosine: fl
         True camera centres; every camera is taken to look at the target.
     min_cosine : float
         Smallest cosine between the outward normal and the way to the camera (0.2 is 78 degrees).
+    enough : int, optional
+        Stop looking for more cameras where so many are found, which is most of the work.
     """
     scene = rtcore_scene.EmbreeScene()
     TriangleMesh(scene, np.asarray(mesh.vertices_m, dtype=np.float32)[np.asarray(mesh.faces)])
     start = surface.points_m + 5e-4 * surface.normals
     seen = np.zeros(len(start), dtype=np.int64)
+    open_rows = np.arange(len(start))
     for centre in np.asarray(centres_W_m, dtype=np.float64):
-        way = centre - start
-        length = np.linalg.norm(way, axis=1)
-        rows = np.flatnonzero(np.einsum("ij,ij->i", way, surface.normals) > min_cosine * length)
+        way = centre - start[open_rows]
+        length = np.sqrt(np.einsum("ij,ij->i", way, way))
+        facing = np.einsum("ij,ij->i", way, surface.normals[open_rows]) > min_cosine * length
+        rows = open_rows[facing]
         if len(rows):
-            hit = scene.run(
-                start[rows].astype(np.float32), (way[rows] / length[rows, None]).astype(np.float32), query="OCCLUDED"
-            )
+            to = (way[facing] / length[facing, None]).astype(np.float32)
+            hit = scene.run(start[rows].astype(np.float32), to, query="OCCLUDED")
             seen[rows] += np.asarray(hit) < 0
+            if enough is not None:
+                open_rows = open_rows[seen[open_rows] < enough]
     return seen
 
 
@@ -248,10 +255,10 @@ def compare_surface(
         kept = moved[crop.keeps(moved, low, high)]
     even = thin(kept, voxel_m)
     to_truth_mm = 1e3 * MeshDistance(mesh.vertices_m, mesh.faces)(even)
-    to_cloud_mm = 1e3 * np.asarray(KDTree(even).query(surface.points_m)[0])
+    to_cloud_mm = 1e3 * np.asarray(KDTree(even).query(surface.points_m, workers=-1)[0])
     seen = None
     if camera_centres_W_m is not None:
-        seen = count_views(surface, mesh, camera_centres_W_m) >= visible_views
+        seen = count_views(surface, mesh, camera_centres_W_m, enough=visible_views) >= visible_views
     precision, recall = _share(to_truth_mm, 3.0), _share(to_cloud_mm, 3.0)
     rmse = float(np.sqrt((np.minimum(to_truth_mm, cap_mm) ** 2).mean()))
     score = SurfaceScore(

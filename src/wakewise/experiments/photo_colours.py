@@ -188,20 +188,13 @@ class Depths:
 
 
 def project(view: View, points_W_m: Array) -> tuple[Array, Array]:
-    """Pixels, shape (n, 2), and depths, shape (n,), of points before a view with one radial coefficient."""
-    points = (points_W_m - view.p_WC_m) @ view.R_CW.T
-    xy = points[:, :2] / np.maximum(points[:, 2:], 1e-9)
-    xy = xy * (1.0 + view.radial * np.sum(xy**2, axis=1, keepdims=True))
-    return view.focal_px * xy + view.centre_px, points[:, 2]
+    """Pixels, shape (n, 2), and depths, shape (n,), of points before a view, through its lens."""
+    return view.project(points_W_m)
 
 
 def rays(view: View, pixels: Array) -> Array:
     """Directions with unit z in the camera frame, shape (n, 3), of pixels, shape (n, 2), distortion undone."""
-    bent = (pixels - view.centre_px) / view.focal_px
-    xy = bent.copy()
-    for _ in range(6):
-        xy = bent / (1.0 + view.radial * np.sum(xy**2, axis=1, keepdims=True))
-    return np.column_stack([xy, np.ones(len(xy))])
+    return view.rays(pixels)
 
 
 def _coarse_grid(h: int, w: int) -> Array:

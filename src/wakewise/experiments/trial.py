@@ -27,15 +27,15 @@ from wakewise.missions import SETTLING
 from wakewise.operation import (
     Mission,
     Scenario,
-    build_camera,
     build_mission,
     differences,
     fly_mission,
+    photo_name,
     photograph_flight,
     read_scenario,
     write_scenario,
 )
-from wakewise.reconstruction import read_cloud, reconstruct
+from wakewise.reconstruction import read_cloud, read_lens, reconstruct
 from wakewise.targets import write_mesh
 
 _SURFACE_FIGURES = (
@@ -80,7 +80,7 @@ def run_trial(scenario: Scenario, folder: Path, watch: Watch | None = None) -> F
         with watch.stage(name) as progress, ledger.account(name):
             work(progress)
 
-    stage("plan", "planned.csv", lambda _: write_plan(mission, folder))
+    stage("plan", "planned.csv", lambda _: write_plan(scenario, mission, folder))
     stage("fly", "steps.parquet", lambda progress: fly_mission(scenario, mission, folder, progress))
     stage("photograph", "images.csv", lambda progress: photograph_flight(scenario, mission, folder, progress))
     stage("reconstruct", "model.json", lambda progress: reconstruct_trial(scenario, mission, folder, progress))
@@ -131,7 +131,7 @@ def claim(folder: Path, scenario: Scenario) -> None:
     write_scenario(path, scenario, versions)
 
 
-def write_plan(mission: Mission, folder: Path) -> None:
+def write_plan(scenario: Scenario, mission: Mission, folder: Path) -> None:
     """Write the truth (truth.ply) and where the photographs are to be taken from (planned.csv)."""
     write_mesh(folder / "truth.ply", mission.target.mesh)
     text = io.StringIO()
@@ -139,7 +139,9 @@ def write_plan(mission: Mission, folder: Path) -> None:
     writer.writerow(("name", "time_s", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"))
     route = mission.route
     for name, time_s, X_WC in zip(route.exposure_names, route.exposures_s, route.X_WC_planned, strict=True):
-        writer.writerow((name, f"{time_s:.6f}", *(f"{value:.9f}" for value in (*X_WC.p_m, *X_WC.q))))
+        writer.writerow(
+            (photo_name(name, scenario), f"{time_s:.6f}", *(f"{value:.9f}" for value in (*X_WC.p_m, *X_WC.q)))
+        )
     write_text(folder / "planned.csv", text.getvalue())
 
 
@@ -158,7 +160,7 @@ def reconstruct_trial(scenario: Scenario, mission: Mission, folder: Path, progre
             folder / "images",
             folder,
             scenario.reconstruction,
-            focal_px=build_camera(scenario).focal_px,
+            lens=read_lens(folder),
             reference_positions=dict(zip(names, centres, strict=True)),
             reference_axes=dict(zip(names, axes, strict=True)),
             region=(mission.target.centre_W_m, REGION_SHARE * mission.target.radius_m),

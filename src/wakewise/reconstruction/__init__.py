@@ -2,6 +2,7 @@
 
 from wakewise.reconstruction.calibration import Board, Calibration, calibrate
 from wakewise.reconstruction.clouds import Cloud, read_cloud, write_cloud, write_mesh
+from wakewise.reconstruction.lenses import Lens, read_lens
 from wakewise.reconstruction.photos import Photo, read_photos
 from wakewise.reconstruction.pipeline import Model, reconstruct
 from wakewise.reconstruction.references import match_references, read_reference_cameras
@@ -11,12 +12,14 @@ __all__ = [
     "Board",
     "Calibration",
     "Cloud",
+    "Lens",
     "Model",
     "Photo",
     "ReconstructionSettings",
     "calibrate",
     "match_references",
     "read_cloud",
+    "read_lens",
     "read_photos",
     "read_reference_cameras",
     "reconstruct",

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sqlite3
 import sys
+import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
@@ -16,6 +18,10 @@ import pycolmap
 from wakewise.errors import StageError
 
 T = TypeVar("T")
+# Room that a disk must keep while COLMAP writes its database: what it writes in about a second.
+RESERVE_MB = 16.0
+# Linux's file system in memory, and the largest database that is put there.
+MEMORY, MOST_IN_MEMORY = Path("/dev/shm"), 200e6
 
 
 def be_quiet() -> None:
@@ -26,7 +32,7 @@ def be_quiet() -> None:
 be_quiet()
 
 
-def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: None) -> T:
+def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: None, *, disk: Path | None = None) -> T:
     """Run a COLMAP call in a thread, calling `watch` now and then; an interrupt cancels it and waits for its end.
 
     Parameters
@@ -35,11 +41,14 @@ def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: 
         Takes `cancellation_token`.
     what : str
         Name of the stage, for messages.
+    disk : Path, optional
+        Folder that the call writes to. COLMAP ends the whole process when its database finds no room, so the call is
+        cancelled when another program leaves less than `RESERVE_MB` there.
 
     Raises
     ------
     StageError
-        If COLMAP fails, with its reason in one line.
+        If COLMAP fails, with its reason in one line, or the disk fills.
     """
     token = pycolmap.CancellationToken()
     result: list[T] = []
@@ -56,8 +65,13 @@ def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: 
     thread.start()
     try:
         while thread.is_alive():
-            thread.join(0.25)
+            thread.join(0.25 if disk is None else 0.05)
             watch()
+            if disk is not None and thread.is_alive() and (free := shutil.disk_usage(disk).free / 1e6) < RESERVE_MB:
+                raise StageError(
+                    f"{what}: the disk of {disk} is full, {free:.0f} MB are left and {RESERVE_MB:g} MB needed; the "
+                    "stages before it are kept"
+                )
     finally:
         if thread.is_alive():
             token.cancel()
@@ -66,6 +80,30 @@ def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: 
         reason = " ".join(str(failure[0]).split())[:200]
         raise StageError(f"{what}: COLMAP stopped: {reason}") from failure[0]
     return result[0]
+
+
+@contextmanager
+def workroom(beside: Path, size_bytes: float) -> Iterator[Path]:
+    """Folder for a database that COLMAP works in, removed afterwards: in memory if that is small beside what is there.
+
+    COLMAP ends the whole process when its database finds no room, so it should not lie where others write. A large one,
+    or a system without a file system in memory, gets a folder next to `beside`.
+    """
+    where = beside.parent
+    roomy = size_bytes <= MOST_IN_MEMORY and os.access(MEMORY, os.W_OK)
+    if roomy and shutil.disk_usage(MEMORY).free > 2.0 * size_bytes + 1e6 * RESERVE_MB:
+        where = MEMORY
+        _sweep()
+    with tempfile.TemporaryDirectory(prefix=f".wakewise-{os.getpid()}-", dir=where) as folder:
+        yield Path(folder)
+
+
+def _sweep() -> None:
+    """Remove from memory what processes left that were killed."""
+    for left in MEMORY.glob(".wakewise-*-*"):
+        process = left.name.split("-")[1]
+        if process.isdecimal() and not Path("/proc", process).exists():
+            shutil.rmtree(left, ignore_errors=True)
 
 
 @contextmanager
@@ -88,9 +126,3 @@ def settle(database: Path) -> None:
     with closing(sqlite3.connect(database)) as link:
         link.execute("PRAGMA wal_checkpoint(TRUNCATE)")
         link.execute("PRAGMA journal_mode=DELETE")
-
-
-def remove_logs(database: Path) -> None:
-    """Remove what SQLite may have left beside a database that is given up."""
-    for suffix in ("-wal", "-shm", "-journal"):
-        database.with_name(database.name + suffix).unlink(missing_ok=True)

@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
-import small_gicp
 
-from wakewise.arrays import Array, IntArray
+from wakewise.arrays import Array
 from wakewise.errors import StageError
 from wakewise.interfaces import Progress
+from wakewise.reconstruction.cells import CellMeans
 from wakewise.reconstruction.clouds import Cloud, write_cloud
-from wakewise.reconstruction.fusion import fuse, lonely, thin_mean
-from wakewise.reconstruction.photos import Image, decode
+from wakewise.reconstruction.fusion import facing_normals, fuse, lonely
+from wakewise.reconstruction.photos import Image, PhotoStore
 from wakewise.reconstruction.settings import ReconstructionSettings
 from wakewise.reconstruction.stereo import DepthMap, pair_depth, rectifiable
 from wakewise.reconstruction.views import Ball, View, rank_partners, read_views
 
 # Depth maps of at most this many other photos vote on a point.
 VOTING_PHOTOS = 8
-MERGE_ROWS = 1_000_000
+T = TypeVar("T")
+S = TypeVar("S")
 
 
 def densify(
@@ -35,6 +37,7 @@ def densify(
     *,
     region: Ball | None,
     progress: Progress,
+    store: PhotoStore | None = None,
 ) -> dict[str, Any]:
     """Stereo on neighbouring photos, fused by agreement, thinned, cleaned; points with normals and colours.
 
@@ -54,20 +57,20 @@ def densify(
     before = cv2.getNumThreads()
     cv2.setNumThreads(1)  # the threads are over photos and pairs
     try:
-        maps = _all_depths(folder, views, partners, region, settings, scale, progress)
+        maps = _all_depths(store or PhotoStore(folder), views, partners, region, settings, scale, progress)
     finally:
         cv2.setNumThreads(before)
     spacing = _spacing(maps) if maps else 0.0
     cloud = _fuse_all(maps, partners, settings, spacing, progress) if maps else np.zeros((0, 9))
     if len(cloud) < 100:
         raise StageError(f"dense: {len(cloud)} points survive from {len(maps)} depth maps, at least 100 must")
-    normals = _normals(cloud[:, :3], cloud[:, 6:9])
+    normals = facing_normals(cloud[:, :3], cloud[:, 6:9], settings.threads)
     write_cloud(out, Cloud(points_m=cloud[:, :3], normals=normals, colours=cloud[:, 3:6]))
     return {"dense_points": len(cloud), "depth_maps": len(maps), "point_spacing_mm": 1e3 * spacing}
 
 
 def _all_depths(
-    folder: Path,
+    store: PhotoStore,
     views: tuple[View, ...],
     partners: list[list[int]],
     region: Ball | None,
@@ -82,29 +85,22 @@ def _all_depths(
         jobs += [(i, j) for j in good[: settings.stereo_partners]]
     # Whole multiples, so that large photos need not lie in memory at a size that stereo does not look at.
     shrink = max(1, int(1.0 / scale))
+    photos = list(in_order(lambda view: _load(store, view.name, shrink), views, settings.threads))
+    small = tuple(_shrunk(view, shrink) for view in views)
+
+    def one(job: tuple[int, int]) -> DepthMap | None:
+        return pair_depth(small, photos, *job, region, scale * shrink, settings.stereo_paths)
+
     maps: list[DepthMap] = []
-    with ThreadPoolExecutor(settings.threads) as pool:
-        try:
-            photos = list(pool.map(lambda view: _load(folder / view.name, shrink), views))
-            small = tuple(_shrunk(view, shrink) for view in views)
-            results: Iterator[DepthMap | None] = pool.map(
-                lambda job: pair_depth(small, photos, job[0], job[1], region, scale * shrink, settings.stereo_paths),
-                jobs,
-            )
-            for done, depth_map in enumerate(results):
-                progress(done, 2 * len(jobs), "stereo")
-                if depth_map is not None:
-                    maps.append(depth_map)
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
+    for done, depth_map in enumerate(in_order(one, jobs, settings.threads)):
+        progress(done, 2 * len(jobs), "stereo")
+        if depth_map is not None:
+            maps.append(depth_map)
     return maps
 
 
-def _load(path: Path, shrink: int) -> Image:
-    image = decode(path.read_bytes())
-    if image is None:
-        raise StageError(f"dense: {path} can no longer be read")
+def _load(store: PhotoStore, name: str, shrink: int) -> Image:
+    image = store.image(name)
     if shrink == 1:
         return image
     height, width = (size - size % shrink for size in image.shape[:2])
@@ -148,7 +144,7 @@ def _fuse_all(
     """Points, colours and directions to the camera side by side, shape (n, 9)."""
     alone = len({own.first for own in maps} | {own.second for own in maps}) == 2
 
-    def of_one(index: int) -> tuple[Array, IntArray]:
+    def of_one(index: int) -> Array:
         own = maps[index]
         voters = {own.first, *partners[own.first][:VOTING_PHOTOS]}
         neighbours = [
@@ -158,46 +154,28 @@ def _fuse_all(
             # The pair the other way round is no independent witness; of two photos it is the only one.
             and ({other.first, other.second} != {own.first, own.second} or (alone and other.first != own.first))
         ]
-        agreeing = 1 if alone else settings.agreeing_views
-        points, colours, towards = fuse(maps, index, neighbours, agreeing, settings.agreement_px)
-        values = np.concatenate([colours, towards], axis=1)
-        if not len(points):
-            return np.zeros((0, 9)), np.zeros(0, dtype=np.int64)
-        points, values, count = thin_mean(points, values, spacing)
-        return np.concatenate([points, values], axis=1), count
+        return fuse(maps, index, neighbours, 1 if alone else settings.agreeing_views, settings.agreement_px)
 
-    gathered: list[Array] = []
-    counts: list[IntArray] = []
+    # Cells as they come, in the order of the maps, so that all points need not be in memory at once.
+    gathered = CellMeans(9, spacing)
+    for index, rows in enumerate(in_order(of_one, range(len(maps)), settings.threads)):
+        progress(len(maps) + index, 2 * len(maps), "fusion")
+        gathered.add(rows)
+    cloud, _ = gathered.means()
+    return cloud[~lonely(cloud[:, :3], threads=settings.threads)]
 
-    def merge() -> None:
-        rows = np.concatenate(gathered)
-        points, values, count = thin_mean(rows[:, :3], rows[:, 3:], spacing, np.concatenate(counts))
-        gathered[:], counts[:] = [np.concatenate([points, values], axis=1)], [count]
 
-    with ThreadPoolExecutor(settings.threads) as pool:
+def in_order(work: Callable[[T], S], items: Iterable[T], threads: int) -> Iterator[S]:
+    """Results of work on each item, in order, from threads that are never more than a few items ahead of who asks."""
+    with ThreadPoolExecutor(threads) as pool:
+        waiting: deque[Future[S]] = deque()
         try:
-            for index, (rows, count) in enumerate(pool.map(of_one, range(len(maps)))):
-                progress(len(maps) + index, 2 * len(maps), "fusion")
-                gathered.append(rows)
-                counts.append(count)
-                # Merged now and then, so that memory stays bounded.
-                if sum(len(part) for part in gathered[1:]) > MERGE_ROWS:
-                    merge()
+            for item in items:
+                waiting.append(pool.submit(work, item))
+                if len(waiting) > 2 * threads:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
-    merge()
-    rows = gathered[0]
-    return rows[~lonely(rows[:, :3], threads=settings.threads)]
-
-
-def _normals(points: Array, towards: Array) -> Array:
-    """Unit normals from each point's neighbourhood, turned to the side that the cameras were on."""
-    cloud = small_gicp.PointCloud(points)
-    small_gicp.estimate_normals(cloud, num_neighbors=16, num_threads=1)
-    normals = np.array(cloud.normals())[:, :3]
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = np.where(length > 0.5, normals / np.maximum(length, 1e-12), towards)
-    away = np.einsum("ij,ij->i", normals, towards) < 0
-    normals[away] *= -1
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import tempfile
 from collections.abc import Callable
 from functools import partial
@@ -14,16 +15,17 @@ import pycolmap
 from wakewise.errors import InputError, StageError
 from wakewise.files import whole_file
 from wakewise.interfaces import Progress
-from wakewise.reconstruction.colmap import call, remove_logs, settle
+from wakewise.reconstruction.colmap import call, settle, workroom
+from wakewise.reconstruction.lenses import Lens
 from wakewise.reconstruction.pairs import Pairs
-from wakewise.reconstruction.photos import Photo
+from wakewise.reconstruction.photos import Photo, PhotoStore
 from wakewise.reconstruction.settings import ReconstructionSettings
 from wakewise.reconstruction.sift import folder_features
 
 T = TypeVar("T")
 FEW_FEATURES = 150
-EXTRACTION_BATCHES, MATCHING_BATCHES = 12, 8
-"""Parts that the work is done in, for progress; each costs a little, as descriptors are indexed anew."""
+EXTRACTION_BATCHES, MATCHING_BATCHES, LEAST_PAIRS = 12, 8, 120
+"""Parts that the work is done in, for progress; descriptors are indexed anew in each, so few pairs are few parts."""
 
 
 def match_photos(
@@ -35,6 +37,8 @@ def match_photos(
     focal_px: float | None,
     pairs: Pairs,
     progress: Progress,
+    store: PhotoStore | None = None,
+    lens: Lens | None = None,
 ) -> dict[str, Any]:
     """Find SIFT features, match and verify; write COLMAP's database whole.
 
@@ -44,6 +48,10 @@ def match_photos(
         Focal length to start from, in pixels of these photos; else from EXIF or 1.2 times the longer side.
     pairs : list of two photo names
         What to match.
+    store : PhotoStore, optional
+        Photos that are decoded already.
+    lens : Lens, optional
+        The camera that took them all, instead of a focal length.
 
     Returns
     -------
@@ -60,22 +68,43 @@ def match_photos(
     names = [photo.name for photo in photos]
     _check_pairs(names, pairs)
     pycolmap.set_random_seed(settings.random_seed)
-    with whole_file(database) as temporary:
-        try:
-            _extract(folder, photos, temporary, settings, focal_px, progress)
-            _match(temporary, settings, pairs, progress)
-            figures = _figures(temporary, len(photos))
-            settle(temporary)
-        finally:
-            remove_logs(temporary)
+    with whole_file(database) as whole, workroom(database, database_bytes(len(photos), len(pairs), settings)) as room:
+        work = room / "database.db"
+        work.touch()
+        _extract(store or PhotoStore(folder), photos, work, settings, focal_px, lens, progress)
+        _check_all_there(work, folder, names)
+        _match(work, settings, pairs, progress)
+        figures = _figures(work, len(photos))
+        settle(work)
+        shutil.copyfile(work, whole)
         if figures["inlier_matches"] == 0:
             count = figures["features_per_image"]
-            hint = "; so few come from dark, blurred or hazy photos" if count < FEW_FEATURES else ""
+            hint = ""
+            if count < FEW_FEATURES:
+                hint = "; so few come from dark, blurred or hazy photos"
+                if settings.detector == "colmap":
+                    hint += ", which detector=opencv brightens"
             raise StageError(
                 f"matching: no two of the {len(photos)} photos show the same thing "
                 f"({count:.0f} features a photo, 0 verified matches{hint})"
             )
     return figures
+
+
+def database_bytes(photos: int, pairs: int, settings: ReconstructionSettings) -> float:
+    """Room for the database: 128 bytes of descriptor, up to 24 of keypoint, a few matches, twice; and a log."""
+    return 2.0 * settings.max_features * (152 * photos + 2 * pairs)
+
+
+def _check_all_there(database: Path, folder: Path, names: list[str]) -> None:
+    link = pycolmap.Database.open(database)
+    try:
+        known = {image.name for image in link.read_all_images()}
+    finally:
+        link.close()
+    for name in names:
+        if name not in known:
+            raise StageError(f"features: COLMAP cannot read {folder / name}; save it anew as PNG or remove it")
 
 
 def _check_pairs(names: list[str], pairs: Pairs) -> None:
@@ -87,11 +116,12 @@ def _check_pairs(names: list[str], pairs: Pairs) -> None:
 
 
 def _extract(
-    folder: Path,
+    store: PhotoStore,
     photos: tuple[Photo, ...],
     database: Path,
     settings: ReconstructionSettings,
     focal_px: float | None,
+    lens: Lens | None,
     progress: Progress,
 ) -> None:
     """Features of all photos; those of one size share a camera, as one that was turned has another size."""
@@ -100,16 +130,36 @@ def _extract(
         groups.setdefault((photo.width, photo.height), []).append(photo.name)
     if focal_px is not None and len(groups) > 1:
         raise InputError("photos: have different sizes, so one focal length in pixels cannot hold for all of them")
+    if lens is not None:
+        check_sizes(photos, lens)
     done = 0
     for (width, height), names in groups.items():
         reader = pycolmap.ImageReaderOptions()
         reader.camera_model = "SIMPLE_RADIAL"
         if focal_px is not None:
             reader.camera_params = f"{focal_px},{width / 2},{height / 2},0"
+        if lens is not None:
+            reader.camera_model, reader.camera_params = lens.for_colmap()
         work = _by_opencv if settings.detector == "opencv" else _by_colmap
-        work(folder, names, database, settings, reader, partial(_tell, progress, done, len(photos)))
+        work(store, names, database, settings, reader, partial(_tell, progress, done, len(photos)))
         done += len(names)
     progress(done, len(photos), "features")
+
+
+def check_sizes(photos: tuple[Photo, ...], lens: Lens) -> None:
+    """Check that photos can be of a camera.
+
+    Raises
+    ------
+    InputError
+        If one has another size.
+    """
+    for photo in photos:
+        if (photo.width, photo.height) != (lens.width, lens.height):
+            raise InputError(
+                f"camera: is of photos of {lens.width} x {lens.height} px, {photo.name} has {photo.width} x "
+                f"{photo.height}; all must have the camera's size"
+            )
 
 
 def _tell(progress: Progress, before: int, total: int, done: int) -> None:
@@ -117,7 +167,7 @@ def _tell(progress: Progress, before: int, total: int, done: int) -> None:
 
 
 def _by_opencv(
-    folder: Path,
+    store: PhotoStore,
     names: list[str],
     database: Path,
     settings: ReconstructionSettings,
@@ -127,13 +177,13 @@ def _by_opencv(
     """List the photos in COLMAP's database and write OpenCV's features beside them."""
     call(
         lambda **_: pycolmap.import_images(
-            database, folder, camera_mode=pycolmap.CameraMode.SINGLE, image_names=names, options=reader
+            database, store.folder, camera_mode=pycolmap.CameraMode.SINGLE, image_names=names, options=reader
         ),
         "features",
     )
     # Found before the database is opened: two SQLite libraries must not meet in it, and an interrupt leaves it whole.
     found = []
-    for k, features in enumerate(folder_features(folder, names, settings)):
+    for k, features in enumerate(folder_features(store, names, settings)):
         tell(k)
         found.append(features)
     link = pycolmap.Database.open(database)
@@ -148,7 +198,7 @@ def _by_opencv(
 
 
 def _by_colmap(
-    folder: Path,
+    store: PhotoStore,
     names: list[str],
     database: Path,
     settings: ReconstructionSettings,
@@ -170,7 +220,7 @@ def _by_colmap(
             partial(
                 pycolmap.extract_features,
                 database,
-                folder,
+                store.folder,
                 image_names=batch,
                 camera_mode=pycolmap.CameraMode.SINGLE,
                 reader_options=reader,
@@ -178,12 +228,15 @@ def _by_colmap(
                 device=pycolmap.Device.cpu,
             ),
             "features",
+            disk=database.parent,
         )
         done += len(batch)
         if reader.existing_camera_id < 0 or done == len(batch):
             link = pycolmap.Database.open(database)
-            reader.existing_camera_id = link.read_image_with_name(batch[0]).camera_id
+            read = [image.camera_id for image in link.read_all_images() if image.name in batch]
             link.close()
+            if read:
+                reader.existing_camera_id = read[0]
 
 
 def _match(
@@ -198,12 +251,14 @@ def _match(
     verification = pycolmap.TwoViewGeometryOptions()
     verification.ransac.random_seed = settings.random_seed
     pairing = pycolmap.ImportedPairingOptions()
+    # COLMAP's list of pairs is split at spaces, which names may have: numbers stand for them meanwhile.
+    ids = _renamed(database, lambda image: str(image.image_id))
     done = 0
-    for batch in _batches(pairs, MATCHING_BATCHES):
+    for batch in _batches(pairs, min(MATCHING_BATCHES, -(-len(pairs) // LEAST_PAIRS))):
         progress(done, len(pairs), "matches")
         with tempfile.TemporaryDirectory(prefix=".pairs.", dir=database.parent) as scratch:
             listing = Path(scratch) / "pairs.txt"
-            listing.write_text("".join(f"{a} {b}\n" for a, b in batch), encoding="utf-8")
+            listing.write_text("".join(f"{ids[a]} {ids[b]}\n" for a, b in batch), encoding="utf-8")
             pairing.match_list_path = str(listing)
             call(
                 partial(
@@ -215,9 +270,26 @@ def _match(
                     device=pycolmap.Device.cpu,
                 ),
                 "matching",
+                disk=database.parent,
             )
         done += len(batch)
+    names = {number: name for name, number in ids.items()}
+    _renamed(database, lambda image: names[image.name])
     progress(done, len(pairs), "matches")
+
+
+def _renamed(database: Path, name: Callable[[pycolmap.Image], str]) -> dict[str, str]:
+    """Give every photo of the database another name; the new ones by the old ones."""
+    link = pycolmap.Database.open(database)
+    out = {}
+    try:
+        for image in link.read_all_images():
+            out[image.name] = name(image)
+            image.name = out[image.name]
+            link.update_image(image)
+    finally:
+        link.close()
+    return out
 
 
 def _batches(items: list[T], count: int) -> list[list[T]]:
@@ -226,7 +298,7 @@ def _batches(items: list[T], count: int) -> list[list[T]]:
     COLMAP tells nothing on its way, and its database must not be looked at meanwhile: Python has an SQLite of its own,
     and two in one process undo each other's locks (sqlite.org, How To Corrupt An SQLite Database File, section 2.2.1).
     """
-    size = max(1, -(-len(items) // count))
+    size = max(1, -(-len(items) // max(count, 1)))
     return [items[k : k + size] for k in range(0, len(items), size)]
 
 

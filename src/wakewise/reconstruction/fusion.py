@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import small_gicp
 from numba import njit
 from scipy.spatial import KDTree
 
 from wakewise.arrays import Array, BoolArray, IntArray
+from wakewise.reconstruction.photos import Image
 from wakewise.reconstruction.stereo import DepthImage, DepthMap
 
 
@@ -97,10 +99,44 @@ def pack(depth_map: DepthMap) -> Array:
     )
 
 
-def fuse(
-    maps: list[DepthMap], index: int, neighbours: list[int], agreeing: int, tolerance_px: float
-) -> tuple[Array, Array, Array]:
-    """Points that other maps confirm: positions, colours (red first, 0 to 1) and unit directions to the camera.
+@njit(cache=True, nogil=True, error_model="numpy")
+def _gather(
+    depth: Array,
+    votes: IntArray,
+    against: IntArray,
+    wanted: BoolArray,
+    colours: Image,
+    camera: Array,
+    agreeing: int,
+) -> Array:
+    """What is confirmed, shape (n, 9): position, colour (red first, 0 to 1), unit direction to the camera."""
+    height, width = depth.shape
+    count = 0
+    for v in range(height):
+        for u in range(width):
+            if wanted[v, u] and votes[v, u] >= agreeing and against[v, u] <= votes[v, u]:
+                count += 1
+    rows = np.empty((count, 9))
+    f, cx, cy = camera[0], camera[1], camera[2]
+    R, c = camera[4:13], camera[13:16]
+    k = 0
+    for v in range(height):
+        for u in range(width):
+            if wanted[v, u] and votes[v, u] >= agreeing and against[v, u] <= votes[v, u]:
+                z = depth[v, u]
+                x, y = (u - cx) / f * z, (v - cy) / f * z
+                length = np.sqrt(x * x + y * y + z * z)
+                for axis in range(3):
+                    ray = R[axis] * x + R[3 + axis] * y + R[6 + axis] * z
+                    rows[k, axis] = ray + c[axis]
+                    rows[k, 3 + axis] = colours[v, u, 2 - axis] / 255.0
+                    rows[k, 6 + axis] = -ray / length
+                k += 1
+    return rows
+
+
+def fuse(maps: list[DepthMap], index: int, neighbours: list[int], agreeing: int, tolerance_px: float) -> Array:
+    """Points that other maps confirm, shape (n, 9): position, colour (red first, 0 to 1), unit direction to the camera.
 
     Parameters
     ----------
@@ -112,7 +148,7 @@ def fuse(
     """
     own = maps[index]
     if not neighbours:
-        return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3))
+        return np.zeros((0, 9))
     camera = pack(own)
     depths = [maps[k].depth_m for k in neighbours]
     starts = np.cumsum([0, *(depth.size for depth in depths[:-1])])
@@ -120,35 +156,7 @@ def fuse(
     others = np.concatenate([depth.ravel() for depth in depths])
     cameras = np.array([pack(maps[k]) for k in neighbours])
     mean, votes, against = _agree(own.depth_m, own.wanted, camera, others, places, cameras, tolerance_px)
-    v, u = np.nonzero((votes >= agreeing) & (against <= votes) & own.wanted)
-    z = mean[v, u]
-    rays = np.stack([(u - own.centre_px[0]) / own.focal_px, (v - own.centre_px[1]) / own.focal_px, np.ones(len(u))], 1)
-    points = (rays * z[:, None]) @ own.R_CW + own.p_WC_m
-    colours = own.colours[v, u][:, ::-1].astype(np.float64) / 255.0
-    towards = own.p_WC_m - points
-    return points, colours, towards / np.linalg.norm(towards, axis=1, keepdims=True)
-
-
-def thin_mean(
-    points_m: Array, values: Array, voxel_m: float, weights: IntArray | None = None
-) -> tuple[Array, Array, IntArray]:
-    """Mean point and mean values of each occupied cell of a grid, and how many points it had.
-
-    Points that are means already count as many times as `weights`, shape (n,), says.
-    """
-    if len(points_m) == 0:
-        return np.zeros((0, 3)), np.zeros((0, values.shape[1])), np.zeros(0, dtype=np.int64)
-    cells = np.floor(points_m / voxel_m).astype(np.int64)
-    cells -= cells.min(axis=0)
-    spans = cells.max(axis=0) + 1
-    key = (cells[:, 0] * spans[1] + cells[:, 1]) * spans[2] + cells[:, 2]
-    order = np.argsort(key, kind="stable")
-    starts = np.flatnonzero(np.diff(key[order], prepend=-1))
-    weight = np.ones(len(key), dtype=np.int64) if weights is None else weights
-    both = (np.concatenate([points_m, values], axis=1) * weight[:, None])[order]
-    count = np.add.reduceat(weight[order], starts)
-    mean = np.add.reduceat(both, starts, axis=0) / count[:, None]
-    return mean[:, :3], mean[:, 3:], count
+    return _gather(mean, votes, against, own.wanted, own.colours, camera, agreeing)
 
 
 def lonely(points_m: Array, neighbours: int = 12, sigmas: float = 2.0, threads: int = 1) -> BoolArray:
@@ -162,3 +170,17 @@ def lonely(points_m: Array, neighbours: int = 12, sigmas: float = 2.0, threads: 
     distances = np.asarray(KDTree(points_m).query(points_m, k=neighbours + 1, workers=threads)[0])
     distance = distances[:, 1:].mean(axis=1)
     return np.asarray(distance > distance.mean() + sigmas * distance.std())
+
+
+def facing_normals(points_m: Array, towards: Array, threads: int = 1) -> Array:
+    """Unit normals of each point's neighbourhood, shape (n, 3), on the side that `towards` points to; it where none is.
+
+    Each point's is found by one thread, so that their number makes no difference.
+    """
+    cloud = small_gicp.PointCloud(points_m)
+    small_gicp.estimate_normals(cloud, num_neighbors=16, num_threads=threads)
+    normals = np.array(cloud.normals())[:, :3]
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.where(length > 0.5, normals / np.maximum(length, 1e-12), towards)
+    normals[np.einsum("ij,ij->i", normals, towards) < 0.0] *= -1.0
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12))

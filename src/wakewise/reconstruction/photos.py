@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import threading
+import zlib
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,15 +13,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from wakewise.errors import InputError
+from wakewise.errors import InputError, StageError
 
 Image = NDArray[np.uint8]
 SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff")
 MIN_PHOTOS = 2
+# Decoded photos that are kept for the stages after the first; more are decoded again.
+KEPT_BYTES = 400_000_000
+PNG = b"\x89PNG\r\n\x1a\n"
 # How files begin, and the suffixes that say so: COLMAP goes by the suffix.
 _BEGINNINGS = {
     b"\xff\xd8\xff": ("JPEG", (".jpg", ".jpeg")),
-    b"\x89PNG\r\n\x1a\n": ("PNG", (".png",)),
+    PNG: ("PNG", (".png",)),
     b"BM": ("BMP", (".bmp",)),
     b"II*\x00": ("TIFF", (".tif", ".tiff")),
     b"MM\x00*": ("TIFF", (".tif", ".tiff")),
@@ -35,8 +41,49 @@ class Photo:
     digest: str
 
 
-def read_photos(folder: Path) -> tuple[Photo, ...]:
+class PhotoStore:
+    """Photos of a folder, decoded once: kept as long as they are small enough together, else decoded at every call."""
+
+    def __init__(self, folder: Path, most_bytes: int = KEPT_BYTES) -> None:
+        self.folder = folder
+        self._left = most_bytes
+        self._kept: dict[str, Image] = {}
+        self._lock = threading.Lock()
+
+    def image(self, name: str) -> Image:
+        """Colours of a photo, shape (h, w, 3), blue first; not to be written to.
+
+        Raises
+        ------
+        StageError
+            If it could be read before and cannot be any more.
+        """
+        kept = self._kept.get(name)
+        if kept is not None:
+            return kept
+        path = self.folder / name
+        try:
+            image = decode(path.read_bytes())
+        except OSError:
+            image = None
+        if image is None:
+            raise StageError(f"{path}: can no longer be read")
+        self.keep(name, image)
+        return image
+
+    def keep(self, name: str, image: Image) -> None:
+        """Keep a decoded photo if there is room."""
+        with self._lock:
+            if name not in self._kept and image.nbytes <= self._left:
+                image.setflags(write=False)
+                self._kept[name] = image
+                self._left -= image.nbytes
+
+
+def read_photos(folder: Path, store: PhotoStore | None = None, threads: int = 2) -> tuple[Photo, ...]:
     """Check every photograph of a folder by decoding it; sorted by name. Other files beside them are left alone.
+
+    What was decoded goes to `store`.
 
     Raises
     ------
@@ -50,26 +97,42 @@ def read_photos(folder: Path) -> tuple[Photo, ...]:
     files = sorted(p for p in folder.iterdir() if p.is_file() and not p.name.startswith("."))
     images = [p for p in files if p.suffix.lower() in SUFFIXES]
     if not images:
-        found = f"holds no photos ({files[0].name} is none)" if files else "is empty"
+        inside = sorted(p.name for p in folder.iterdir() if p.is_dir() and not p.name.startswith("."))
+        found = "is empty"
+        if files:
+            found = f"holds no photos ({files[0].name} is none)"
+        elif inside:
+            found = f"holds only folders ({', '.join(inside[:3])}), whose photos are not looked for"
         raise InputError(f"{folder}: {found}; at least {MIN_PHOTOS} photos ({allowed}) are needed")
-    photos = tuple(_read_photo(path) for path in images)
+    with ThreadPoolExecutor(threads) as pool:
+        try:
+            photos = tuple(pool.map(lambda path: _read_photo(path, store), images))
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
     if len(photos) < MIN_PHOTOS:
         raise InputError(f"{folder}: holds {len(photos)} photos, at least {MIN_PHOTOS} are needed")
     return photos
 
 
-def _read_photo(path: Path) -> Photo:
+def _read_photo(path: Path, store: PhotoStore | None) -> Photo:
     data = path.read_bytes()
     if data.startswith(b"\xff\xd8") and not jpeg_is_whole(data):
         raise InputError(
             f"{path}: is cut short ({len(data)} bytes), the JPEG image in it has no end; remove or replace it"
         )
+    if data.startswith(PNG) and not png_is_whole(data):
+        raise InputError(f"{path}: is cut short or damaged ({len(data)} bytes of a PNG image); remove or replace it")
     image = decode(data)
     if image is None:
         raise InputError(f"{path}: is no image that can be read ({len(data)} bytes); allowed are {', '.join(SUFFIXES)}")
-    for beginning, (kind, suffixes) in _BEGINNINGS.items():
-        if data.startswith(beginning) and path.suffix.lower() not in suffixes:
-            raise InputError(f"{path}: holds a {kind} image, so its name must end in {suffixes[0]}, not {path.suffix}")
+    kind, suffixes = next((found for start, found in _BEGINNINGS.items() if data.startswith(start)), ("", ()))
+    if not kind:
+        raise InputError(f"{path}: holds an image of another kind than JPEG, PNG, BMP or TIFF; save it as one of these")
+    if path.suffix.lower() not in suffixes:
+        raise InputError(f"{path}: holds a {kind} image, so its name must end in {suffixes[0]}, not {path.suffix}")
+    if store is not None:
+        store.keep(path.name, image)
     height, width = image.shape[:2]
     return Photo(name=path.name, width=width, height=height, digest=hashlib.blake2b(data, digest_size=16).hexdigest())
 
@@ -112,6 +175,23 @@ def jpeg_is_whole(data: bytes) -> bool:
     return data[at : at + 2] == b"\xff\xd9"
 
 
+def png_is_whole(data: bytes) -> bool:
+    """Whether a PNG's chunks come to its end with the checksums they carry; its decoder complains past all handling.
+
+    W3C, Portable Network Graphics, section 5: length, type, data, CRC-32 of type and data.
+    """
+    at = len(PNG)
+    while at + 12 <= len(data):
+        length = int.from_bytes(data[at : at + 4], "big")
+        stop = at + 8 + length
+        if data[stop : stop + 4] != zlib.crc32(data[at + 4 : stop]).to_bytes(4, "big"):
+            return False
+        if data[at + 4 : at + 8] == b"IEND":
+            return True
+        at = stop + 4
+    return False
+
+
 def _end_of_scan(data: bytes, at: int) -> int:
     """Where the marker after coded bytes begins; the data's length if there is none."""
     while True:
@@ -123,6 +203,30 @@ def _end_of_scan(data: bytes, at: int) -> int:
         at += 1 if data[at + 1] == 0xFF else 2
 
 
+class _Quiet:
+    """OpenCV's decoders say nothing of their own while any thread is in here."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._inside = 0
+        self._level = 0
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._inside == 0:
+                self._level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+            self._inside += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._inside -= 1
+            if self._inside == 0:
+                cv2.utils.logging.setLogLevel(self._level)
+
+
+_quiet_decoders = _Quiet()
+
+
 def decode(data: bytes) -> Image | None:
     """Colours of an encoded image, shape (h, w, 3), blue first as OpenCV has them; None if it is no image.
 
@@ -131,12 +235,8 @@ def decode(data: bytes) -> Image | None:
     if not data:
         return None
     flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-    level = cv2.utils.logging.getLogLevel()
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
-        image: Image | None = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags)
+        with _quiet_decoders:
+            return cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags)
     except cv2.error:
         return None
-    finally:
-        cv2.utils.logging.setLogLevel(level)
-    return image

@@ -16,24 +16,26 @@ from wakewise.errors import InputError
 from wakewise.files import write_json
 from wakewise.interfaces import Progress, no_progress
 from wakewise.reconstruction.dense import densify
-from wakewise.reconstruction.features import match_photos
+from wakewise.reconstruction.features import check_sizes, database_bytes, match_photos
+from wakewise.reconstruction.lenses import Lens
 from wakewise.reconstruction.mapping import map_photos
 from wakewise.reconstruction.meshing import mesh_points
 from wakewise.reconstruction.pairs import Pairs, choose_pairs
 from wakewise.reconstruction.patchmatch import patch_match, require_cuda
-from wakewise.reconstruction.photos import Photo, read_photos, without_duplicates
+from wakewise.reconstruction.photos import Photo, PhotoStore, read_photos, without_duplicates
 from wakewise.reconstruction.references import match_references
 from wakewise.reconstruction.settings import ReconstructionSettings
 from wakewise.reconstruction.stages import StageResult, fingerprint, make_folder, need_room, run_stage
 from wakewise.reconstruction.views import Ball
 
 # Part of every stage's fingerprint: raise it when a stage's result changes for the same input.
-VERSION = 5
+VERSION = 6
 _STAGES = {
     "match": ("detector", "max_features", "first_octave", "peak_threshold", "random_seed"),
     "map": (
         "mapper",
         "bundle_iterations",
+        "refine_camera",
         "reprojection_px",
         "position_priors",
         "prior_sigma_m",
@@ -104,6 +106,7 @@ def reconstruct(
     settings: ReconstructionSettings | None = None,
     *,
     focal_px: float | None = None,
+    lens: Lens | None = None,
     pairs: Sequence[tuple[str, str]] | None = None,
     reference_positions: dict[str, Array] | None = None,
     reference_axes: dict[str, Array] | None = None,
@@ -120,6 +123,8 @@ def reconstruct(
         Folder of photographs.
     focal_px : float, optional
         Focal length in pixels to start from; it is refined.
+    lens : Lens, optional
+        Camera that took all the photos, such as a trial's in its cameras.txt; refined unless the settings say no.
     pairs : sequence of two photo names, optional
         Which photos to match; else the settings choose.
     reference_positions : dict, optional
@@ -140,14 +145,17 @@ def reconstruct(
     """
     start = time.perf_counter()
     settings = settings or ReconstructionSettings()
-    dense_points = densify
     if settings.dense == "patch-match":
         require_cuda()
-        dense_points = patch_match
-    found, duplicates = without_duplicates(read_photos(photos))
+    store = PhotoStore(photos)
+    found, duplicates = without_duplicates(read_photos(photos, store, settings.threads))
     names = [photo.name for photo in found]
     if focal_px is not None and not (np.isfinite(focal_px) and focal_px > 0):
         raise InputError(f"focal length: {focal_px:g} px, must be above 0")
+    if lens is not None:
+        if focal_px is not None:
+            raise InputError("camera: give either a focal length or a calibrated camera, not both")
+        check_sizes(found, lens)
     references = None if reference_positions is None else match_references(reference_positions, names)
     if settings.position_priors and references is None:
         raise InputError("position priors: need known camera positions")
@@ -164,9 +172,9 @@ def reconstruct(
     results["match"] = run_stage(
         out,
         "match",
-        key("match", "", [asdict(photo) for photo in found], focal_px, listed),
+        key("match", "", [asdict(photo) for photo in found], focal_px, lens and lens.numbers(), listed),
         (database,),
-        lambda: _match(photos, found, database, settings, focal_px, listed, progress),
+        lambda: _match(store, found, database, settings, focal_px, lens, listed, progress),
     )
     placed = None if references is None else {name: position.tolist() for name, position in references.items()}
     results["map"] = run_stage(
@@ -174,7 +182,7 @@ def reconstruct(
         "map",
         key("map", results["match"].key, placed),
         (sparse / "images.bin",),
-        lambda: _map(photos, database, sparse, settings, len(found), references, progress),
+        lambda: _map(store, database, sparse, settings, len(found), references, progress),
     )
     place = None if ball is None else [ball.centre_W_m.tolist(), ball.radius_m]
     results["dense"] = run_stage(
@@ -182,7 +190,7 @@ def reconstruct(
         "dense",
         key("dense", results["map"].key, place),
         (dense,),
-        lambda: dense_points(photos, sparse, dense, settings, region=ball, progress=progress),
+        lambda: _densify(store, sparse, dense, settings, ball, progress),
     )
     if settings.mesh:
         spacing = 1e-3 * results["dense"].figures["point_spacing_mm"]
@@ -211,22 +219,31 @@ def reconstruct(
 
 
 def _match(
-    folder: Path,
+    store: PhotoStore,
     photos: tuple[Photo, ...],
     database: Path,
     settings: ReconstructionSettings,
     focal_px: float | None,
+    lens: Lens | None,
     pairs: Pairs,
     progress: Progress,
 ) -> dict[str, Any]:
-    # 128 bytes of descriptor and up to 24 of keypoint; a few matches in a hundred features, twice; a log beside it all.
-    features, matches = len(photos) * settings.max_features * 152, len(pairs) * settings.max_features * 2
-    need_room(database.parent, 2.0 * (features + matches), "match")
-    return match_photos(folder, photos, database, settings, focal_px=focal_px, pairs=pairs, progress=progress)
+    need_room(database.parent, database_bytes(len(photos), len(pairs), settings), "match")
+    return match_photos(
+        store.folder,
+        photos,
+        database,
+        settings,
+        focal_px=focal_px,
+        pairs=pairs,
+        progress=progress,
+        store=store,
+        lens=lens,
+    )
 
 
 def _map(
-    folder: Path,
+    store: PhotoStore,
     database: Path,
     sparse: Path,
     settings: ReconstructionSettings,
@@ -234,9 +251,31 @@ def _map(
     references: dict[str, Array] | None,
     progress: Progress,
 ) -> dict[str, Any]:
-    # Points and tracks are a part of what the database holds; it is copied where priors are written into it.
-    need_room(sparse.parent, database.stat().st_size * (2.0 if settings.position_priors else 0.5), "map")
-    return map_photos(folder, database, sparse, settings, photos=photos, references=references, progress=progress)
+    # Points and tracks are a part of what the database holds; it is copied.
+    need_room(sparse.parent, 2.0 * database.stat().st_size, "map")
+    return map_photos(
+        store.folder,
+        database,
+        sparse,
+        settings,
+        photos=photos,
+        references=references,
+        progress=progress,
+        store=store,
+    )
+
+
+def _densify(
+    store: PhotoStore,
+    sparse: Path,
+    dense: Path,
+    settings: ReconstructionSettings,
+    region: Ball | None,
+    progress: Progress,
+) -> dict[str, Any]:
+    if settings.dense == "patch-match":
+        return patch_match(store.folder, sparse, dense, settings, region=region, progress=progress)
+    return densify(store.folder, sparse, dense, settings, region=region, progress=progress, store=store)
 
 
 def _ball(region: tuple[Array, float] | None, references: dict[str, Array] | None) -> Ball | None:

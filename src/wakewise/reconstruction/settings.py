@@ -47,6 +47,11 @@ class ReconstructionSettings(Settings):
         le=10.0,
         description="mean reprojection error to get below: outliers are cut ever more closely until it is met",
     )
+    refine_camera: bool = Field(
+        default=True,
+        description="fit focal length and distortion to the photos, from EXIF or a given camera on; false keeps a "
+        "given camera as it is",
+    )
     position_priors: bool = Field(
         default=False, description="let known camera positions pull at the model, instead of only placing it"
     )

@@ -9,15 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from wakewise.errors import StageError
-from wakewise.reconstruction.photos import Image, decode
+from wakewise.reconstruction.photos import Image, PhotoStore
 from wakewise.reconstruction.settings import ReconstructionSettings
 
 # OpenCV always doubles a photo first; the doubled one is kept to what COLMAP takes at most (its max_image_size).
@@ -74,14 +72,11 @@ def stretched(grey: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.clip(np.rint((grey.astype(np.float32) - low) * gain + 32.0), 0, 255).astype(np.uint8)
 
 
-def folder_features(folder: Path, names: list[str], settings: ReconstructionSettings) -> Iterator[Features]:
+def folder_features(store: PhotoStore, names: list[str], settings: ReconstructionSettings) -> Iterator[Features]:
     """Features of each photo, in order, several photos at a time."""
 
     def one(name: str) -> Features:
-        image = decode((folder / name).read_bytes())
-        if image is None:
-            raise StageError(f"features: {folder / name} can no longer be read")
-        return photo_features(image, settings)
+        return photo_features(store.image(name), settings)
 
     before = cv2.getNumThreads()
     cv2.setNumThreads(1)

@@ -14,6 +14,7 @@ from typing import Any
 
 from wakewise.errors import InputError, StageError
 from wakewise.files import write_json
+from wakewise.reconstruction.colmap import RESERVE_MB
 
 LOW_DISK_MB = 5.0
 
@@ -71,6 +72,7 @@ def need_room(folder: Path, size_bytes: float, name: str) -> None:
         If less is free than the stage may write.
     """
     free = shutil.disk_usage(folder).free
+    size_bytes += 1e6 * RESERVE_MB
     if free < size_bytes:
         raise StageError(
             f"{name}: the disk of {folder} is full, {free / 1e6:.1f} MB are left and about {size_bytes / 1e6:.1f} MB "

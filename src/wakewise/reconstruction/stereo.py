@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from wakewise.arrays import Array, BoolArray, freeze
@@ -144,13 +145,24 @@ def pair_depth(
 
 def _inside(depth_m: DepthImage, focal: float, centre_px: Array, middle_C_m: Array, region: Ball | None) -> BoolArray:
     """Which pixels have a depth, and where a region is given, one inside its ball about `middle_C_m`."""
-    inside = depth_m > 0
-    if region is not None:
-        v, u = np.nonzero(inside)
-        z = depth_m[v, u].astype(np.float64)
-        points = np.stack([(u - centre_px[0]) / focal * z, (v - centre_px[1]) / focal * z, z], axis=1)
-        inside[v, u] = np.linalg.norm(points - middle_C_m, axis=1) <= region.radius_m
-    return np.asarray(inside)
+    if region is None:
+        return np.asarray(depth_m > 0)
+    return _in_ball(depth_m, float(focal), centre_px, middle_C_m, float(region.radius_m))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _in_ball(depth_m: DepthImage, focal: float, centre_px: Array, middle_C_m: Array, radius_m: float) -> BoolArray:
+    """Which pixels have a depth whose point lies in a ball of the camera's frame."""
+    height, width = depth_m.shape
+    inside = np.zeros((height, width), np.bool_)
+    for v in range(height):
+        for u in range(width):
+            z = float(depth_m[v, u])
+            if z > 0.0:
+                x = (u - centre_px[0]) / focal * z - middle_C_m[0]
+                y = (v - centre_px[1]) / focal * z - middle_C_m[1]
+                inside[v, u] = x * x + y * y + (z - middle_C_m[2]) ** 2 <= radius_m * radius_m
+    return inside
 
 
 def _turn_deg(view: View, R_CW: Array) -> float:
@@ -167,7 +179,7 @@ def _depth_limits(view: View, middle_m: float, region: Ball | None) -> tuple[flo
 
 def _window(view: View, R_CW: Array, focal: float, region: Ball | None) -> tuple[int, int, int, int]:
     """Left, top, width and height in rectified pixels (principal point at 0) of what is worth matching."""
-    corners = _pixel_rays(view, np.array([[0, 0], [view.width, 0], [0, view.height], [view.width, view.height]]))
+    corners = view.rays(np.array([[0.0, 0.0], [view.width, 0.0], [0.0, view.height], [view.width, view.height]]))
     rays = corners @ view.R_CW @ R_CW.T
     uv = focal * rays[:, :2] / rays[:, 2:]
     low, high = uv.min(axis=0), uv.max(axis=0)
@@ -182,27 +194,18 @@ def _window(view: View, R_CW: Array, focal: float, region: Ball | None) -> tuple
     return left, top, width, height
 
 
-def _pixel_rays(view: View, pixels: Array) -> Array:
-    """Directions with unit z in the camera frame of pixel positions, shape (n, 2); undoes the radial distortion."""
-    distorted = (pixels - view.centre_px) / view.focal_px
-    xy = distorted.copy()
-    for _ in range(10):
-        xy = distorted / (1.0 + view.radial * (xy**2).sum(axis=1, keepdims=True))
-    return np.concatenate([xy, np.ones((len(xy), 1))], axis=1)
-
-
 def _resample(photo: Image, view: View, R_CW: Array, focal: float, centre_px: Array, size: tuple[int, int]) -> Image:
     """The photo as a pinhole camera of the same centre turned to R_CW would have taken it."""
     # COLMAP has pixel centres at +0.5, OpenCV at 0.
     K = np.array(
         [
             [view.focal_px, 0.0, view.centre_px[0] - 0.5],
-            [0.0, view.focal_px, view.centre_px[1] - 0.5],
+            [0.0, view.focal_px * view.stretch, view.centre_px[1] - 0.5],
             [0.0, 0.0, 1.0],
         ]
     )
     new_K = np.array([[focal, 0.0, centre_px[0]], [0.0, focal, centre_px[1]], [0.0, 0.0, 1.0]])
-    distortion = np.array([[view.radial, 0.0, 0.0, 0.0, 0.0]])
+    distortion = np.array([[view.radial, *view.bend, 0.0]])
     turn = R_CW @ view.R_CW.T
     map_x, map_y = cv2.initUndistortRectifyMap(K, distortion, turn, new_K, size, cv2.CV_32FC1)
     shrink = view.focal_px / focal

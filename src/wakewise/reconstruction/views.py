@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +10,14 @@ import pycolmap
 
 from wakewise.arrays import Array, IntArray, freeze
 from wakewise.errors import StageError
+from wakewise.reconstruction.lenses import lens_of
 
 # Stereo is best near this angle between two views: less is imprecise, more looks too different. The band is what was
 # measured to work on corals; photos of a flat wall would bear more.
 BEST_ANGLE_DEG, ANGLE_SPREAD_DEG = 13.0, 8.0
 ANGLES_DEG = (3.0, 35.0)
 MIN_SHARED = 20
+NEWTON_STEPS = 12
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,7 +33,10 @@ class Ball:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class View:
-    """One registered photo. R_CW and p_WC_m place the camera; depth limits in m hold for what it should see."""
+    """One registered photo. R_CW and p_WC_m place the camera; depth limits in m hold for what it should see.
+
+    Of OpenCV's lens, `focal_px` is fx and `stretch` fy / fx; `radial` is k1 and `bend` the rest, k2, p1, p2.
+    """
 
     name: str
     width: int
@@ -45,13 +50,58 @@ class View:
     far_m: float
     focus_W_m: Array
     seen: IntArray
+    stretch: float = 1.0
+    bend: Array = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
-        freeze(self, centre_px=(2,), R_CW=(3, 3), p_WC_m=(3,), focus_W_m=(3,))
+        freeze(self, centre_px=(2,), R_CW=(3, 3), p_WC_m=(3,), focus_W_m=(3,), bend=(3,))
 
     def depth_of(self, points_W_m: Array) -> Array:
         """Distance along the optical axis, shape (n,)."""
         return np.asarray((np.asarray(points_W_m) - self.p_WC_m) @ self.R_CW[2])
+
+    @property
+    def focals_px(self) -> Array:
+        """Focal lengths across and down, shape (2,)."""
+        return self.focal_px * np.array([1.0, self.stretch])
+
+    def project(self, points_W_m: Array) -> tuple[Array, Array]:
+        """Pixels, shape (n, 2), and depths, shape (n,), of points, shape (n, 3); pixels hold where the depth is > 0."""
+        points = (np.asarray(points_W_m) - self.p_WC_m) @ self.R_CW.T
+        xy = points[:, :2] / np.maximum(points[:, 2:], 1e-9)
+        return self.focals_px * self._bent(xy) + self.centre_px, points[:, 2]
+
+    def rays(self, pixels: Array) -> Array:
+        """Directions with unit z in the camera frame, shape (n, 3), of pixels, shape (n, 2), distortion undone."""
+        wanted = (np.asarray(pixels) - self.centre_px) / self.focals_px
+        k2, p1, p2 = self.bend
+        xy = wanted.copy()
+        for _ in range(NEWTON_STEPS):
+            x, y = xy.T
+            r2 = x * x + y * y
+            grown, slope = 1.0 + r2 * (self.radial + r2 * k2), self.radial + 2.0 * r2 * k2
+            a = grown + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x
+            b = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y
+            d = grown + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x
+            # Where the lens would fold the image over there is no ray: the step is kept small there, nothing is found.
+            determinant = np.maximum(a * d - b * b, 0.05)
+            ex, ey = (self._bent(xy) - wanted).T
+            xy = xy - np.stack([(d * ex - b * ey) / determinant, (a * ey - b * ex) / determinant], axis=1)
+        return np.concatenate([xy, np.ones((len(xy), 1))], axis=1)
+
+    def _bent(self, xy: Array) -> Array:
+        """Distorted slopes of ideal ones (D. C. Brown, Photogrammetric Engineering 37(8), 1971, as OpenCV has it)."""
+        k2, p1, p2 = self.bend
+        x, y = xy.T
+        r2 = x * x + y * y
+        grown = 1.0 + r2 * (self.radial + r2 * k2)
+        return np.stack(
+            [
+                x * grown + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+                y * grown + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+            ],
+            axis=1,
+        )
 
 
 def read_views(sparse: Path, region: Ball | None) -> tuple[tuple[View, ...], Array]:
@@ -85,22 +135,24 @@ def read_views(sparse: Path, region: Ball | None) -> tuple[tuple[View, ...], Arr
             focus = np.median(points[seen], axis=0)
             if near <= 0.0:
                 continue
-        camera = image.camera
-        focal, cx, cy, radial = camera.params
+        lens = lens_of(image.camera)
+        fx, fy, cx, cy, k1, *bend = lens.params
         views.append(
             View(
                 name=image.name,
-                width=camera.width,
-                height=camera.height,
-                focal_px=float(focal),
+                width=lens.width,
+                height=lens.height,
+                focal_px=float(fx),
                 centre_px=np.array([cx, cy]),
-                radial=float(radial),
+                radial=float(k1),
                 R_CW=R,
                 p_WC_m=centre,
                 near_m=near,
                 far_m=far,
                 focus_W_m=focus,
                 seen=seen,
+                stretch=float(fy / fx),
+                bend=np.array(bend),
             )
         )
     if len(views) < 2:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import small_gicp
 from numpy.typing import NDArray
 
 from wakewise.arrays import Array, freeze
 from wakewise.errors import StageError
 from wakewise.interfaces import Progress
+from wakewise.reconstruction.cells import CellMeans
 from wakewise.reconstruction.clouds import Cloud
-from wakewise.reconstruction.fusion import fuse, lonely, thin_mean
+from wakewise.reconstruction.fusion import facing_normals, fuse, lonely
 from wakewise.reconstruction.nerf.posed import PosedPhoto
 from wakewise.reconstruction.stereo import DepthMap
 from wakewise.reconstruction.views import Ball
@@ -116,31 +116,18 @@ def fuse_depth(maps: list[DepthMap], agreeing: int, progress: Progress) -> tuple
         raise StageError("neural field: nothing in the region is opaque; it needs more steps or other photos")
     spacing = float(np.median(footprints))
     sight = np.stack([m.R_CW[2] for m in maps])
-    parts = []
+    gathered = CellMeans(9, spacing)
+    confirmed = 0
     for index in range(len(maps)):
         progress(index, len(maps), "fusion")
         near = np.argsort(-(sight @ sight[index]), kind="stable")
         neighbours = [int(k) for k in near if k != index][:VOTING_VIEWS]
-        points, colours, towards = fuse(maps, index, neighbours, min(agreeing, len(neighbours)), 1.0)
-        if len(points):
-            # Thinned per map first, so that memory stays bounded.
-            mean, values, count = thin_mean(points, np.concatenate([colours, towards], axis=1), spacing)
-            parts.append(np.concatenate([mean, values, count[:, None].astype(np.float64)], axis=1))
-    rows = np.concatenate(parts) if parts else np.zeros((0, 10))
-    if len(rows) < FEWEST_POINTS:
-        raise StageError(f"neural field: {len(rows)} points are confirmed by {agreeing} other views, needs 100")
-    points, values, _ = thin_mean(rows[:, :3], rows[:, 3:9], spacing, rows[:, 9].astype(np.int64))
-    keep = ~lonely(points)
-    points, values = points[keep], values[keep]
-    return Cloud(points_m=points, normals=_normals(points, values[:, 3:]), colours=values[:, :3]), spacing
-
-
-def _normals(points: Array, towards: Array) -> Array:
-    """Unit normals of each point's neighbourhood, on the side that the cameras were on."""
-    cloud = small_gicp.PointCloud(points)
-    small_gicp.estimate_normals(cloud, num_neighbors=16, num_threads=1)
-    normals = np.array(cloud.normals())[:, :3]
-    normals[np.linalg.norm(normals, axis=1) < 0.5] = 0.0
-    normals = np.where(np.any(normals, axis=1, keepdims=True), normals, towards)
-    normals[np.einsum("ij,ij->i", normals, towards) < 0.0] *= -1.0
-    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12))
+        rows = fuse(maps, index, neighbours, min(agreeing, len(neighbours)), 1.0)
+        confirmed += len(rows)
+        gathered.add(rows)
+    if confirmed < FEWEST_POINTS:
+        raise StageError(f"neural field: {confirmed} points are confirmed by {agreeing} other views, needs 100")
+    cloud, _ = gathered.means()
+    cloud = cloud[~lonely(cloud[:, :3])]
+    points, colours, towards = cloud[:, :3], cloud[:, 3:6], cloud[:, 6:]
+    return Cloud(points_m=points, normals=facing_normals(points, towards), colours=colours), spacing

@@ -1,0 +1,99 @@
+"""A calibrated camera: focal lengths, principal point and distortion of COLMAP's OPENCV model, from its cameras.txt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+
+from wakewise.arrays import Array, freeze
+from wakewise.errors import InputError, StageError
+
+# Which parameters of COLMAP's models are fx, fy, cx, cy, k1, k2, p1, p2; -1 is a zero.
+LAYOUTS = {
+    "SIMPLE_PINHOLE": (0, 0, 1, 2, -1, -1, -1, -1),
+    "PINHOLE": (0, 1, 2, 3, -1, -1, -1, -1),
+    "SIMPLE_RADIAL": (0, 0, 1, 2, 3, -1, -1, -1),
+    "RADIAL": (0, 0, 1, 2, 3, 4, -1, -1),
+    "OPENCV": (0, 1, 2, 3, 4, 5, 6, 7),
+}
+COUNTS = {"SIMPLE_PINHOLE": 3, "PINHOLE": 4, "SIMPLE_RADIAL": 4, "RADIAL": 5, "OPENCV": 8}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Lens:
+    """Image size in pixels and `params`, shape (8,): fx, fy, cx, cy in pixels (centres at +0.5), k1, k2, p1, p2."""
+
+    width: int
+    height: int
+    params: Array
+
+    def __post_init__(self) -> None:
+        freeze(self, params=(8,))
+        if self.width < 1 or self.height < 1 or not (self.params[:2] > 0.0).all():
+            raise InputError(
+                f"camera: {self.width} x {self.height} px with focal lengths {self.params[0]:g} and "
+                f"{self.params[1]:g} px, all must be above 0"
+            )
+
+    def for_colmap(self) -> tuple[str, str]:
+        """COLMAP's model and its parameters: no more of them than it takes, as each will be fitted to the photos."""
+        fx, fy, cx, cy, *bend = (float(value) for value in self.params)
+        if fx == fy and not any(bend):
+            return "SIMPLE_RADIAL", f"{fx!r},{cx!r},{cy!r},0"
+        return "OPENCV", ",".join(repr(value) for value in (fx, fy, cx, cy, *bend))
+
+    def numbers(self) -> list[float]:
+        """Size and parameters as plain numbers."""
+        return [float(value) for value in (self.width, self.height, *self.params)]
+
+
+def lens_of(camera: pycolmap.Camera) -> Lens:
+    """Lens of a camera of a sparse model.
+
+    Raises
+    ------
+    StageError
+        If its distortion is of another kind than OpenCV's.
+    """
+    name = str(camera.model.name)
+    if name not in LAYOUTS:
+        raise StageError(f"cameras: model {name} is not known here, allowed are {', '.join(LAYOUTS)}")
+    return Lens(width=camera.width, height=camera.height, params=_in_order(name, np.asarray(camera.params)))
+
+
+def read_lens(path: Path) -> Lens:
+    """The camera of COLMAP's cameras.txt, given the file or a folder that holds it.
+
+    Raises
+    ------
+    InputError
+        If nothing is there, it holds no camera or several, or the camera is not of a known model.
+    """
+    file = path / "cameras.txt" if path.is_dir() else path
+    if not file.is_file():
+        raise InputError(f"{file}: does not exist; COLMAP's cameras.txt with one camera is needed")
+    try:
+        lines = [line.split() for line in file.read_text(encoding="utf-8").splitlines()]
+    except (OSError, UnicodeDecodeError):
+        raise InputError(f"{file}: is no text file that can be read; COLMAP's cameras.txt is needed") from None
+    rows = [words for words in lines if words and not words[0].startswith("#")]
+    if len(rows) != 1:
+        raise InputError(f"{file}: holds {len(rows)} cameras, must hold 1 (id, model, width, height, parameters)")
+    row = rows[0]
+    if len(row) < 4 or row[1] not in LAYOUTS:
+        found = row[1] if len(row) > 1 else " ".join(row)
+        raise InputError(f"{file}: camera model '{found[:40]}', allowed are {', '.join(LAYOUTS)}")
+    try:
+        width, height, params = int(row[2]), int(row[3]), np.array([float(word) for word in row[4:]])
+    except ValueError:
+        raise InputError(f"{file}: holds something that is no number where the camera's numbers must be") from None
+    if len(params) != COUNTS[row[1]] or not np.isfinite(params).all():
+        raise InputError(f"{file}: {len(params)} parameters, {row[1]} has {COUNTS[row[1]]}, all finite")
+    return Lens(width=width, height=height, params=_in_order(row[1], params))
+
+
+def _in_order(model: str, params: Array) -> Array:
+    return np.append(params, 0.0)[list(LAYOUTS[model])]
