@@ -6,7 +6,7 @@ from imaging_helpers import box_scene, coral_scene, view
 
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_from_rotvec
-from wakewise.imaging import Lights, PinholeCamera, motion_blur, motion_px, pose_at, render
+from wakewise.imaging import LensCamera, Lights, PinholeCamera, motion_blur, motion_px, pose_at, render
 
 LIGHTS = Lights(lamp=0.0, lamps_C_m=np.zeros((0, 3)))
 CAMERA = PinholeCamera(400, 300, 2 * np.arctan(200 / 480))  # the middle of a photograph 960 px wide at 90 deg
@@ -74,6 +74,51 @@ def test_a_uniform_image_stays_uniform():
     depth = np.random.default_rng(0).uniform(0.3, 2.0, (300, 400)).astype(np.float32)
     depth[:50] = np.inf
     assert np.allclose(motion_blur(image, depth, CAMERA, poses), 0.3, atol=1e-6)
+
+
+def keys(t):
+    """Cubic convolution's weights of the neighbours at -1, 0, 1, 2 by Keys's own formula, a = -1/2."""
+    distance = np.abs(t - np.arange(-1, 3))
+    inner = 1.5 * distance**3 - 2.5 * distance**2 + 1.0
+    return np.where(distance <= 1.0, inner, -0.5 * distance**3 + 2.5 * distance**2 - 4.0 * distance + 2.0)
+
+
+def blurred_twin(image, depth, camera, poses, frames, x, y):
+    """One pixel of the mean of frames, each looked up where the middle frame's own points went."""
+    middle, h, w = pose_at(poses, 0.5), *depth.shape
+    total = np.zeros(3)
+    for k in range(frames):
+        X_KM = pose_at(poses, (k + 0.5) / frames).inverse() @ middle
+        here = np.array([x + 0.5, y + 0.5])
+        q = here.copy()
+        for _ in range(20):
+            i, j = np.clip(q.astype(int), 0, [w - 1, h - 1])
+            q += here - camera.project(X_KM.apply(camera.unproject(q[None], depth[j, i : i + 1])))[0]
+        u, v = np.clip(q - 0.5, 0.0, [w - 1, h - 1])
+        i, j = int(u), int(v)
+        columns, rows = np.clip(np.arange(i - 1, i + 3), 0, w - 1), np.clip(np.arange(j - 1, j + 3), 0, h - 1)
+        total += np.einsum("n,m,nmc->c", keys(v - j), keys(u - i), image[np.ix_(rows, columns)].astype(float))
+    return np.maximum(total, 0.0) / frames
+
+
+@pytest.mark.parametrize("camera", [CAMERA, LensCamera(400, 300, 0.8, (-0.1, 0.05, 0.0, 0.0))], ids=["ideal", "lens"])
+@pytest.mark.parametrize("turn", [(0, 0, 0), (0.004, 0.01, 0.02)])
+def test_blur_agrees_with_a_readable_twin(camera, turn):
+    """Whole rows at once give what one pixel at a time gives, at depth edges, at the image's border and elsewhere."""
+    rng = np.random.default_rng(8)
+    image = rng.uniform(0.1, 0.9, (300, 400, 3)).astype(np.float32)
+    depth = np.full((300, 400), 0.8, np.float32) + np.linspace(0, 0.1, 400, dtype=np.float32)
+    depth[100:200, 150:250] = 0.5
+    poses = moving(view(), (0.002, 0.001, 0.003), turn)
+    motion = motion_px(camera, poses, float(np.quantile(depth[::8, ::8], 0.001)))
+    frames = 2 * int(np.ceil(0.5 * (motion - 1.0))) + 1
+    found = motion_blur(image, depth, camera, poses)
+    inside = [(rng.integers(0, 400), rng.integers(0, 300)) for _ in range(60)]
+    for x, y in [(0, 0), (399, 299), (1, 150), (398, 7), *inside]:
+        if np.ptp(depth[max(0, y - 12) : y + 13, max(0, x - 12) : x + 13]) > 0.1:
+            continue  # where a step in depth passes, whole fans of sources are as good as one another
+        expected = blurred_twin(image, depth, camera, poses, frames, int(x), int(y))
+        assert np.allclose(found[y, x], expected, atol=5e-3), (x, y)
 
 
 def test_pose_at_ends_and_between():

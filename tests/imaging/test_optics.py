@@ -13,7 +13,7 @@ from scipy.interpolate import RegularGridInterpolator
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.imaging import Lights, PinholeCamera, Render, SiltOptics, haze_between, through_water, water_optics
-from wakewise.imaging.optics import BACKSCATTER_RATIO, sample_grid, water_types
+from wakewise.imaging.optics import BACKSCATTER_RATIO, decayed, sample_grid, water_types
 from wakewise.interfaces import ScalarGrid
 
 DATA = pathlib.Path(os.environ.get("WAKEWISE_DATA", pathlib.Path(__file__).parents[3] / "shared" / "data"))
@@ -127,6 +127,16 @@ def test_grid_sampling_is_trilinear_and_zero_outside():
     reference = RegularGridInterpolator(axes, values, bounds_error=False, fill_value=0.0)
     for point in rng.uniform([-0.4, 0.1, 0.9], [0.2, 0.8, 1.7], (300, 3)):
         assert sample_grid(values, origin, spacing, *point) == pytest.approx(float(reference(point)[0]), abs=1e-12)
+
+
+def test_the_fast_exponential_is_one():
+    """What an optical depth leaves is exp(-tau) within 1e-9, falls steadily, and is nothing for endless ones."""
+    tau = np.concatenate([np.linspace(0.0, 30.0, 3001), [60.0, 1e3, 1e9]])
+    left = np.array([decayed(t) for t in tau])
+    assert np.abs(left - np.exp(-tau)).max() < 1e-9
+    assert np.abs(left * np.exp(np.minimum(tau, 3.0)) - 1.0)[tau <= 3.0].max() < 1e-8
+    assert (np.diff(left) <= 0.0).all()
+    assert left[-1] < 1e-20
 
 
 def test_unknown_water_and_impossible_silt_are_refused():

@@ -3,6 +3,8 @@
 import numba
 import numpy as np
 import pytest
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
 from imaging_helpers import BED_Z, box, box_scene, coral_scene, view
 
 from wakewise.errors import InputError
@@ -171,6 +173,65 @@ def _first_hit(triangles, origin, ray):
     t = np.where((u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9) & (t > 0), t, np.inf)
     face = int(np.argmin(t))
     return face, t[face], np.array([1 - u[face] - v[face], u[face], v[face]])
+
+
+@pytest.mark.parametrize("camera", [CAMERA, LENS, PORT], ids=["ideal", "distorted", "port"])
+def test_the_whole_view_is_what_ray_casting_sees(camera):
+    """Target, stones and bed have the depth that rays cast at all triangles at once give, but for grazed edges."""
+    scene, target = coral_scene()
+    caster = EmbreeScene()
+    TriangleMesh(caster, scene.vertices_F_m, scene.faces)
+    X_WC = view(30, centre=target.centre_W_m)
+    seen = render(scene, camera, X_WC, LIGHTS)
+    pixels = np.stack(np.meshgrid(np.arange(480) + 0.5, np.arange(360) + 0.5), axis=-1).reshape(-1, 2)
+    near, far = (X_WC.apply(camera.unproject(pixels, np.full(len(pixels), d))) for d in (0.05, 1.05))
+    hits = caster.run((near - scene.foot_W_m).astype(np.float32), (far - near).astype(np.float32), output=True)
+    depth = np.where(hits["geomID"] >= 0, 0.05 + hits["tfar"], 1e4).reshape(360, 480)
+    found = np.minimum(seen.depth_m, 1e4)
+    same = np.abs(depth - found) < 1e-5 * np.maximum(1.0, found**2)
+    assert (~same).sum() < 20
+    assert (depth < 1e4).mean() > 0.5
+    on_target = (hits["primID"] < scene.first_face[1]).reshape(360, 480) & (depth < 1e4)
+    assert (seen.target_fraction[on_target & same] > 0.0).mean() > 0.99
+
+
+@pytest.mark.parametrize("elevation", [25, 65])
+def test_samples_are_the_pixels_of_a_finer_image(elevation):
+    """Where the target is in a pixel, its colour and share are the mean over 2 x 2 pixels of an image twice as fine."""
+    scene, target = coral_scene()
+    X_WC = view(elevation, 130, 0.3, centre=target.centre_W_m)
+    coarse = render(scene, PinholeCamera(160, 120, np.deg2rad(70)), X_WC, LIGHTS, samples=2)
+    fine = render(scene, PinholeCamera(320, 240, np.deg2rad(70)), X_WC, LIGHTS, samples=1)
+
+    def halved(image):
+        return image.reshape(120, 2, 160, 2, -1).mean(axis=(1, 3)).reshape(image[::2, ::2].shape)
+
+    on_target = coarse.target_fraction > 0.0
+    assert on_target.sum() > 500
+    assert (coarse.target_fraction[on_target] < 1.0).sum() > 50
+    same = np.abs(coarse.target_fraction - halved(fine.target_fraction)) < 1e-6
+    assert same[on_target].mean() > 0.99
+    for name in ("radiance", "lamp_radiance"):
+        a, b = getattr(coarse, name), halved(getattr(fine, name))
+        assert np.allclose(a[on_target & same], b[on_target & same], rtol=1e-3, atol=1e-4)
+
+
+def test_needs_more_agrees_with_looking_at_each_neighbour():
+    """On random kinds and depths, open water among them, the fast rule is the one that it states."""
+    rng = np.random.default_rng(3)
+    kind = rng.choice(np.array([-1, 0, 1, 1, 1, 1, 1, 1, 2], np.int8), (40, 50))
+    kind[:20] = 1
+    depth = rng.uniform(0.9, 0.95, (40, 50)).astype(np.float32)
+    depth[kind < 0] = np.inf
+    found = np.empty((40, 50), bool)
+    needs_more(kind, depth, 0, 40, found)
+    for y, x in np.ndindex(40, 50):
+        around = np.s_[max(0, y - 1) : y + 2, max(0, x - 1) : x + 2]
+        own, d = kind[y, x], depth[y, x]
+        edge = (kind[around] != own).any()
+        step = own >= 0 and ((depth[around] < 0.96 * d) | (depth[around] > 1.04 * d)).any()
+        assert found[y, x] == (own in (0, 2) or edge or step)
+    assert 0.2 < found.mean() < 0.95
 
 
 def test_where_one_ray_is_not_enough():

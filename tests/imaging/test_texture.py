@@ -69,6 +69,38 @@ def test_baked_bed_agrees_with_its_noise():
     assert np.allclose(texture.baked_albedo(maps, 0.001, x, y, 0.0005), texture.sand_albedo(x, y, 0.002, 9), atol=2e-5)
 
 
+def bed_twin(maps, texel_m, x, y, footprint_m):
+    """Bilinear in each of two levels that the footprint lies between, by numpy's interpolation; rest by log2."""
+    size = maps.shape[1]
+
+    def level(k):
+        places = (np.arange(size) + 0.5 - 0.5 * size) * texel_m * 2.0**k
+        along_y = [[np.interp(y, places, maps[k, i, :, c] / 65535.0) for i in range(size)] for c in range(3)]
+        return np.array([np.interp(x, places, column) for column in along_y])
+
+    low = int(np.clip(np.floor(np.log2(max(footprint_m / texel_m, 1.0))), 0, len(maps) - 2))
+    rest = min(max(np.log2(max(footprint_m / texel_m, 1.0)) - low, 0.0), 1.0)
+    return level(low) + rest * (level(low + 1) - level(low))
+
+
+def test_looking_up_the_bed_agrees_with_its_twin():
+    """Anywhere on the finest map the colour is that of the readable interpolation, but for 0.01 of a level."""
+    maps = texture.bake_bed(64, 3, 0.001, 9)
+    rng = np.random.default_rng(6)
+    for x, y in rng.uniform(-0.03, 0.03, (60, 2)):
+        footprint = 0.001 * 2.0 ** rng.uniform(-1.0, 3.0)
+        found = texture.baked_albedo(maps, 0.001, x, y, footprint)
+        assert np.allclose(found, bed_twin(maps, 0.001, x, y, footprint), atol=2e-3)
+
+
+def test_logarithm_from_the_bits():
+    """Whole number and rest add up to log2 within 0.01, exactly at powers of two."""
+    for x in (1.0, 1.3, 1.99, 2.0, 3.0, 4.0, 1000.0, 4096.0):
+        whole, rest = texture.whole_log2(x)
+        assert whole == math.floor(math.log2(x))
+        assert abs(whole + rest - math.log2(x)) <= (0.0 if math.log2(x).is_integer() else 0.01)
+
+
 def test_albedos_are_reflectances():
     """Coral, stone and sand reflect between 0 and 1 in every band, and differ from place to place."""
     points = np.random.default_rng(3).uniform(-0.3, 0.3, (500, 3))

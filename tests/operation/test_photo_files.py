@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 
 from wakewise.imaging import ImagingSettings
+from wakewise.operation import load_scenario, photo_name
 from wakewise.operation.photography import write_image
 
 
@@ -25,3 +26,11 @@ def test_format_is_png_unless_asked():
     """PNG is the default, JPEG an option with a quality."""
     assert ImagingSettings().photo_format == "png"
     assert ImagingSettings(photo_format="jpeg", jpeg_quality=80).jpeg_quality == 80
+
+
+def test_the_suffix_follows_the_format():
+    """A photograph keeps the route's name, and its suffix says how it is stored."""
+    scenario = load_scenario("quick", None, {})
+    stored = load_scenario("quick", None, {"imaging.photo_format": "jpeg"})
+    assert photo_name("007.png", scenario) == "007.png"
+    assert photo_name("007.png", stored) == "007.jpg"

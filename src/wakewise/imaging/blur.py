@@ -12,13 +12,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
 from wakewise.imaging.camera import Camera
 from wakewise.imaging.lens import IDEAL, pixel_at, ray_at
-from wakewise.imaging.renderer import Image
+from wakewise.imaging.renderer import BAND_ROWS, Image, in_threads
 
 STEP_PX = 1.0
 """Largest motion between two averaged frames, no wider than a pixel, so that a point's trail shows no beads."""
@@ -83,27 +83,44 @@ def motion_blur(image: Image, depth_m: Image, camera: Camera, poses: Sequence[Po
     for k in range(frames):
         X_KM = pose_at(poses, (k + 0.5) / frames).inverse() @ middle
         turns[k], shifts[k] = X_KM.R, X_KM.p_m
-    out = np.empty_like(image)
-    row = camera.row
-    _average(out, image, 1.0 / depth_m, turns, shifts, np.append(row, 1.0 / row[1:3]))
+    out, planes = np.empty_like(image), np.empty((3, *depth_m.shape), np.float32)
+    lens = np.append(camera.row, 1.0 / camera.row[1:3])
+    h = camera.height
+    bands = range(0, h, BAND_ROWS)
+    in_threads(lambda first: _split(first, min(first + BAND_ROWS, h), planes, image), bands)
+    in_threads(
+        lambda first: _average(first, min(first + BAND_ROWS, h), out, planes, depth_m, turns, shifts, lens), bands
+    )
     return out
 
 
+@njit(cache=True, nogil=True, error_model="numpy")
+def _split(first: int, last: int, planes: Any, image: Any) -> None:
+    """An image (h, w, 3) as planes (3, h, w): along a plane's rows several pixels go through at once."""
+    for y in range(first, last):
+        for x in range(image.shape[1]):
+            planes[0, y, x], planes[1, y, x], planes[2, y, x] = image[y, x, 0], image[y, x, 1], image[y, x, 2]
+
+
+_HALF, _ONE = np.float32(0.5), np.float32(1.0)
+_THREE_HALVES, _TWO, _FIVE_HALVES = np.float32(1.5), np.float32(2.0), np.float32(2.5)
+
+
 @njit(cache=True, inline="always", error_model="numpy")
-def _cubic(t: float) -> tuple[float, float, float, float]:
+def _cubic(t: Any) -> Any:
     """Weights of four neighbours at a fraction t: cubic convolution (Keys 1981, doi 10.1109/TASSP.1981.1163711).
 
     Linear weights would soften every frame of a hardly moving camera by more than the motion does.
     """
     return (
-        ((-0.5 * t + 1.0) * t - 0.5) * t,
-        (1.5 * t - 2.5) * t * t + 1.0,
-        ((-1.5 * t + 2.0) * t + 0.5) * t,
-        (0.5 * t - 0.5) * t * t,
+        ((-_HALF * t + _ONE) * t - _HALF) * t,
+        (_THREE_HALVES * t - _FIVE_HALVES) * t * t + _ONE,
+        ((-_THREE_HALVES * t + _TWO) * t + _HALF) * t,
+        (_HALF * t - _HALF) * t * t,
     )
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _seen_at(lens: Any, turns: Any, shifts: Any, k: int, qx: float, qy: float, nearness: float) -> tuple[float, float]:
     """Pixel at which another frame sees what the middle one sees in the pixel (qx, qy) at 1 / nearness."""
     if lens[0] == IDEAL:
@@ -122,40 +139,126 @@ def _seen_at(lens: Any, turns: Any, shifts: Any, k: int, qx: float, qy: float, n
     return pixel_at(lens, x, y, max(z, lens[13] + 1e-3))
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
-def _average(out: Any, image: Any, nearness: Any, turns: Any, shifts: Any, lens: Any) -> None:
-    """Mean over frames k of image[q_k(p)], where q_k solves seen_k(q) = p by fixed-point steps from q = p."""
-    h, w = nearness.shape
-    frames = turns.shape[0]
-    for y in prange(h):
+@njit(cache=True, error_model="numpy")
+def _source(
+    lens: Any, turns: Any, shifts: Any, k: int, x: int, y: int, qx: float, qy: float, depth_m: Any
+) -> tuple[float, float]:
+    """Place q in the middle frame that frame k sees at pixel (x, y): seen_k(q) = p, by fixed-point steps from q."""
+    h, w = depth_m.shape
+    for _ in range(4):
+        i = min(max(int(qx), 0), w - 1)
+        j = min(max(int(qy), 0), h - 1)
+        sx, sy = _seen_at(lens, turns, shifts, k, qx, qy, 1.0 / depth_m[j, i])
+        ex, ey = x + 0.5 - sx, y + 0.5 - sy
+        qx += ex
+        qy += ey
+        if abs(ex) + abs(ey) < 0.01:
+            break
+    return qx, qy
+
+
+@njit(cache=True, error_model="numpy")
+def _sources(lens: Any, turns: Any, shifts: Any, k: int, y: int, depth_m: Any, nearness: Any, qx: Any, qy: Any) -> None:
+    """Write `_source` of a row of pixels.
+
+    Two steps at the pixel's own depth, a whole row at once, are all where depth hardly changes on the way: the first
+    leaves a thousandth of the motion. Elsewhere, and through lenses, single pixels go on.
+    """
+    h, w = depth_m.shape
+    if lens[0] != IDEAL:
         for x in range(w):
-            red, green, blue = image[y, x, 0], image[y, x, 1], image[y, x, 2]
-            for k in range(frames):
-                if k == frames // 2:
-                    continue
-                qx, qy = x + 0.5, y + 0.5
-                for _ in range(4):
-                    i = min(max(int(qx), 0), w - 1)
-                    j = min(max(int(qy), 0), h - 1)
-                    sx, sy = _seen_at(lens, turns, shifts, k, qx, qy, nearness[j, i])
-                    ex, ey = x + 0.5 - sx, y + 0.5 - sy
-                    qx += ex
-                    qy += ey
-                    if abs(ex) + abs(ey) < 0.01:
-                        break
-                u = min(max(qx - 0.5, 0.0), w - 1.0)
-                v = min(max(qy - 0.5, 0.0), h - 1.0)
-                i, j = int(u), int(v)
-                a0, a1, a2, a3 = _cubic(u - i)
-                b0, b1, b2, b3 = _cubic(v - j)
-                i0, i2, i3 = max(i - 1, 0), min(i + 1, w - 1), min(i + 2, w - 1)
-                for n in range(4):
-                    weight = b0 if n == 0 else b1 if n == 1 else b2 if n == 2 else b3
-                    m = min(max(j + n - 1, 0), h - 1)
-                    c0, c1, c2, c3 = weight * a0, weight * a1, weight * a2, weight * a3
-                    red += c0 * image[m, i0, 0] + c1 * image[m, i, 0] + c2 * image[m, i2, 0] + c3 * image[m, i3, 0]
-                    green += c0 * image[m, i0, 1] + c1 * image[m, i, 1] + c2 * image[m, i2, 1] + c3 * image[m, i3, 1]
-                    blue += c0 * image[m, i0, 2] + c1 * image[m, i, 2] + c2 * image[m, i2, 2] + c3 * image[m, i3, 2]
-            out[y, x, 0] = max(red, 0.0) / frames
-            out[y, x, 1] = max(green, 0.0) / frames
-            out[y, x, 2] = max(blue, 0.0) / frames
+            qx[x], qy[x] = _source(lens, turns, shifts, k, x, y, x + 0.5, y + 0.5, depth_m)
+        return
+    own = depth_m[y]
+    for x in range(w):
+        nearness[x] = 1.0 / own[x]
+    t00, t01, t02, t10, t11, t12 = (
+        turns[k, 0, 0], turns[k, 0, 1], turns[k, 0, 2], turns[k, 1, 0], turns[k, 1, 1], turns[k, 1, 2],
+    )  # fmt: skip
+    t20, t21, t22, s0, s1, s2 = turns[k, 2, 0], turns[k, 2, 1], turns[k, 2, 2], shifts[k, 0], shifts[k, 1], shifts[k, 2]
+    fx, fy, cx, cy, per_fx, per_fy = lens[1], lens[2], lens[3], lens[4], lens[14], lens[15]
+    for x in range(w):
+        rx, ry, near = (x + 0.5 - cx) * per_fx, (y + 0.5 - cy) * per_fy, nearness[x]
+        px, py = rx, ry
+        for _ in range(2):
+            per_z = 1.0 / max(t20 * rx + t21 * ry + t22 + s2 * near, 1e-3)
+            sx = (t00 * rx + t01 * ry + t02 + s0 * near) * per_z
+            sy = (t10 * rx + t11 * ry + t12 + s1 * near) * per_z
+            rx += px - sx
+            ry += py - sy
+        qx[x], qy[x] = cx + fx * rx, cy + fy * ry
+    # A change of nearness moves a point by this much, in pixels.
+    gain = fx * (abs(s0) + abs(s1) + abs(s2))
+    for x in range(w):
+        i = min(max(int(qx[x]), 0), w - 1)
+        j = min(max(int(qy[x]), 0), h - 1)
+        if not gain * abs(1.0 / depth_m[j, i] - nearness[x]) < 0.01:
+            qx[x], qy[x] = _source(lens, turns, shifts, k, x, y, x + 0.5, y + 0.5, depth_m)
+
+
+@njit(cache=True, error_model="numpy")
+def _add_run(total: Any, pixels: Any, across: Any, down: Any) -> None:
+    """Add to `total` (m,) the values between pixels (m + 3,) of one row at fractions `across`, times `down`."""
+    for x in range(total.shape[0]):
+        a0, a1, a2, a3 = _cubic(across[x])
+        total[x] += down[x] * (a0 * pixels[x] + a1 * pixels[x + 1] + a2 * pixels[x + 2] + a3 * pixels[x + 3])
+
+
+@njit(cache=True, error_model="numpy")
+def _add_frame(totals: Any, planes: Any, columns: Any, rows: Any, across: Any, down: Any) -> None:
+    """Add to `totals` (3, w) the values of the planes at pixels `columns`, `rows` plus fractions `across` and `down`.
+
+    Pixels that lie the same number of whole pixels away from their sources are done together.
+    """
+    _, h, w = planes.shape
+    first = 0
+    while first < w:
+        i, j = columns[first], rows[first]
+        last = first + 1
+        if i >= 1:
+            while last < w and columns[last] - last == i - first and rows[last] == j and columns[last] + 2 < w:
+                last += 1
+        if i >= 1 and i + 2 < w:
+            for n in range(4):
+                m = min(max(j + n - 1, 0), h - 1)
+                for c in range(3):
+                    _add_run(
+                        totals[c, first:last], planes[c, m, i - 1 : i + last - first + 2], across[first:last],
+                        down[n, first:last],
+                    )  # fmt: skip
+        else:
+            a = _cubic(across[first])
+            for n in range(4):
+                m = min(max(j + n - 1, 0), h - 1)
+                for s in range(4):
+                    at = min(max(i + s - 1, 0), w - 1)
+                    for c in range(3):
+                        totals[c, first] += down[n, first] * a[s] * planes[c, m, at]
+        first = last
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _average(first: int, last: int, out: Any, planes: Any, depth_m: Any, turns: Any, shifts: Any, lens: Any) -> None:
+    """Mean over frames k of image[q_k(p)], where q_k solves seen_k(q) = p, in rows first..last-1."""
+    h, w = depth_m.shape
+    frames = turns.shape[0]
+    totals, down = np.empty((3, w), np.float32), np.empty((4, w), np.float32)
+    qx, qy, nearness = np.empty(w), np.empty(w), np.empty(w)
+    columns, rows, across = np.empty(w, np.int64), np.empty(w, np.int64), np.empty(w, np.float32)
+    share, dark = np.float32(1.0 / frames), np.float32(0.0)
+    for y in range(first, last):
+        totals[:] = planes[:, y]
+        for k in range(frames):
+            if k == frames // 2:
+                continue
+            _sources(lens, turns, shifts, k, y, depth_m, nearness, qx, qy)
+            for x in range(w):
+                u = min(max(qx[x] - 0.5, 0.0), w - 1.0)
+                v = min(max(qy[x] - 0.5, 0.0), h - 1.0)
+                columns[x], rows[x] = int(u), int(v)
+                across[x] = u - columns[x]
+                down[0, x], down[1, x], down[2, x], down[3, x] = _cubic(np.float32(v - rows[x]))
+            _add_frame(totals, planes, columns, rows, across, down)
+        for x in range(w):
+            for c in range(3):
+                out[y, x, c] = max(totals[c, x], dark) * share

@@ -15,16 +15,18 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.imaging.camera import Camera
 from wakewise.imaging.lens import ray_at
-from wakewise.imaging.renderer import LAMP_REFERENCE_M, Image, Lights, Render
+from wakewise.imaging.renderer import BAND_ROWS, LAMP_REFERENCE_M, Image, Lights, Render, in_threads
 from wakewise.interfaces import ScalarGrid
 
+NOTHING_M = 1e4
+"""Length of a ray that meets nothing: no light from beyond gets through."""
 BACKSCATTER_RATIO = 0.0183
 """Share of scattering that goes backward, of particles in sea water (Petzold 1972; Mobley 1994, table 3.11)."""
 
@@ -164,11 +166,16 @@ def haze_between(
     origin = np.zeros(3) if silt is None else silt.origin_W_m
     spacing = 1.0 if silt is None else silt.spacing_m
     power = lights.lamp * LAMP_REFERENCE_M**2 / max(1, len(lights.lamps_C_m))
-    _march(
-        table, ranges, stride, camera.row, X_WC.R, X_WC.p_m, values, origin, spacing, silt_optics.attenuation_m2_kg,
-        water.signal_per_m, water.veil_per_m, lights.from_above * water.veil, lights.from_above * silt_optics.veil,
-        water.backscatter_per_m, silt_optics.backscatter_share, lights.lamps_C_m, power,
-    )  # fmt: skip
+
+    def band(first: int) -> None:
+        _march(
+            first, min(first + 4, rows), table, ranges, stride, camera.row, X_WC.R, X_WC.p_m, values, origin, spacing,
+            silt_optics.attenuation_m2_kg, water.signal_per_m, water.veil_per_m, lights.from_above * water.veil,
+            lights.from_above * silt_optics.veil, water.backscatter_per_m, silt_optics.backscatter_share,
+            lights.lamps_C_m, power,
+        )  # fmt: skip
+
+    in_threads(band, range(0, rows, 4))
     return Haze(ranges_m=ranges, table=table, stride=stride)
 
 
@@ -185,10 +192,15 @@ def through_water(
     """
     out = np.empty_like(view.radiance)
     silt_per_m = np.empty_like(view.depth_m)
-    _apply(
-        out, silt_per_m, view.radiance, view.lamp_radiance, view.depth_m, haze.ranges_m, haze.table, haze.stride,
-        camera.row, water.signal_per_m, water.veil_per_m, from_above * water.veil,
-    )  # fmt: skip
+
+    def band(first: int) -> None:
+        _apply(
+            first, min(first + BAND_ROWS, camera.height), out, silt_per_m, view.radiance, view.lamp_radiance,
+            view.depth_m, haze.ranges_m, haze.table, haze.stride, camera.row, water.signal_per_m, water.veil_per_m,
+            from_above * water.veil,
+        )  # fmt: skip
+
+    in_threads(band, range(0, camera.height, BAND_ROWS))
     return out, silt_per_m
 
 
@@ -209,20 +221,27 @@ def sample_grid(values: Any, origin: Any, spacing: float, x: float, y: float, z:
     return low * (1 - c) + high * c
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _march(
-    table: Any, ranges: Any, stride: int, lens: Any, R_WC: Any, p: Any, values: Any, origin: Any, spacing: float,
-    attenuation: float, signal: Any, veil_rate: Any, water_veil: Any, silt_veil: Any, water_back: Any, silt_back: Any,
-    lamps: Any, power: float,
+    first: int, last: int, table: Any, ranges: Any, stride: int, lens: Any, R_WC: Any, p: Any, values: Any, origin: Any,
+    spacing: float, attenuation: float, signal: Any, veil_rate: Any, water_veil: Any, silt_veil: Any, water_back: Any,
+    silt_back: Any, lamps: Any, power: float,
 ) -> None:  # fmt: skip
-    """Midpoint rule, two steps between nodes; within a step the medium is uniform and the exponentials are exact.
+    """Midpoint rule in rows first..last-1, two steps between nodes; in a step the medium is uniform.
 
     Light from above: dL/ds = (beta_B B_w + c_s B_s) T. Lamps: a medium that scatters b_b backward evenly over the rear
     hemisphere returns b_b / (2 pi) of the irradiance per steradian, which is b_b / 2 relative to a white card's 1 / pi,
     and the lamp's light has come about the same way as it goes back: T squared.
     """
-    rows, columns, nodes, _ = table.shape
-    for row in prange(rows):
+    _, columns, nodes, _ = table.shape
+    # What clear water keeps along each step, one way at the veil's rate and out and back at the signal's.
+    clear_kept, clear_kept_twice = np.empty((nodes, 3)), np.empty((nodes, 3))
+    for node in range(1, nodes):
+        for c in range(3):
+            length = 0.5 * (ranges[node] - ranges[node - 1])
+            clear_kept[node, c] = math.exp(-veil_rate[c] * length)
+            clear_kept_twice[node, c] = math.exp(-2.0 * signal[c] * length)
+    for row in range(first, last):
         left = np.empty(3)  # of light from above, on its way to the camera
         left_twice = np.empty(3)  # of the lamps' light, out and back
         for column in range(columns):
@@ -253,20 +272,18 @@ def _march(
                         if lz > 0.0:
                             r2 = lx * lx + ly * ly + lz * lz + 1e-4
                             lamp += power * lz / (r2 * math.sqrt(r2))
+                    silt_kept = math.exp(-silt * length) if silt > 0.0 else 1.0
                     for c in range(3):
                         fade = veil_rate[c] + silt
                         source = veil_rate[c] * water_veil[c] + silt * silt_veil[c]
-                        kept = math.exp(-fade * length)
+                        kept = clear_kept[node, c] * silt_kept
                         amount = source * left[c] * _mean_decay(fade, length, kept)
                         left[c] *= kept
+                        kept_twice = clear_kept_twice[node, c] * silt_kept * silt_kept
                         if lamp > 0.0:
                             back = 0.5 * (water_back[c] + silt * silt_back[c]) * lamp
-                            both_ways = 2.0 * (signal[c] + silt)
-                            kept = math.exp(-both_ways * length)
-                            amount += back * left_twice[c] * _mean_decay(both_ways, length, kept)
-                            left_twice[c] *= kept
-                        else:
-                            left_twice[c] *= math.exp(-2.0 * (signal[c] + silt) * length)
+                            amount += back * left_twice[c] * _mean_decay(2.0 * (signal[c] + silt), length, kept_twice)
+                        left_twice[c] *= kept_twice
                         table[row, column, node, 1 + c] += amount
                     tau += silt * length
                 table[row, column, node, 0] = tau
@@ -279,49 +296,73 @@ def _mean_decay(rate: float, length: float, kept: float) -> float:
     return length * (1.0 - 0.5 * x) if x < 1e-6 else (1.0 - kept) / rate
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, inline="always", error_model="numpy")
+def decayed(tau: float) -> float:
+    """exp(-tau) of an optical depth, not negative: a 64th of it by series, then squared six times.
+
+    Within 1e-8 of exp(-tau) itself everywhere; below exp(-60) it stays there.
+    """
+    x = -min(tau, 60.0) * (1.0 / 64.0)
+    y = 1.0 + x * (1.0 + x * (1.0 / 2.0) * (1.0 + x * (1.0 / 3.0) * (1.0 + x * (1.0 / 4.0) * (1.0 + x * (1.0 / 5.0)))))
+    y *= y
+    y *= y
+    y *= y
+    y *= y
+    y *= y
+    return y * y
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _apply(
-    out: Any, silt_per_m: Any, radiance: Any, lamp_radiance: Any, depth_m: Any, ranges: Any, table: Any, stride: int,
-    lens: Any, signal: Any, veil_rate: Any, water_veil: Any,
+    first_row: int, last_row: int, out: Any, silt_per_m: Any, radiance: Any, lamp_radiance: Any, depth_m: Any,
+    ranges: Any, table: Any, stride: int, lens: Any, signal: Any, veil_rate: Any, water_veil: Any,
 ) -> None:  # fmt: skip
-    h, w = depth_m.shape
+    w = depth_m.shape[1]
     _, columns, nodes, _ = table.shape
     last = nodes - 1
     reach = ranges[last]
-    for y in prange(h):
-        v = (y + 0.5) / stride
+    per_reach, per_stride = 1.0 / reach, 1.0 / stride
+    per_gap = 1.0 / (ranges[1:] - ranges[:-1])
+    line = np.empty((columns, nodes, 4), np.float32)
+    lengths, silts = np.empty(w), np.empty(w)
+    veils, kept = np.empty((3, w)), np.empty(w)
+    for y in range(first_row, last_row):
+        v = (y + 0.5) * per_stride
         j = int(v)
         b = np.float32(v - j)
-        line = np.empty((columns, nodes, 4), np.float32)
+        above, below = table[j], table[j + 1]
         for i in range(columns):
             for k in range(nodes):
                 for c in range(4):
-                    line[i, k, c] = table[j, i, k, c] + b * (table[j + 1, i, k, c] - table[j, i, k, c])
+                    line[i, k, c] = above[i, k, c] + b * (below[i, k, c] - above[i, k, c])
+        # In short loops over the row, so that several pixels go through at once.
         for x in range(w):
-            u = (x + 0.5) / stride
-            i = int(u)
-            a = u - i
             sx, sy, _ = ray_at(lens, x + 0.5, y + 0.5)
-            nothing = not depth_m[y, x] < 1e4
-            r = 1e4 if nothing else max(depth_m[y, x] - lens[13], 0.0) * math.sqrt(sx * sx + sy * sy + 1.0)
-            near = min(r, reach)
+            slant = math.sqrt(sx * sx + sy * sy + 1.0)
+            lengths[x] = min(max(depth_m[y, x] - lens[13], 0.0) * slant, NOTHING_M)
+        for x in range(w):
+            near = min(lengths[x], reach)
+            u = (x + 0.5) * per_stride
+            p = np.uint64(u)
             # Nodes stand at reach * (k / last)**2.
-            k = min(int(last * math.sqrt(near / reach)), last - 1)
-            f = min(max((near - ranges[k]) / (ranges[k + 1] - ranges[k]), 0.0), 1.0)
+            q = np.uint64(min(int(last * math.sqrt(near * per_reach)), last - 1))
+            p1, q1 = p + np.uint64(1), q + np.uint64(1)
+            a, f = u - p, min(max((near - ranges[q]) * per_gap[q], 0.0), 1.0)
             w00, w01, w10, w11 = (1 - a) * (1 - f), (1 - a) * f, a * (1 - f), a * f
-            silt = w00 * line[i, k, 0] + w01 * line[i, k + 1, 0]
-            silt += w10 * line[i + 1, k, 0] + w11 * line[i + 1, k + 1, 0]
-            beyond = r - near
-            for c in range(3):
-                q = c + 1
-                value = w00 * line[i, k, q] + w01 * line[i, k + 1, q]
-                value += w10 * line[i + 1, k, q] + w11 * line[i + 1, k + 1, q]
-                if not nothing:
-                    kept = math.exp(-signal[c] * r - silt)
-                    lamp = lamp_radiance[y, x, c]
-                    value += kept * (radiance[y, x, c] - lamp + lamp * kept)
-                if beyond > 0.0:
-                    far = 1.0 - math.exp(-veil_rate[c] * beyond)
-                    value += water_veil[c] * math.exp(-veil_rate[c] * near - silt) * far
-                out[y, x, c] = value
-            silt_per_m[y, x] = silt / max(near, 1e-6)
+            silts[x] = w00 * line[p, q, 0] + w01 * line[p, q1, 0] + w10 * line[p1, q, 0] + w11 * line[p1, q1, 0]
+            veils[0, x] = w00 * line[p, q, 1] + w01 * line[p, q1, 1] + w10 * line[p1, q, 1] + w11 * line[p1, q1, 1]
+            veils[1, x] = w00 * line[p, q, 2] + w01 * line[p, q1, 2] + w10 * line[p1, q, 2] + w11 * line[p1, q1, 2]
+            veils[2, x] = w00 * line[p, q, 3] + w01 * line[p, q1, 3] + w10 * line[p1, q, 3] + w11 * line[p1, q1, 3]
+            silt_per_m[y, x] = silts[x] / max(near, 1e-6)
+        for c in range(3):
+            veil = veils[c]
+            for x in range(w):
+                kept[x] = decayed(signal[c] * lengths[x] + silts[x])
+            for x in range(w):
+                lamp = lamp_radiance[y, x, c]
+                out[y, x, c] = veil[x] + kept[x] * (radiance[y, x, c] - lamp + lamp * kept[x])
+        for x in range(w):
+            if lengths[x] > reach:
+                for c in range(3):
+                    far = 1.0 - decayed(veil_rate[c] * (lengths[x] - reach))
+                    out[y, x, c] += water_veil[c] * decayed(veil_rate[c] * reach + silts[x]) * far

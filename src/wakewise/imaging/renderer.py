@@ -20,15 +20,20 @@ from numpy.typing import NDArray
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
+from wakewise.imaging.bed_view import draw_bed, project_bed
 from wakewise.imaging.camera import Camera
-from wakewise.imaging.scene import Scene
-from wakewise.imaging.shading import aim, keep_first, needs_more, shade
+from wakewise.imaging.lens import IDEAL
+from wakewise.imaging.nearby import TILE_PX, may_meet
+from wakewise.imaging.scene import BED, Scene
+from wakewise.imaging.shading import aim, average, needs_more, overlay
 
 Image = NDArray[np.float32]
 LAMP_REFERENCE_M = 0.5
 """Where the lamps' irradiance is stated."""
 BAND_RAYS = 32768
 """Rays cast at a time."""
+BAND_ROWS = 32
+"""Rows of an image that a thread takes at a time; those of the noise are part of what a seed gives."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -98,51 +103,70 @@ def render(scene: Scene, camera: Camera, X_WC: Pose, lights: Lights, samples: in
     # Each lamp's share, so that all together give `lamp` at the reference distance.
     power = lights.lamp * LAMP_REFERENCE_M**2 / max(1, len(lamps))
     light = np.float32(lights.ambient) * scene.daylight + np.float32(lights.panels) * scene.panel_light
-    radiance, lamp_radiance = np.zeros((h * w, 3), np.float32), np.zeros((h * w, 3), np.float32)
-    fraction, depth = np.zeros(h * w, np.float32), np.full(h * w, np.inf, np.float32)
-    kind = np.full(h * w, -1, np.int8)
+    radiance, lamp_radiance = np.zeros((h, w, 3), np.float32), np.zeros((h, w, 3), np.float32)
+    fraction, depth = np.zeros((h, w), np.float32), np.full((h, w), np.inf, np.float32)
+    kind = np.full((h, w), -1, np.int8)
+    flat = (radiance.reshape(-1, 3), lamp_radiance.reshape(-1, 3), fraction.reshape(-1))
 
-    axis = np.ascontiguousarray(R[:, 2])
+    n = len(scene.bed.lines_m)
+    of_bed = slice(scene.first_bed_vertex, scene.first_bed_vertex + n * n)
+    attributes = np.concatenate([scene.normals[of_bed], light[of_bed, :1]], axis=1)
+    crossings, boxes = np.empty((n, n, 5)), np.empty((*scene.bed.tops_m.shape, 4))
+    if row[0] == IDEAL:
+        project_bed(scene.bed, row, R, origin, crossings, boxes)
+    tiles = np.empty((-(-h // TILE_PX), -(-w // TILE_PX)), np.bool_)
+    spheres_C = np.column_stack([(scene.spheres_F_m[:, :3] - origin) @ R, scene.spheres_F_m[:, 3]])
+    may_meet(row, w, h, spheres_C, tiles)
 
-    def cast(pixels: NDArray[np.int64], across: int, only_bed: bool) -> tuple[NDArray[np.int64], dict[str, Any]]:
+    def cast(pixels: NDArray[np.int64], across: int) -> tuple[Any, ...]:
         most = len(pixels) * across**2
         starts, ways = np.empty((most, 3), np.float32), np.empty((most, 3), np.float32)
         which, spreads = np.empty(most, np.int64), np.empty(most, np.float32)
         count = aim(pixels, across, w, row, R, origin, scene.top_m, starts, ways, which, spreads)
-        hits = scene.embree.run(starts[:count], ways[:count], output=True)
-        shade(
-            pixels, across, which, starts, ways, spreads, hits["geomID"], hits["primID"], hits["u"], hits["v"],
-            hits["tfar"], scene.faces, scene.first_face, scene.normals, light, scene.bed_maps, scene.seed, axis, power,
-            lamps, only_bed, radiance, lamp_radiance, fraction,
+        hits = scene.solids.run(starts[:count], ways[:count], output=True)
+        return (
+            which, starts, ways, spreads, hits["geomID"], hits["primID"], hits["u"], hits["v"], hits["tfar"],
+            scene.faces, scene.first_face, scene.normals, light, scene.seed,
         )  # fmt: skip
-        return which, hits
+
+    rows = max(TILE_PX, BAND_RAYS // w // TILE_PX * TILE_PX)
 
     def first(begin: int) -> None:
-        pixels = np.arange(begin, min(begin + BAND_RAYS, h * w))
-        which, hits = cast(pixels, 1, samples > 1)
-        keep_first(begin, row, w, which, hits["geomID"], hits["tfar"], kind, depth)
+        end = min(begin + rows, h)
+        draw_bed(
+            begin, end, row, R, origin, scene.bed, crossings, boxes, attributes, scene.bed_maps, power, lamps, kind,
+            depth, radiance, lamp_radiance, BED,
+        )  # fmt: skip
+        near = np.repeat(np.repeat(tiles[begin // TILE_PX : -(-end // TILE_PX)], TILE_PX, axis=0), TILE_PX, axis=1)
+        pixels = np.flatnonzero(near[: end - begin, :w]) + begin * w
+        if len(pixels):
+            which, *met = cast(pixels, 1)
+            overlay(
+                pixels, row, w, which, *met, R, power, lamps, samples == 1, kind.reshape(-1), depth.reshape(-1), *flat
+            )
 
-    in_threads(first, range(0, h * w, BAND_RAYS))
-    kinds, depths = kind.reshape(h, w), depth.reshape(h, w)
+    in_threads(first, range(0, h, rows))
     if samples > 1:
         again = np.empty((h, w), np.bool_)
-        rows = max(1, BAND_RAYS // w)
-        in_threads(lambda y: needs_more(kinds, depths, y, min(y + rows, h), again), range(0, h, rows))
+        in_threads(lambda y: needs_more(kind, depth, y, min(y + rows, h), again), range(0, h, rows))
         more = np.flatnonzero(again)
         step = max(1, BAND_RAYS // samples**2)
-        in_threads(lambda k: cast(more[k : k + step], samples, False), range(0, len(more), step))
-    return Render(
-        radiance=radiance.reshape(h, w, 3),
-        lamp_radiance=lamp_radiance.reshape(h, w, 3),
-        depth_m=depths,
-        target_fraction=fraction.reshape(h, w),
-    )
+
+        def second(begin: int) -> None:
+            pixels = more[begin : begin + step]
+            average(
+                pixels, samples, *cast(pixels, samples), scene.bed, attributes, scene.bed_maps, R, power, lamps, *flat
+            )
+
+        in_threads(second, range(0, len(more), step))
+    return Render(radiance=radiance, lamp_radiance=lamp_radiance, depth_m=depth, target_fraction=fraction)
 
 
 def in_threads(work: Callable[[int], Any], items: Iterable[int]) -> None:
     """Do the work on as many threads as numba uses; Embree and the kernels release the interpreter's lock."""
-    threads = numba.get_num_threads()
-    if threads == 1:
+    items = list(items)
+    threads = min(numba.get_num_threads(), len(items))
+    if threads <= 1:
         for item in items:
             work(item)
         return

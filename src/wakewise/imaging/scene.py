@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from wakewise.arrays import Array, IntArray
 from wakewise.errors import InputError
 from wakewise.imaging.daylight import bake_light
+from wakewise.imaging.height_field import HeightField, grid_faces, height_field
+from wakewise.imaging.nearby import bounding_spheres
 from wakewise.imaging.panels import Panels
 from wakewise.imaging.texture import BED_MAP_LEVELS, BED_MAP_SIZE, BED_TEXEL_M, Maps, bake_bed, bed_heights
 from wakewise.targets import Mesh, Target
@@ -37,7 +39,8 @@ class Scene:
     target, bed and stones one after the other; `normals` (n, 3) point outward; `daylight` (n, 2) is the irradiance of
     the down-welling light on the outer and the inner side, relative to a level open surface, and `panel_light` (n, 2)
     that of the tank's panels, relative to a level open surface at the foot; `bed_maps` the baked sand; `top_m` the
-    least z of all vertices.
+    least z of all vertices. The bed is a height field, `bed`, whose crossings are the vertices from `first_bed_vertex`
+    on; `solids` is target and stones for ray casting, and `spheres_F_m` (k, 4) holds them.
     """
 
     foot_W_m: Array
@@ -50,7 +53,10 @@ class Scene:
     bed_maps: Maps
     top_m: float
     seed: int
-    embree: Any
+    bed: HeightField
+    first_bed_vertex: int
+    spheres_F_m: Array
+    solids: Any
 
     @classmethod
     def build(
@@ -92,7 +98,8 @@ class Scene:
         vertices, faces = target.mesh.vertices_m - foot_W, facing_out(target.mesh).faces
         clear_m = float(np.max(np.hypot(vertices[:, 0], vertices[:, 1])))
 
-        bed_vertices, bed_faces = _bed(clear_m, bed_half_m, noise_seed)
+        lines, bed_vertices = _bed(clear_m, bed_half_m, noise_seed)
+        bed_faces = grid_faces(len(lines))
         stone_vertices, stone_faces = _stones(stones, clear_m + 0.03, bed_half_m, noise_seed)
         parts = [(vertices, faces), (bed_vertices, bed_faces), (stone_vertices, stone_faces)]
         normals = [vertex_normals(v, f) for v, f in parts]
@@ -100,10 +107,11 @@ class Scene:
         daylight, panel_light = bake_light(parts, normals, clear_m + 0.4, panels, foot_W)
 
         offsets = np.cumsum([0] + [len(v) for v, _ in parts])
-        embree = EmbreeScene()
-        for v, f in parts:
+        solids = EmbreeScene()
+        for v, f in (parts[0], parts[2]):
             if len(f):
-                TriangleMesh(embree, np.ascontiguousarray(v, np.float32), np.ascontiguousarray(f, np.int32))
+                TriangleMesh(solids, np.ascontiguousarray(v, np.float32), np.ascontiguousarray(f, np.int32))
+        bed_z = bed_vertices[:, 2].astype(np.float32).reshape(len(lines), len(lines))
         return cls(
             foot_W_m=foot_W,
             vertices_F_m=np.concatenate([v for v, _ in parts]).astype(np.float32),
@@ -115,7 +123,10 @@ class Scene:
             bed_maps=bake_bed(BED_MAP_SIZE, BED_MAP_LEVELS, BED_TEXEL_M, noise_seed),
             top_m=float(min(v[:, 2].min(initial=np.inf) for v, _ in parts)),
             seed=noise_seed,
-            embree=embree,
+            bed=height_field(lines, bed_z),
+            first_bed_vertex=len(vertices),
+            spheres_F_m=bounding_spheres([parts[0], parts[2]]),
+            solids=solids,
         )
 
 
@@ -134,8 +145,8 @@ def facing_out(mesh: Mesh) -> Mesh:
     return mesh if about_middle.volume_m3 >= 0.0 else Mesh(mesh.vertices_m, mesh.faces[:, ::-1])
 
 
-def _bed(clear_m: float, half_m: float, seed: int) -> tuple[Array, IntArray]:
-    """Height field on a square grid that is fine near the foot and coarsens outward, with normals up (z < 0)."""
+def _bed(clear_m: float, half_m: float, seed: int) -> tuple[Array, Array]:
+    """Lines of a square grid that is fine near the foot and coarsens outward, and a vertex at each crossing."""
     # Steps grow from 6 mm under the target to 3 cm at the edge of the fine part, then to 1 m on the apron.
     steps, edge = [], 0.0
     while edge < APRON_M:
@@ -144,16 +155,12 @@ def _bed(clear_m: float, half_m: float, seed: int) -> tuple[Array, IntArray]:
         edge += steps[-1]
     positive = np.cumsum(steps) * (APRON_M / edge)
     line = np.concatenate([-positive[::-1], [0.0], positive])
-    n = len(line)
     x, y = np.meshgrid(line, line, indexing="ij")
     xy = np.stack([x.ravel(), y.ravel()], axis=1)
     # Octaves of relief finer than the coarse apron's cells would only alias there: level it off.
     fade = np.clip((half_m + 0.5 - np.max(np.abs(xy), axis=1)) / 0.5, 0.0, 1.0)
     vertices = np.concatenate([xy, -(fade * bed_heights(xy, clear_m, seed))[:, None]], axis=1)
-    k = np.arange(n * n).reshape(n, n)
-    a, b, c, d = k[:-1, :-1].ravel(), k[1:, :-1].ravel(), k[1:, 1:].ravel(), k[:-1, 1:].ravel()
-    faces = np.concatenate([np.stack([a, c, b], axis=1), np.stack([a, d, c], axis=1)])
-    return vertices, faces
+    return line, vertices
 
 
 def _stones(count: int, inner_m: float, half_m: float, seed: int) -> tuple[Array, IntArray]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from wakewise.arrays import Array
-from wakewise.imaging.renderer import Image
+from wakewise.imaging.renderer import BAND_ROWS, Image, in_threads
 
 _TABLE_SIZE = 4096
 
@@ -21,7 +21,7 @@ def srgb_encode(linear: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 # The table is entered by the square root, along which the curve is nearly straight.
-_ENCODED = (255.0 * srgb_encode(np.linspace(0.0, 1.0, _TABLE_SIZE + 1) ** 2)).astype(np.float32)
+_ENCODED = (255.0 * srgb_encode(np.linspace(0.0, 1.0, _TABLE_SIZE + 1) ** 2) + 0.5).astype(np.uint8)
 
 
 def expose(
@@ -36,22 +36,40 @@ def expose(
     The noise of a pixel with N electrons is Gaussian with variance N + read_noise^2: Poisson's law for the many
     electrons of a daylight exposure.
     """
-    noise = rng.standard_normal(radiance.shape, dtype=np.float32)
-    out = np.empty(radiance.shape, np.uint8)
-    _encode(
-        out, radiance, noise, gains, 1.0 / electrons_at_saturation, read_noise_e / electrons_at_saturation, _ENCODED
-    )
+    h, w, _ = radiance.shape
+    out = np.empty((h, w, 3), np.uint8)
+    radiance = np.ascontiguousarray(radiance)
+    row_gains = np.tile(gains, w).astype(np.float32)
+    shot, read = np.float32(1.0 / electrons_at_saturation), np.float32((read_noise_e / electrons_at_saturation) ** 2)
+    # Each band draws from its own stream: the bytes do not depend on who draws first.
+    seeds = rng.integers(0, 2**63, -(-h // BAND_ROWS))
+
+    def band(k: int) -> None:
+        rows = slice(k * BAND_ROWS, (k + 1) * BAND_ROWS)
+        stream = np.random.Generator(np.random.SFC64(int(seeds[k])))
+        noise = stream.standard_normal(radiance[rows].shape, dtype=np.float32)
+        _encode(
+            out[rows].reshape(-1, 3 * w),
+            radiance[rows].reshape(-1, 3 * w),
+            noise.reshape(-1, 3 * w),
+            row_gains,
+            shot,
+            read,
+            _ENCODED,
+        )
+
+    in_threads(band, range(len(seeds)))
     return out
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
-def _encode(out: Any, radiance: Any, noise: Any, gains: Any, per_electron: float, read: float, table: Any) -> None:
-    h, w, _ = radiance.shape
-    for y in prange(h):
-        for x in range(w):
-            for c in range(3):
-                signal = max(radiance[y, x, c] * gains[c], 0.0)
-                # Shot noise of a full well at most: charge does not grow beyond saturation.
-                value = signal + noise[y, x, c] * np.sqrt(min(signal, 1.0) * per_electron + read * read)
-                place = np.sqrt(min(max(value, 0.0), 1.0)) * (table.shape[0] - 1)
-                out[y, x, c] = int(table[int(place + 0.5)] + 0.5)
+@njit(cache=True, nogil=True, error_model="numpy")
+def _encode(out: Any, radiance: Any, noise: Any, gains: Any, shot: Any, read: Any, table: Any) -> None:
+    """Rows of interleaved channels, shape (h, 3 w), in single precision throughout; `read` is a variance."""
+    zero, one, half = np.float32(0.0), np.float32(1.0), np.float32(0.5)
+    last = np.float32(table.shape[0] - 1)
+    for y in range(out.shape[0]):
+        for x in range(out.shape[1]):
+            signal = max(radiance[y, x] * gains[x], zero)
+            # Shot noise of a full well at most: charge does not grow beyond saturation.
+            value = signal + noise[y, x] * np.sqrt(min(signal, one) * shot + read)
+            out[y, x] = table[np.uint32(np.sqrt(min(max(value, zero), one)) * last + half)]

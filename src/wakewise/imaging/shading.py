@@ -12,9 +12,12 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from wakewise.imaging.lens import IDEAL, ray_at
-from wakewise.imaging.scene import BED, TARGET
-from wakewise.imaging.texture import BED_TEXEL_M, baked_albedo, coral_albedo, stone_albedo
+from wakewise.imaging.bed_view import FAR_M, bed_colour
+from wakewise.imaging.height_field import meet
+from wakewise.imaging.lens import ray_at
+from wakewise.imaging.lighting import lamps_on, spread_at
+from wakewise.imaging.scene import BED, STONE, TARGET
+from wakewise.imaging.texture import coral_albedo, stone_albedo
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -46,19 +49,9 @@ def aim(
                 ways[count, 1] = R_WC[1, 0] * sx + R_WC[1, 1] * sy + R_WC[1, 2]
                 ways[count, 2] = up
                 which[count] = k
-                spreads[count] = step * _spread(row, px, py, sx, sy)
+                spreads[count] = step * spread_at(row, px, py, sx, sy)
                 count += 1
     return count
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _spread(row: Any, x: float, y: float, sx: float, sy: float) -> float:
-    """Width of a pixel at unit depth: how fast the ray turns from pixel to pixel."""
-    if row[0] == IDEAL:
-        return float(1.0 / row[1])
-    ax, ay, _ = ray_at(row, x + 0.5, y)
-    bx, by, _ = ray_at(row, x, y + 0.5)
-    return 2.0 * math.sqrt(abs((ax - sx) * (by - sy) - (ay - sy) * (bx - sx)))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -68,32 +61,37 @@ def needs_more(kind: Any, depth_m: Any, first: int, last: int, out: Any) -> None
     `kind`, `depth_m` and `out` are whole images (h, w); rows first to last - 1 are written.
     """
     h, w = kind.shape
+    # Least and greatest over three rows, then over three columns: the eight neighbours without looking at each.
+    low_kind, high_kind = np.empty(w + 2, kind.dtype), np.empty(w + 2, kind.dtype)
+    near, far = np.empty(w + 2, depth_m.dtype), np.empty(w + 2, depth_m.dtype)
     for y in range(first, last):
+        above, below = max(0, y - 1), min(h - 1, y + 1)
+        for x in range(w):
+            low_kind[x + 1] = min(kind[above, x], kind[y, x], kind[below, x])
+            high_kind[x + 1] = max(kind[above, x], kind[y, x], kind[below, x])
+            near[x + 1] = min(depth_m[above, x], depth_m[y, x], depth_m[below, x])
+            far[x + 1] = max(depth_m[above, x], depth_m[y, x], depth_m[below, x])
+        low_kind[0], high_kind[0], near[0], far[0] = low_kind[1], high_kind[1], near[1], far[1]
+        low_kind[w + 1], high_kind[w + 1], near[w + 1], far[w + 1] = low_kind[w], high_kind[w], near[w], far[w]
         for x in range(w):
             own, d = kind[y, x], depth_m[y, x]
-            if own >= 0 and own != BED:
-                out[y, x] = True
-                continue
-            near, far = 0.96 * d, 1.04 * d
-            more = False
-            for yy in range(max(0, y - 1), min(h, y + 2)):
-                for xx in range(max(0, x - 1), min(w, x + 2)):
-                    other = depth_m[yy, xx]
-                    # Open water is infinitely deep, and so is its own neighbour.
-                    more |= kind[yy, xx] != own or (own >= 0 and (other < near or other > far))
-            out[y, x] = more
+            other = min(low_kind[x], low_kind[x + 1], low_kind[x + 2]) != own
+            other |= max(high_kind[x], high_kind[x + 1], high_kind[x + 2]) != own
+            # Open water is infinitely deep, and so is its own neighbour.
+            step = min(near[x], near[x + 1], near[x + 2]) < np.float32(0.96) * d
+            step |= max(far[x], far[x + 1], far[x + 2]) > np.float32(1.04) * d
+            out[y, x] = other | ((own >= 0) & (step | (own != BED)))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _colour(
+def _solid_colour(
     what: int, triangle: int, u: float, v: float, x: float, y: float, z: float, wx: float, wy: float, wz: float,
-    footprint: float, faces: Any, first_face: Any, normals: Any, light: Any, maps: Any, seed: int, axis: Any,
+    footprint: float, faces: Any, first_face: Any, normals: Any, light: Any, seed: int, ax: float, ay: float, az: float,
     power: float, lamps: Any,
 ) -> tuple[float, float, float, float, float]:  # fmt: skip
-    """Albedo (r, g, b), irradiance from sky and panels, and from the vehicle's lamps, where a ray meets a surface.
+    """Albedo (r, g, b), irradiance from above, and from the lamps, where a ray meets the target or a stone.
 
-    (x, y, z) is the place, (wx, wy, wz) the ray's direction, `axis` the lamps'. Surfaces are matt (Lambert). A lamp's
-    light falls off with the squared distance and with the cosine from its axis.
+    (x, y, z) is the place, (wx, wy, wz) the ray's direction, (ax, ay, az) the lamps'. Surfaces are matt (Lambert).
     """
     face = np.uint64(first_face[what] + triangle)
     # Unsigned: an index that may be negative costs a check at every use.
@@ -108,77 +106,101 @@ def _colour(
     inner = 1 if what == TARGET and facing < -0.25 else 0
     if inner == 1:
         scale = -scale
-    nx, ny, nz = scale * nx, scale * ny, scale * nz
     if what == TARGET:
         red, green, blue = coral_albedo(x, y, z, footprint, seed)
-    elif what == BED:
-        # A slanting footprint is long and narrow: filter to its geometric mean.
-        red, green, blue = baked_albedo(maps, BED_TEXEL_M, x, y, footprint / math.sqrt(max(abs(facing), 0.02)))
     else:
         red, green, blue = stone_albedo(x, y, z, footprint, seed)
     day = wa * light[a, inner] + u * light[b, inner] + v * light[c, inner]
-    night = 0.0
-    for m in range(lamps.shape[0]):
-        lx, ly, lz = lamps[m, 0] - x, lamps[m, 1] - y, lamps[m, 2] - z
-        r2 = lx * lx + ly * ly + lz * lz + 1e-4
-        on_surface = nx * lx + ny * ly + nz * lz
-        off_axis = -(axis[0] * lx + axis[1] * ly + axis[2] * lz)
-        if on_surface > 0.0 and off_axis > 0.0:
-            night += power * on_surface * off_axis / (r2 * r2)
+    night = lamps_on(x, y, z, scale * nx, scale * ny, scale * nz, ax, ay, az, power, lamps)
     return red, green, blue, day, night
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def shade(
-    pixels: Any, across: int, which: Any, starts: Any, ways: Any, spreads: Any, kinds: Any, triangle: Any, u: Any,
-    v: Any, distance: Any, faces: Any, first_face: Any, normals: Any, light: Any, maps: Any, seed: int, axis: Any,
-    power: float, lamps: Any, only_bed: bool, radiance: Any, lamp_radiance: Any, fraction: Any,
+def overlay(
+    pixels: Any, row: Any, width: int, which: Any, starts: Any, ways: Any, spreads: Any, solids: Any, triangle: Any,
+    u: Any, v: Any, distance: Any, faces: Any, first_face: Any, normals: Any, light: Any, seed: int, R_WC: Any,
+    power: float, lamps: Any, coloured: bool, kind: Any, depth_m: Any, radiance: Any, lamp_radiance: Any,
+    fraction: Any,
 ) -> None:  # fmt: skip
-    """Write each pixel's mean over its samples: radiance, the lamps' part of it, and the target's share.
+    """Lay what the centres' rays met of target and stones over the image of the bed, where it is nearer.
 
-    The rays are those of `aim`. With `only_bed`, pixels whose ray met something else keep what they have.
+    The rays are those of `aim`, one a pixel; depth is from the lens's pupil. Without `coloured` only kind and depth
+    are written: more rays will give the colour.
     """
-    share = 1.0 / (across * across)
-    if not only_bed:
-        for k in range(pixels.shape[0]):
-            pixel = pixels[k]
-            fraction[pixel] = 0.0
-            for c in range(3):
-                radiance[pixel, c] = 0.0
-                lamp_radiance[pixel, c] = 0.0
-    for i in range(kinds.shape[0]):
-        what = kinds[i]
-        if what < 0 or (only_bed and what != BED):
+    ax, ay, az = R_WC[0, 2], R_WC[1, 2], R_WC[2, 2]
+    for i in range(solids.shape[0]):
+        if solids[i] < 0:
             continue
         pixel = pixels[which[i]]
         t = distance[i]
+        _, _, z0 = ray_at(row, pixel % width + 0.5, pixel // width + 0.5)
+        if t + z0 >= depth_m[pixel]:
+            continue
+        what = TARGET if solids[i] == 0 else STONE
+        kind[pixel], depth_m[pixel] = what, t + z0
+        if not coloured:
+            continue
         wx, wy, wz = ways[i, 0], ways[i, 1], ways[i, 2]
-        red, green, blue, day, night = _colour(
+        red, green, blue, day, night = _solid_colour(
             what, triangle[i], u[i], v[i], starts[i, 0] + t * wx, starts[i, 1] + t * wy, starts[i, 2] + t * wz,
-            wx, wy, wz, t * spreads[i], faces, first_face, normals, light, maps, seed, axis, power, lamps,
+            wx, wy, wz, t * spreads[i], faces, first_face, normals, light, seed, ax, ay, az, power, lamps,
         )  # fmt: skip
+        fraction[pixel] = 1.0 if what == TARGET else 0.0
+        radiance[pixel, 0], lamp_radiance[pixel, 0] = red * (day + night), red * night
+        radiance[pixel, 1], lamp_radiance[pixel, 1] = green * (day + night), green * night
+        radiance[pixel, 2], lamp_radiance[pixel, 2] = blue * (day + night), blue * night
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def average(
+    pixels: Any, across: int, which: Any, starts: Any, ways: Any, spreads: Any, solids: Any, triangle: Any, u: Any,
+    v: Any, distance: Any, faces: Any, first_face: Any, normals: Any, light: Any, seed: int, bed: Any, attributes: Any,
+    maps: Any, R_WC: Any, power: float, lamps: Any, radiance: Any, lamp_radiance: Any, fraction: Any,
+) -> None:  # fmt: skip
+    """Write each pixel's mean over its samples: radiance, the lamps' part of it, and the target's share.
+
+    The rays are those of `aim`; `solids` and what follows is what they met of target and stones, and the bed is met
+    here.
+    """
+    lines, per_cell, cell_at, z, tops = bed.lines_m, bed.per_cell, bed.cell_at, bed.z_m, bed.tops_m
+    per_bin, top, bottom = 1.0 / bed.bin_m, bed.range_m[0], bed.range_m[1]
+    n = lines.shape[0]
+    ax, ay, az = R_WC[0, 2], R_WC[1, 2], R_WC[2, 2]
+    share = 1.0 / (across * across)
+    for k in range(pixels.shape[0]):
+        pixel = pixels[k]
+        fraction[pixel] = 0.0
+        for c in range(3):
+            radiance[pixel, c] = 0.0
+            lamp_radiance[pixel, c] = 0.0
+    for i in range(solids.shape[0]):
+        pixel = pixels[which[i]]
+        wx, wy, wz = float(ways[i, 0]), float(ways[i, 1]), float(ways[i, 2])
+        ox, oy, oz = float(starts[i, 0]), float(starts[i, 1]), float(starts[i, 2])
+        solid = solids[i] >= 0
+        most = float(distance[i]) if solid else FAR_M
+        t, ci, cj, cu, cv = meet(lines, per_cell, cell_at, z, tops, per_bin, top, bottom, ox, oy, oz, wx, wy, wz, most)
+        if t < most:
+            red, green, blue, day, night = bed_colour(
+                ox + t * wx, oy + t * wy, oz + t * wz, wx, wy, wz, t * spreads[i], n, ci, cj, cu, cv, attributes, maps,
+                ax, ay, az, power, lamps,
+            )  # fmt: skip
+        elif solid:
+            what = TARGET if solids[i] == 0 else STONE
+            t = most
+            red, green, blue, day, night = _solid_colour(
+                what, triangle[i], u[i], v[i], ox + t * wx, oy + t * wy, oz + t * wz,
+                wx, wy, wz, t * spreads[i], faces, first_face, normals, light, seed, ax, ay, az, power, lamps,
+            )  # fmt: skip
+            if what == TARGET:
+                fraction[pixel] += share
+        else:
+            continue
         night *= share
         both = share * day + night
-        if what == TARGET:
-            fraction[pixel] += share
         radiance[pixel, 0] += red * both
         radiance[pixel, 1] += green * both
         radiance[pixel, 2] += blue * both
         lamp_radiance[pixel, 0] += red * night
         lamp_radiance[pixel, 1] += green * night
         lamp_radiance[pixel, 2] += blue * night
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def keep_first(
-    first_pixel: int, row: Any, width: int, which: Any, kinds: Any, distance: Any, kind: Any, depth_m: Any
-) -> None:
-    """Write what the ray through each pixel's centre met: its kind, and its depth from the lens's pupil."""
-    for i in range(kinds.shape[0]):
-        if kinds[i] >= 0:
-            pixel = first_pixel + which[i]
-            kind[pixel] = kinds[i]
-            depth_m[pixel] = distance[i]
-            if row[0] != IDEAL:
-                _, _, z0 = ray_at(row, pixel % width + 0.5, pixel // width + 0.5)
-                depth_m[pixel] = distance[i] + z0

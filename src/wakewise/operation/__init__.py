@@ -3,7 +3,7 @@
 from wakewise.operation.build import Mission, build_camera, build_flight, build_mission, build_scene
 from wakewise.operation.flying import fly_mission
 from wakewise.operation.loop import Step, Truth, WaterTruth, Witness, fly
-from wakewise.operation.photography import photograph_flight
+from wakewise.operation.photography import photo_name, photograph_flight
 from wakewise.operation.recorder import FlightRecorder, read_exposures, step_columns
 from wakewise.operation.scenario import (
     PRESETS,
@@ -33,6 +33,7 @@ __all__ = [
     "fly_mission",
     "load_scenario",
     "parse_overrides",
+    "photo_name",
     "photograph_flight",
     "read_exposures",
     "read_scenario",

@@ -22,6 +22,7 @@ from wakewise.missions import Route, RoutePilot, TankBounds, check_clearance, pl
 from wakewise.operation.loop import Truth, WaterTruth
 from wakewise.operation.scenario import Scenario, TargetSettings
 from wakewise.tank import Holding, Tank, build_ambient, holding
+from wakewise.tank.fitting import check_fit
 from wakewise.targets import Region, Target, coral, coral_kinds, delicacy, load_mesh, place_on_bed, sample_region
 from wakewise.vehicles import Vehicle, load_vehicle, perturbed
 from wakewise.wake import wake_model
@@ -104,7 +105,8 @@ def build_mission(scenario: Scenario) -> Mission:
     Raises
     ------
     InputError
-        Unknown vehicle or target, an orbit that would touch something, or a current faster than the vehicle can hold.
+        Unknown vehicle or target, an orbit that would touch something, a current faster than the vehicle can hold,
+        failures or a cable that do not fit.
     """
     bounds = tank_bounds(scenario)
     vehicle = load_vehicle(scenario.vehicle)
@@ -122,6 +124,8 @@ def build_mission(scenario: Scenario) -> Mission:
         gain,
     )
     check_way(scenario, vehicle, region, route)
+    times_s = np.linspace(0.0, route.duration_s, 400)
+    check_fit(scenario.tank, vehicle, [(float(t), route.body(float(t), vehicle.X_BC).X_WB) for t in times_s])
     return Mission(
         vehicle=vehicle,
         target=target,

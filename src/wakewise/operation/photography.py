@@ -49,9 +49,8 @@ def photograph_flight(
     grains = SiltOptics(diameter_m=scenario.tank.grain_m, density_kg_m3=scenario.tank.grain_density_kg_m3)
     images = folder / "images"
     rows = []
-    suffix = ".png" if scenario.imaging.photo_format == "png" else ".jpg"
     for k, (planned, exposure, rng) in enumerate(zip(names, exposures, streams, strict=True)):
-        name = Path(planned).with_suffix(suffix).name
+        name = photo_name(planned, scenario)
         note = images / f".{Path(name).stem}.json"
         if not ((images / name).exists() and note.exists()):
             photo = photograph(scene, camera, exposure.X_WC_true, _silt(exposure), scenario.imaging, rng, grains)
@@ -76,6 +75,11 @@ def photograph_flight(
     write_text(folder / "images.csv", text.getvalue())
     for note in images.glob(".*.json"):
         note.unlink()
+
+
+def photo_name(planned: str, scenario: Scenario) -> str:
+    """File name of the photograph that a route calls `planned`, with the suffix of the scenario's format."""
+    return Path(planned).with_suffix(".png" if scenario.imaging.photo_format == "png" else ".jpg").name
 
 
 def write_image(path: Path, image: NDArray[np.uint8], jpeg_quality: int = 92) -> None:

@@ -126,6 +126,7 @@ def describe_fault(fault: ValidationError, model: type[BaseModel]) -> str:
     found = first["input"]
     shown = f"found {found!r}, " if isinstance(found, (str, int, float, bool, type(None))) else ""
     message = first["msg"].removeprefix("Value error, ").replace("Input should", "should").replace("\n", " ")
+    message = message.replace("a valid tuple", "a list in square brackets").replace("Field required", "is missing")
     return f"{where}: {shown}{message}"
 
 

@@ -1,0 +1,107 @@
+"""Which pixels may see target or stones: spheres round their pieces, tested against cones round tiles of the image.
+
+Casting rays through the others would be in vain, and most of a photograph shows nothing but bed. A tile's cone is that
+of its own rays, whatever the lens.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from wakewise.arrays import Array, IntArray
+from wakewise.imaging.lens import ray_at
+
+PIECE_M = 0.03
+"""Width of the cells by which surfaces are cut into pieces."""
+TILE_PX, COARSE = 8, 8
+"""Pixels along a tile's side, and tiles along the side of a coarse one."""
+SLACK = 1.02
+"""Widening of a cone whose angle is that of its corners: a lens may bulge the sides between them."""
+
+
+def bounding_spheres(parts: Sequence[tuple[Array, IntArray]]) -> Array:
+    """Spheres (x, y, z, radius), shape (k, 4), that together hold all faces of surfaces given as vertices and faces."""
+    found = [np.zeros((0, 4))]
+    for vertices, faces in parts:
+        if not len(faces):
+            continue
+        corners = vertices[faces]
+        _, piece = np.unique(np.floor(corners.mean(axis=1) / PIECE_M).astype(np.int64), axis=0, return_inverse=True)
+        order = np.argsort(piece.ravel(), kind="stable")
+        firsts = np.searchsorted(piece.ravel()[order], np.arange(int(piece.max()) + 1))
+        corners = corners[order]
+        low = np.minimum.reduceat(corners.min(axis=1), firsts)
+        high = np.maximum.reduceat(corners.max(axis=1), firsts)
+        centres = 0.5 * (low + high)
+        away = np.linalg.norm(corners - centres[piece.ravel()[order], None], axis=2).max(axis=1)
+        found.append(np.column_stack([centres, np.maximum.reduceat(away, firsts) + 1e-6]))
+    return np.concatenate(found)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _cone(row: Any, x0: float, y0: float, x1: float, y1: float) -> tuple[float, float, float, float, float, float]:
+    """Cone round the rays of a rectangle of pixels: unit axis, apex on the optical axis, half angle, apex's spread."""
+    sx, sy, apex = ray_at(row, 0.5 * (x0 + x1), 0.5 * (y0 + y1))
+    length = math.sqrt(sx * sx + sy * sy + 1.0)
+    ax, ay, az = sx / length, sy / length, 1.0 / length
+    least, spread = 1.0, 0.0
+    for k in range(4):
+        sx, sy, z0 = ray_at(row, x0 if k % 2 == 0 else x1, y0 if k < 2 else y1)
+        cosine = (ax * sx + ay * sy + az) / math.sqrt(sx * sx + sy * sy + 1.0)
+        least, spread = min(least, cosine), max(spread, abs(z0 - apex))
+    return ax, ay, az, apex, SLACK * math.acos(max(min(least, 1.0), -1.0)) + 1e-6, SLACK * spread
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _meets(
+    ax: float, ay: float, az: float, apex: float, cosine: float, sine: float, spread: float, x: float, y: float,
+    z: float, radius: float,
+) -> bool:  # fmt: skip
+    """Whether a cone may meet a sphere: the distance to the cone's side is never more than to the cone."""
+    z -= apex
+    along = ax * x + ay * y + az * z
+    aside = math.sqrt(max(x * x + y * y + z * z - along * along, 0.0))
+    return bool(aside * cosine - along * sine <= radius + spread)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def may_meet(row: Any, width: int, height: int, spheres_C: Any, out: Any) -> None:
+    """Write, for each tile of 8 x 8 pixels, whether a ray through it may meet a sphere.
+
+    `spheres_C` (k, 4) in the camera frame; `out` (ceil(height / 8), ceil(width / 8)) of bool.
+    """
+    rows, columns = out.shape
+    some = np.empty(spheres_C.shape[0], np.int64)
+    for big_j in range(0, rows, COARSE):
+        for big_i in range(0, columns, COARSE):
+            end_j, end_i = min(big_j + COARSE, rows), min(big_i + COARSE, columns)
+            ax, ay, az, apex, angle, spread = _cone(
+                row, big_i * TILE_PX, big_j * TILE_PX, min(end_i * TILE_PX, width), min(end_j * TILE_PX, height)
+            )
+            cosine, sine = math.cos(angle), math.sin(angle)
+            count = 0
+            for k in range(spheres_C.shape[0]):
+                x, y, z, r = spheres_C[k, 0], spheres_C[k, 1], spheres_C[k, 2], spheres_C[k, 3]
+                if _meets(ax, ay, az, apex, cosine, sine, spread, x, y, z, r):
+                    some[count] = k
+                    count += 1
+            for j in range(big_j, end_j):
+                for i in range(big_i, end_i):
+                    hit = False
+                    if count > 0:
+                        ax, ay, az, apex, angle, spread = _cone(
+                            row, i * TILE_PX, j * TILE_PX, min((i + 1) * TILE_PX, width), min((j + 1) * TILE_PX, height)
+                        )
+                        cosine, sine = math.cos(angle), math.sin(angle)
+                        for m in range(count):
+                            k = some[m]
+                            x, y, z, r = spheres_C[k, 0], spheres_C[k, 1], spheres_C[k, 2], spheres_C[k, 3]
+                            if _meets(ax, ay, az, apex, cosine, sine, spread, x, y, z, r):
+                                hit = True
+                                break
+                    out[j, i] = hit
