@@ -52,6 +52,9 @@ def test_the_answer_can_be_written(files, tmp_path, capsys):
         (["--target", "brain"], "give --floor"),
         (["--flow", "magic"], "allowed are parcels, lattice"),
         (["--every", "0"], "more than 0"),
+        (["--every", "50"], "go on for 2 s only"),
+        (["--floor", "1.5", "--target", "branching", "--pose", "0", "0", "1.3", "0", "0", "0"], "inside the target"),
+        (["--flow", "lattice", "--swirl"], "need parcels"),
         (["--points", "nowhere.csv"], "no such file"),
         (["--pose", "0", "0", "0", "0", "0", "90"], "radians"),
         (["--pose", "0", "0", "nan", "0", "0", "0"], "finite"),
@@ -64,3 +67,29 @@ def test_bad_input_is_one_line_and_code_2(files, capsys, more, words):
     said = capsys.readouterr().err
     assert words in said
     assert said.count("\n") == 1
+
+
+def test_thrusts_beyond_the_thrusters_are_refused(files, tmp_path, capsys):
+    """With file, row, thruster and what it gives."""
+    (tmp_path / "t.csv").write_text(f"time_s,{NAMES}\n0,{PUSH}\n1,500{PUSH[1:]}\n2,{PUSH}\n")
+    assert _probe(*files) == 2
+    said = capsys.readouterr().err
+    assert "t.csv row 2: 500 N for" in said
+    assert "allowed -42 to 53.55 N" in said
+
+
+def test_what_the_lattice_does_not_know_is_null(files, tmp_path, capsys):
+    """Not zero, with a reason; the figures are of the points that are known, and null if there are none."""
+    assert _probe(*files, "--flow", "lattice", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["why"] == {}
+    (tmp_path / "p.csv").write_text("x_m,y_m,z_m\n9,9,9\n")
+    assert _probe(*files, "--flow", "lattice", "--json", "--out", str(tmp_path / "u.npz")) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["velocities_m_s"] == [[[None] * 3]] * 3
+    assert found["speed_mean_m_s"] is found["speed_p95_m_s"] is None
+    assert "outside the boxes" in found["why"]["speed_mean_m_s"]
+    with np.load(tmp_path / "u.npz") as data:
+        assert np.isnan(data["velocities_m_s"]).all()
+    assert _probe(*files, "--flow", "lattice") == 0
+    assert "not known at any of the points" in capsys.readouterr().out

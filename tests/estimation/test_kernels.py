@@ -5,16 +5,15 @@ import pytest
 
 from wakewise.estimation.kernels import (
     CURRENT,
-    DRAG,
     GAINS,
     correct,
     felt,
     predict,
-    turn,
     turn_between,
     turned_by,
     unexplained,
 )
+from wakewise.estimation.resting import DRAG, at_rest, turn
 from wakewise.geometry import matrix_from_quat, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
 from wakewise.vehicles import acceleration, compile_body, load_vehicle
 
@@ -25,6 +24,7 @@ PACKED, ALLOCATION = BODY.packed, np.array(VEHICLE.allocation_matrix)
 ERRORS, GRAVITY = GAINS + 8, np.array([0.0, 0.0, 9.80665])
 STEADY = np.zeros(ERRORS - CURRENT), np.full(ERRORS - CURRENT, 1e12)
 SILENT = np.zeros(6)
+REST = np.array([0.8, 0.2, -0.4, 0.4])
 
 
 @pytest.fixture(autouse=True)
@@ -96,7 +96,7 @@ def test_the_covariance_moves_as_the_mean_does():
 
     def after(start):
         out, unused = start.copy(), np.zeros((ERRORS, ERRORS))
-        predict(PACKED, ALLOCATION, out, unused, thrusts, dt, SILENT, *STEADY)
+        predict(PACKED, ALLOCATION, out, unused, thrusts, REST, dt, SILENT, *STEADY)
         return out
 
     middle = after(mean)
@@ -105,7 +105,7 @@ def test_the_covariance_moves_as_the_mean_does():
         part = np.zeros_like(P)
         part[np.ix_(kept, kept)] = P[np.ix_(kept, kept)]
         expected, found = F @ part @ F.T, part.copy()
-        predict(PACKED, ALLOCATION, mean.copy(), found, thrusts, dt, SILENT, *STEADY)
+        predict(PACKED, ALLOCATION, mean.copy(), found, thrusts, REST, dt, SILENT, *STEADY)
         np.testing.assert_allclose(found, expected, atol=tolerance * np.abs(expected).max())
         np.testing.assert_array_equal(found, found.T)
 
@@ -117,14 +117,14 @@ def test_every_unknown_moves_the_vehicle_as_the_jacobian_says():
 
     def after(start):
         out, unused = start.copy(), np.zeros((ERRORS, ERRORS))
-        predict(PACKED, ALLOCATION, out, unused, thrusts, dt, SILENT, *STEADY)
+        predict(PACKED, ALLOCATION, out, unused, thrusts, REST, dt, SILENT, *STEADY)
         return out[7:13]
 
     expected, found = jacobian(after, mean), np.zeros((ERRORS, ERRORS))
     for j in range(CURRENT, GAINS):
         found = np.zeros((ERRORS, ERRORS))
         found[j, j] = 1.0
-        predict(PACKED, ALLOCATION, mean.copy(), found, thrusts, dt, SILENT, *STEADY)
+        predict(PACKED, ALLOCATION, mean.copy(), found, thrusts, REST, dt, SILENT, *STEADY)
         column = expected[:, j]
         np.testing.assert_allclose(found[6:12, j], column, atol=0.03 * np.abs(column).max() + 1e-6)
 
@@ -135,14 +135,16 @@ def test_what_an_accelerometer_feels_and_its_jacobian():
 
     def feel(at):
         down = matrix_from_quat(at[3:7]).T @ GRAVITY
-        return felt(PACKED, ALLOCATION, at, thrusts, down, np.empty((3, ERRORS)))
+        return felt(PACKED, ALLOCATION, at, thrusts, REST, down, np.empty((3, ERRORS)))
 
     H = np.empty((3, ERRORS))
-    felt(PACKED, ALLOCATION, mean, thrusts, matrix_from_quat(mean[3:7]).T @ GRAVITY, H)
+    felt(PACKED, ALLOCATION, mean, thrusts, REST, matrix_from_quat(mean[3:7]).T @ GRAVITY, H)
     expected = jacobian(feel, mean, 1e-4)
     np.testing.assert_allclose(H, expected, atol=1e-4 * np.abs(expected).max())
     plain = mean.copy()
     plain[1 + DRAG :] = 0.0
+    # The load is that at rest: with the current's drag and Munk moment there.
+    plain[13:19] -= at_rest(PACKED, plain, REST)
     wrench = ALLOCATION @ thrusts
     wrench[:3] += matrix_from_quat(mean[3:7]).T @ mean[13:16]
     wrench[3:] += mean[16:19]
@@ -160,10 +162,10 @@ def test_what_the_nominal_vehicle_lacks_is_the_wrench_of_all_unknowns():
     mean, thrusts = random_mean(), RNG.normal(size=8)
     mean[10:13] = 0.0
     mean[34:40] = 0.0
-    lacking = unexplained(PACKED, ALLOCATION, mean, thrusts)
+    lacking = unexplained(PACKED, ALLOCATION, mean, thrusts, REST)
     nominal = acceleration(BODY, mean[3:7], mean[7:13], ALLOCATION @ thrusts + lacking, np.zeros(3))
     out, unused = mean.copy(), np.zeros((ERRORS, ERRORS))
-    predict(PACKED, ALLOCATION, out, unused, thrusts, 1e-6, SILENT, *STEADY)
+    predict(PACKED, ALLOCATION, out, unused, thrusts, REST, 1e-6, SILENT, *STEADY)
     np.testing.assert_allclose(nominal[:3], (out[7:10] - mean[7:10]) / 1e-6, atol=1e-4)
 
 
@@ -172,7 +174,7 @@ def test_lasting_errors_keep_their_spread():
     spread, lasts_s = np.full(ERRORS - CURRENT, 0.2), np.full(ERRORS - CURRENT, 0.1)
     mean, P = random_mean(), np.zeros((ERRORS, ERRORS))
     for _ in range(100):
-        predict(PACKED, ALLOCATION, mean, P, np.zeros(8), 0.01, SILENT, spread, lasts_s)
+        predict(PACKED, ALLOCATION, mean, P, np.zeros(8), REST, 0.01, SILENT, spread, lasts_s)
     np.testing.assert_allclose(np.sqrt(np.diag(P)[CURRENT:]), 0.2, rtol=1e-6)
     assert np.abs(mean[1 + CURRENT :]).max() < 1e-3
 
@@ -181,10 +183,10 @@ def test_noise_adds_up_over_steps():
     """Two steps of 10 ms give the covariance of one of 20 ms, within what the motion's curvature leaves."""
     mean, noise = random_mean(), np.array([0.02, 0.2, 0.1, 0.01, 1e-3, 1e-2])
     once, twice = np.zeros((ERRORS, ERRORS)), np.zeros((ERRORS, ERRORS))
-    predict(PACKED, ALLOCATION, mean.copy(), once, np.zeros(8), 0.02, noise, *STEADY)
+    predict(PACKED, ALLOCATION, mean.copy(), once, np.zeros(8), REST, 0.02, noise, *STEADY)
     walker = mean.copy()
     for _ in range(2):
-        predict(PACKED, ALLOCATION, walker, twice, np.zeros(8), 0.01, noise, *STEADY)
+        predict(PACKED, ALLOCATION, walker, twice, np.zeros(8), REST, 0.01, noise, *STEADY)
     np.testing.assert_allclose(np.diag(twice), np.diag(once), rtol=0.06)
     assert np.linalg.eigvalsh(twice).min() > -1e-15
 

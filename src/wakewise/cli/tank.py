@@ -11,6 +11,7 @@ from wakewise.cli.console import print_json
 from wakewise.cli.options import Json
 
 if TYPE_CHECKING:
+    from wakewise.arrays import Array
     from wakewise.geometry import Pose
     from wakewise.targets import Target
 
@@ -89,12 +90,14 @@ def probe_command(
 ) -> None:
     """Give the flow at points and times for a vehicle held in place and a history of thrusts.
 
-    Thrusts are those delivered (no lag). Mean and 95th percentile of the speed are over all points and times.
+    Thrusts are those delivered (no lag). Mean and 95th percentile of the speed are over all points and times at which
+    the flow is known; --flow lattice knows none outside the boxes of its jets, and gives null there (NaN in a .npz).
     """
     import numpy as np
 
     from wakewise.tank import TankSettings
-    from wakewise.tank.probe import probe, read_points, read_thrusts, regular_times
+    from wakewise.tank.probe import probe
+    from wakewise.tank.probe_tables import read_points, read_thrusts, regular_times
     from wakewise.vehicles import load_vehicle
 
     chosen = load_vehicle(vehicle)
@@ -113,23 +116,35 @@ def probe_command(
         density_kg_m3=density,
         seed=seed,
     )
-    speeds = result.speeds_m_s
+    known, velocities = result.known, np.where(result.known[..., None], result.velocities_m_s, np.nan)
+    speeds = result.speeds_m_s[known]
+    unknown = int(np.count_nonzero(~known))
+    why = {}
+    if unknown:
+        outside = f"{unknown} of {known.size} values are outside the boxes of the jets that the lattice computed"
+        why["velocities_m_s"] = outside
+        if not len(speeds):
+            why["speed_mean_m_s"] = why["speed_p95_m_s"] = outside
     figures = {
         "vehicle": chosen.name,
         "flow": flow,
         "thruster_of_column": columns,
         "thrusts_held": "until the next row",
         "times_s": result.times_s.tolist(),
-        "velocities_m_s": result.velocities_m_s.tolist(),
-        "speed_mean_m_s": float(speeds.mean()),
-        "speed_p95_m_s": float(np.quantile(speeds, 0.95)),
+        "velocities_m_s": [
+            [u if k else [None] * 3 for u, k in zip(*row, strict=True)]
+            for row in zip(result.velocities_m_s.tolist(), known.tolist(), strict=True)
+        ],
+        "speed_mean_m_s": float(speeds.mean()) if len(speeds) else None,
+        "speed_p95_m_s": float(np.quantile(speeds, 0.95)) if len(speeds) else None,
+        "why": why,
     }
     if out is not None and out.suffix == ".npz":
         from wakewise.files import whole_file
 
         with whole_file(out) as temporary:
             np.savez_compressed(
-                temporary, times_s=result.times_s, points_W_m=result.points_W_m, velocities_m_s=result.velocities_m_s
+                temporary, times_s=result.times_s, points_W_m=result.points_W_m, velocities_m_s=velocities
             )
     elif out is not None:
         from wakewise.files import write_json
@@ -139,12 +154,21 @@ def probe_command(
         print_json(figures)
         return
     typer.echo(f"{chosen.name}, {flow}: {len(result.times_s)} times, {len(result.points_W_m)} points")
-    for k, time_s in enumerate(result.times_s):
-        p95 = np.quantile(speeds[k], 0.95)
-        typer.echo(f"{time_s:8.2f} s   mean {speeds[k].mean():.4f} m/s   95th percentile {p95:.4f} m/s")
-    typer.echo(f"all          mean {speeds.mean():.4f} m/s   95th percentile {np.quantile(speeds, 0.95):.4f} m/s")
+    for time_s, row, at in zip(result.times_s, result.speeds_m_s, known, strict=True):
+        typer.echo(f"{time_s:8.2f} s   {_summary(row[at])}")
+    typer.echo(f"all          {_summary(speeds)}")
+    for reason in dict.fromkeys(why.values()):
+        typer.echo(f"not known: {reason}")
     if out is not None:
         typer.echo(f"written: {out}")
+
+
+def _summary(speeds_m_s: Array) -> str:
+    import numpy as np
+
+    if not len(speeds_m_s):
+        return "not known at any of the points"
+    return f"mean {speeds_m_s.mean():.4f} m/s   95th percentile {np.quantile(speeds_m_s, 0.95):.4f} m/s"
 
 
 def _pose(numbers: tuple[float, float, float, float, float, float]) -> Pose:

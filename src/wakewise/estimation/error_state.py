@@ -6,8 +6,9 @@ thrusts; the covariance moves by the Jacobian of the very same step.
 
 **What is not known** stays so for longer than a sample, so it is no white noise: the gains of the thrusters, drag,
 inertia and the current are states with a stated spread, next to a force and a moment that nothing explains (trim,
-tether) and the inertial unit's biases. While a vehicle hovers these cannot be told apart and need not be; when the
-camera is lost and the vehicle sets off, they carry it away from its estimate, and the covariance knows it.
+tether, the current at rest, see `resting`) and the inertial unit's biases. While a vehicle hovers these cannot be told
+apart and need not be; when the camera is lost and the vehicle sets off, they carry it away from its estimate, and the
+covariance knows it.
 
 **A camera's slow error** (calibration, map, refraction), if its spread is stated, is a state, too: it does not average
 out, and the covariance then says so.
@@ -64,8 +65,9 @@ class FilterState:
     """Everything that the filter remembers.
 
     `mean`, shape (E + 1,), and `covariance`, shape (E, E), as laid out in `kernels`, hold at `settled_s`; so do
-    `thrusts_N`, shape (n,), what the thrusters are believed to give, behind their commands. `time_s` is now, on the
-    clock of the measurements. `commands` (from when, thrusts) and `waiting` measurements are what lies between.
+    `thrusts_N`, shape (n,), what the thrusters are believed to give, behind their commands. `rest_q`, shape (4,), is
+    the attitude that the unmodelled load is told for, the first one. `time_s` is now, on the clock of the measurements.
+    `commands` (from when, thrusts) and `waiting` measurements are what lies between.
     """
 
     time_s: float
@@ -73,6 +75,7 @@ class FilterState:
     mean: Array
     covariance: Array
     thrusts_N: Array
+    rest_q: Array
     commands: tuple[tuple[float, Array], ...] = ()
     waiting: tuple[Measurement, ...] = ()
     poses_refused_in_a_row: int = 0
@@ -84,11 +87,11 @@ class FilterState:
 
     def __post_init__(self) -> None:
         errors = len(self.mean) - 1
-        freeze(self, mean=(None,), covariance=(errors, errors), thrusts_N=(None,), leaning=(6,))
+        freeze(self, mean=(None,), covariance=(errors, errors), thrusts_N=(None,), rest_q=(4,), leaning=(6,))
 
     @property
     def unmodelled_force_W_N(self) -> Array:
-        """Force that the model does not explain, shape (3,), in the world."""
+        """Force at rest that the model does not explain, the current's drag in it, shape (3,), in the world."""
         return self.mean[13:16]
 
     @property
@@ -161,6 +164,7 @@ class ErrorStateFilter:
             mean=mean,
             covariance=self._start_covariance,
             thrusts_N=np.zeros(self._B.shape[1]),
+            rest_q=start.X_WB.q,
         )
 
     def step(
@@ -205,7 +209,7 @@ class ErrorStateFilter:
             self._take(walk, measured)
         self._advance(walk, now_s)
         mean = walk.mean
-        load_B = unexplained(self._packed, self._B, mean, walk.thrusts_N)
+        load_B = unexplained(self._packed, self._B, mean, walk.thrusts_N, walk.rest_q)
         return BodyState(X_WB=Pose(mean[:3], mean[3:7]), nu_B=mean[7:13], load_B=load_B, covariance=walk.P[:12, :12])
 
     def _advance(self, walk: _Walk, until_s: float) -> None:
@@ -219,7 +223,9 @@ class ErrorStateFilter:
             push = command + (walk.thrusts_N - command) * (self._lag_s / dt_s) * (1.0 - kept)
             noise = self._noise.copy()
             noise[:4] *= walk.noise_scale
-            predict(self._packed, self._B, walk.mean, walk.P, push, dt_s, noise, self._lasting, self._lasts_s)
+            predict(
+                self._packed, self._B, walk.mean, walk.P, push, walk.rest_q, dt_s, noise, self._lasting, self._lasts_s
+            )
             walk.thrusts_N = command + kept * (walk.thrusts_N - command)
             walk.time_s = end_s
 
@@ -278,7 +284,7 @@ class ErrorStateFilter:
         R_WB = matrix_from_quat(mean[3:7])
         down_B = R_WB.T @ np.array([0.0, 0.0, _GRAVITY_M_S2])
         H = np.empty((3, self._errors))
-        expected = felt(self._packed, self._B, mean, walk.thrusts_N, down_B, H)
+        expected = felt(self._packed, self._B, mean, walk.thrusts_N, walk.rest_q, down_B, H)
         period_s = max(time_s - walk.force_s, 1e-3) if walk.force_s is not None else 0.02
         walk.force_s = time_s
         s = self.settings
@@ -299,7 +305,7 @@ class _Walk:
     def __init__(self, state: FilterState, commands: tuple[tuple[float, Array], ...]) -> None:
         self.time_s = state.settled_s
         self.mean, self.P = state.mean.copy(), state.covariance.copy()
-        self.thrusts_N = state.thrusts_N
+        self.thrusts_N, self.rest_q = state.thrusts_N, state.rest_q
         self.refused_in_a_row = state.poses_refused_in_a_row
         self.leaning, self.noise_scale = state.leaning, state.noise_scale
         self.taken, self.refused = state.taken, state.refused

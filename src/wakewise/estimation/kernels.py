@@ -1,11 +1,11 @@
 """Compiled steps of the error-state filter; see `error_state` for what they mean.
 
 `mean`, shape (41 + n [+ 6],) for n thrusters: position in W (0:3), quaternion q_WB (3:7), twist in B (7:13),
-unmodelled force in W (13:16), unmodelled moment in B (16:19), gyro bias (19:22), accelerometer bias (22:25), current in
-W (25:28); then by how much of itself the truth differs from the nominal in drag (28:34) and inertia (34:40) per degree
-of freedom and in each thruster's gain (40:40 + n); last, if asked for, the camera's slow error: shift in W, turn in B.
-`P` is the covariance of the error, which has one entry less: position in W (0:3), turn, a rotation vector in B (3:6),
-then as in `mean`, each place one lower.
+unmodelled force in W (13:16) and moment in B (16:19), what the current does at rest included (`resting`), gyro bias
+(19:22), accelerometer bias (22:25), current in W (25:28); then by how much of itself the truth differs from the nominal
+in drag (28:34) and inertia (34:40) per degree of freedom and in each thruster's gain (40:40 + n); last, if asked for,
+the camera's slow error: shift in W, turn in B. `P` is the covariance of the error, which has one entry less: position
+in W (0:3), turn, a rotation vector in B (3:6), then as in `mean`, each place one lower.
 """
 
 from __future__ import annotations
@@ -14,19 +14,12 @@ import numpy as np
 from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.estimation.resting import DRAG, at_rest, rest_effects, turn
 from wakewise.vehicles.kernels import INVERSE, LINEAR, QUADRATIC, damping, rate_kernel, rotate
 from wakewise.vehicles.runge_kutta import rk4_jacobian_kernel
 
-MOVING, FORCE, MOMENT, GYRO, FELT, CURRENT, DRAG, INERTIA, GAINS = 12, 12, 15, 18, 21, 24, 27, 33, 39
+MOVING, FORCE, MOMENT, GYRO, FELT, CURRENT, INERTIA, GAINS = 12, 12, 15, 18, 21, 24, 33, 39
 """Where each block of the error begins; the first is how many entries the equations of motion move."""
-
-
-@njit(cache=True)
-def turn(q: Array, v: Array, sign: float) -> Array:
-    """Vector R(q) v for sign = 1, R(q)' v for sign = -1."""
-    w, x, y, z = q[0], sign * q[1], sign * q[2], sign * q[3]
-    tx, ty, tz = 2.0 * (y * v[2] - z * v[1]), 2.0 * (z * v[0] - x * v[2]), 2.0 * (x * v[1] - y * v[0])
-    return np.array([v[0] + w * tx + y * tz - z * ty, v[1] + w * ty + z * tx - x * tz, v[2] + w * tz + x * ty - y * tx])
 
 
 @njit(cache=True)
@@ -78,13 +71,13 @@ def believed(packed: Array, mean: Array) -> Array:
 
 
 @njit(cache=True)
-def pushed(allocation: Array, mean: Array, thrusts_N: Array) -> Array:
+def pushed(own: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array) -> Array:
     """Wrench in B of thrusts, with the gains believed in, and of what the model does not explain, shape (6,)."""
-    wrench = np.empty(6)
-    load_B = turn(mean[3:7], mean[13:16], -1.0)
+    wrench = at_rest(own, mean, rest_q)
+    load_B = turn(mean[3:7], mean[13:16] + wrench[:3], -1.0)
     for i in range(3):
         wrench[i] = load_B[i]
-        wrench[3 + i] = mean[16 + i]
+        wrench[3 + i] += mean[16 + i]
     for k in range(thrusts_N.shape[0]):
         thrust = (1.0 + mean[1 + GAINS + k]) * thrusts_N[k]
         for i in range(6):
@@ -100,10 +93,11 @@ def _past(mean: Array) -> tuple[float, float, float, float, float, float]:
 
 
 @njit(cache=True)
-def unexplained(packed: Array, allocation: Array, mean: Array, thrusts_N: Array) -> Array:
+def unexplained(packed: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array) -> Array:
     """Wrench in B, shape (6,), that the nominal vehicle in still water lacks to move as the mean has it."""
-    wrench = pushed(allocation, mean, thrusts_N)
-    own = damping(believed(packed, mean), _past(mean))
+    vehicle = believed(packed, mean)
+    wrench = pushed(vehicle, allocation, mean, thrusts_N, rest_q)
+    own = damping(vehicle, _past(mean))
     still = damping(packed, (mean[7], mean[8], mean[9], mean[10], mean[11], mean[12]))
     for i in range(6):
         for k in range(thrusts_N.shape[0]):
@@ -113,9 +107,9 @@ def unexplained(packed: Array, allocation: Array, mean: Array, thrusts_N: Array)
 
 
 @njit(cache=True)
-def _inputs(allocation: Array, mean: Array, thrusts_N: Array) -> Array:
+def _inputs(own: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array) -> Array:
     inputs = np.empty(9)
-    inputs[:6] = pushed(allocation, mean, thrusts_N)
+    inputs[:6] = pushed(own, allocation, mean, thrusts_N, rest_q)
     inputs[6:] = mean[25:28]
     return inputs
 
@@ -177,15 +171,17 @@ def _add_current(F: Array, A: Array, mean: Array, dt_s: float) -> None:
 
 
 @njit(cache=True)
-def moved(packed: Array, allocation: Array, mean: Array, thrusts_N: Array, dt_s: float, errors: int) -> Array:
+def moved(
+    packed: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array, dt_s: float, errors: int
+) -> Array:
     """Advance the mean's motion in place by dt_s, some hundredths at most; return its Jacobian, shape (12, errors).
 
     Drag and inertia enter the Jacobian as they act half-way, the current as it does at the start of the step.
     """
     own = believed(packed, mean)
-    inputs = _inputs(allocation, mean, thrusts_N)
-    load_B = turn(mean[3:7], mean[13:16], -1.0)
-    before = mean[:28].copy()
+    inputs = _inputs(own, allocation, mean, thrusts_N, rest_q)
+    load_B = turn(mean[3:7], mean[13:16] + at_rest(own, mean, rest_q)[:3], -1.0)
+    before = mean.copy()
     A, B = np.empty((MOVING, MOVING)), np.empty((MOVING, 6))
     rk4_jacobian_kernel(own, mean[:13], inputs, dt_s, A, B)
     halfway = mean.copy()
@@ -196,6 +192,12 @@ def moved(packed: Array, allocation: Array, mean: Array, thrusts_N: Array, dt_s:
     F[:, :MOVING] = A
     _add_current(F, A, before, dt_s)
     F[:, DRAG:GAINS] = B @ effect
+    resting = B @ rest_effects(own, before, rest_q)
+    for i in range(MOVING):
+        for j in range(3):
+            F[i, CURRENT + j] += resting[i, j]
+        for j in range(12):
+            F[i, DRAG + j] += resting[i, 3 + j]
     by_gain = B @ allocation
     for i in range(MOVING):
         # A turn of the body turns the force that it sees by S(load_B).
@@ -213,13 +215,15 @@ def moved(packed: Array, allocation: Array, mean: Array, thrusts_N: Array, dt_s:
 
 
 @njit(cache=True)
-def felt(packed: Array, allocation: Array, mean: Array, thrusts_N: Array, down_B: Array, H: Array) -> Array:
+def felt(
+    packed: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array, down_B: Array, H: Array
+) -> Array:
     """Specific force at the body origin as an accelerometer tells it, bias included, shape (3,).
 
     dv/dt + omega x v - down_B, with gravity `down_B` in B; writes its Jacobian to H, shape (3, E).
     """
     after, instant_s = mean.copy(), 1e-7
-    F = moved(packed, allocation, after, thrusts_N, instant_s, H.shape[1])
+    F = moved(packed, allocation, after, thrusts_N, rest_q, instant_s, H.shape[1])
     v, w = mean[7:10], mean[10:13]
     force = np.empty(3)
     for i in range(3):
@@ -244,6 +248,7 @@ def predict(
     mean: Array,
     P: Array,
     thrusts_N: Array,
+    rest_q: Array,
     dt_s: float,
     noise: Array,
     spread: Array,
@@ -257,7 +262,7 @@ def predict(
     both of shape (E - 24,).
     """
     q = mean[3:7].copy()
-    F = moved(packed, allocation, mean, thrusts_N, dt_s, P.shape[0])
+    F = moved(packed, allocation, mean, thrusts_N, rest_q, dt_s, P.shape[0])
     top = F @ P
     block = top @ F.T
     for i in range(MOVING):
