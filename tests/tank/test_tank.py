@@ -196,16 +196,3 @@ def test_bad_settings_are_refused(bad):
     """Negative silt, a grain of no size, no time step and unknown fields do not validate."""
     with pytest.raises(ValidationError):
         TankSettings(**bad)
-
-
-def test_silt_beside_the_water_is_silt_after_it(monkeypatch):
-    """Moved on a thread of its own or at once, the silt ends up in the same places to the byte, and loses nothing."""
-    places = []
-    for cores in (1, 2):
-        monkeypatch.setattr("os.cpu_count", lambda cores=cores: cores)
-        tank = _tank(silt=1.0)
-        mass = tank.silt.total_kg
-        _fly(tank, 3.0)
-        assert tank.silt.total_kg == pytest.approx(mass, rel=1e-9)
-        places.append(tank.silt.position_m.tobytes())
-    assert len(places[0]) > 0 and places[0] == places[1]

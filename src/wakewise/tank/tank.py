@@ -10,13 +10,11 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.interfaces import BodyState, Measurement, ScalarGrid
-from wakewise.tank.beside import Beside
 from wakewise.tank.blockage import Blockage
 from wakewise.tank.closure import PLAIN, SWIRLING
 from wakewise.tank.currents import build_ambient
 from wakewise.tank.grains import speed_at_stress_m_s
 from wakewise.tank.induction import impulse_velocity
-from wakewise.tank.instant import Instant
 from wakewise.tank.measuring import TargetProbes, WaterMeasure
 from wakewise.tank.plant import VehiclePlant
 from wakewise.tank.probes import surface_points
@@ -85,7 +83,7 @@ class Tank:
             failures=settings.failures,
             tether=_tether(settings),
         )
-        self._water = Water(
+        self.water = Water(
             vehicle.disk_areas_m2,
             density_kg_m3=settings.density_kg_m3,
             bed_z_m=depth,
@@ -105,9 +103,8 @@ class Tank:
             settings.erosion_threshold_Pa,
             settings.pickup,
         )
-        self._silt = Silt(laws, settings.silt, settings.size_m, settings.max_silt_particles, silt_rng)
-        self._silt.suspend(1e-3 * settings.suspended_mg_l, target.centre_W_m)
-        self._water_moves, self._silt_moves = Beside("water"), Beside("silt")
+        self.silt = Silt(laws, settings.silt, settings.size_m, settings.max_silt_particles, silt_rng)
+        self.silt.suspend(1e-3 * settings.suspended_mg_l, target.centre_W_m)
         _say_when_it_clears(settings, laws)
         self._stirring_speed = _STIRRING_SHARE * speed_at_stress_m_s(
             laws.threshold_Pa / settings.density_kg_m3, SHEAR_HEIGHT_M, laws.grain_m
@@ -126,19 +123,6 @@ class Tank:
         self._touching = ""
         self._measured: WaterMeasure | None = None
         self._turbidity_per_m = self._probes.turbidity_per_m(laws, self._silt_grid())
-
-    @property
-    def silt(self) -> Silt:
-        """Silt on the bed and in the water, when its step under way is done."""
-        self._water_moves.wait()
-        self._silt_moves.wait()
-        return self._silt
-
-    @property
-    def water(self) -> Water:
-        """The water, when its step under way is done."""
-        self._water_moves.wait()
-        return self._water
 
     @property
     def time_s(self) -> float:
@@ -245,30 +229,24 @@ class Tank:
             self._sensors.sample(self._time, self._plant.state, self._plant.force_B_m_s2, self._turbidity_per_m)
 
     def _move_water(self) -> None:
-        """Start the water's step; the vehicle does not wait for it, whoever asks for `water` or `silt` does."""
         origins, axes = self._plant.disks()
-        dt_s, before, impulses = self.settings.flow_step_s, self._disks_before_m, self._plant.take_impulse_N_s()
-        self._flow_steps += 1
-        # The silt moves with the water of the middle of its step, while the water goes on to the step's end.
-        middle = self._muddy and self._flow_steps % self._silt_every == self._silt_middle
-
-        def move() -> None:
-            self._water.step(dt_s, before, origins, axes, impulses)
-            if middle:
-                now = self._water.now
-                self._silt_moves.start(lambda: self._move_silt(now))
-
-        self._water_moves.start(move)
+        dt_s = self.settings.flow_step_s
+        self.water.step(dt_s, self._disks_before_m, origins, axes, self._plant.take_impulse_N_s())
         self._disks_before_m = origins
+        self._flow_steps += 1
         if self._inflow is not None:
             self._inflow = self._inflow_W_m_s()
+        if self._muddy and self._flow_steps % self._silt_every == self._silt_middle:
+            self._move_silt()
         if self._muddy and self._flow_steps % round(_TURBIDITY_EVERY_S / dt_s) == 0:
             self._turbidity_per_m = self._probes.turbidity_per_m(self.silt.laws, self._silt_grid())
         self._measured = None
 
-    def _move_silt(self, now: Instant) -> None:
+    def _move_silt(self) -> None:
+        """Move the silt by its whole step with the water of the step's middle, which makes the step of second order."""
+        now = self.water.now
         circles = np.concatenate([now.stirred_bed(self._stirring_speed), self.ambient.stirred_bed()])
-        self._silt.step(now, circles, self._silt_every * self.settings.flow_step_s)
+        self.silt.step(now, circles, self._silt_every * self.settings.flow_step_s)
 
 
 def _tether(settings: TankSettings) -> Tether | None:
