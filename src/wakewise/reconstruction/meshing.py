@@ -57,7 +57,7 @@ def mesh_points(
         vertices, faces = np.asarray(loaded.vertices, dtype=np.float64), np.asarray(getattr(loaded, "faces", ()))
     if len(faces) == 0:
         raise StageError("mesh: no surface came out of the dense points")
-    distance, nearest = (np.asarray(found) for found in KDTree(cloud.points_m).query(vertices, k=4))
+    distance, nearest = (np.asarray(found) for found in KDTree(cloud.points_m).query(vertices, k=4, workers=-1))
     near = distance[:, 0] <= 6.0 * spacing_m
     faces = faces[near[faces].all(axis=1)]
     if len(faces) == 0:
@@ -81,6 +81,9 @@ def without_crumbs(faces: IntArray, vertices: int, share: float = 0.005) -> IntA
 
 
 def _depth(points_m: Array, spacing_m: float, most: int) -> int:
-    """Octree depth whose finest cell is about one and a half point spacings; finer cells would only mesh the noise."""
+    """Octree depth whose finest cell is nearest to one and a half point spacings, from 1.06 to 2.1 of them.
+
+    Finer cells would only mesh the noise, and each depth more takes twice as long or longer.
+    """
     cells = 1.1 * float(np.ptp(points_m, axis=0).max()) / (1.5 * spacing_m)
-    return int(np.clip(np.ceil(np.log2(max(cells, 1.0))), 6, most))
+    return int(np.clip(np.rint(np.log2(max(cells, 1.0))), 6, most))
