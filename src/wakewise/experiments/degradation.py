@@ -53,13 +53,13 @@ FACTORS = {
             name="blur",
             unit="px",
             title="way of the target across the photograph while the shutter is open",
-            levels=(0.0, 1.0, 2.0, 4.0, 6.0, 9.0, 13.0, 18.0, 25.0),
+            levels=(0.0, 1.0, 2.0, 4.0, 6.0, 9.0, 13.0, 18.0, 25.0, 35.0, 50.0, 70.0),
         ),
         Factor(
             name="particles",
             unit="1/m3",
             title="flakes in otherwise clear water",
-            levels=(0.0, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6),
+            levels=(0.0, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6, 3e6, 1e7),
         ),
     )
 }
