@@ -46,7 +46,7 @@ def test_after_a_stop_the_wake_dies_as_in_the_lattice():
     over its steady value; in D/U0. Lattice: 13.1, 18.7 and 26.2 at 4, 6 and 8 diameters; of the volume flux 19.8, 25.7
     and 33.0.
     Outside 25 %: the half-time of the speed at 6 D (14.1, here 10) and the life of the kinetic energy (9.2, 14.3,
-    20.0; here 6.2, 9.7, 14.7).
+    20.0; here 5.0, 8.5, 13.2 within four diameters of the axis).
     """
     unit_s = D_M / EXIT_M_S
     places = (4, 6, 8)

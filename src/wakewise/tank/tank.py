@@ -112,7 +112,6 @@ class Tank:
         self._sensors = Sensors(settings, sensor_rng)
         self._probes = TargetProbes(target, probe_rng)
         self._time = 0.0
-        self._flow_time = 0.0
         self._flow_steps = 0
         self._silt_every = max(1, math.floor(_SILT_STEP_S / settings.flow_step_s + 1e-9))
         self._silt_middle = -(-self._silt_every // 2) % self._silt_every

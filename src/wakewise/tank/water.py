@@ -9,9 +9,9 @@ target turns water aside (`blockage`).
 What it does not hold: swirl shows in the width of a jet only; wall jets carry no turbulence of their own and do not
 collide (those on the same ground add their momentum); there is no boundary layer nor wake of hull and target; the bed
 right below a jet is struck in pulses (mean stress right, fluctuation about half of the mean). After a thruster has
-stopped, its wake dies sooner than the lattice's: the speed lasts 11 to 16 % less, its half-times are 18 to 29 % and the
-energy's life 26 to 33 % shorter. Jets that meet head-on run out 1.2 to 1.5 times as fast as the lattice's within two
-diameters, and twice as fast at 20 cm (tests/tank/test_water_laws.py).
+stopped, its wake dies sooner than the lattice's: the speed lasts 16 to 22 % less, the volume flux 10 to 14 %, the
+half-time at six diameters is 29 % and the energy's life 34 to 46 % shorter. Jets that meet head-on run out 1.2 to 1.5
+times as fast as the lattice's within two diameters, and twice as fast at 20 cm (tests/tank/test_water_laws.py).
 """
 
 from __future__ import annotations
