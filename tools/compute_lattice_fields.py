@@ -13,9 +13,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from wakewise.cli.console import Bars
-from wakewise.tank.lattice import CASES, compute_mean_field, find_case, save_mean_field
-from wakewise.tank.lattice.laws import convergence
-from wakewise.tank.lattice.meanfield import DATA, SHIPPED
+from wakewise.lattice import CASES, compute_mean_field, find_case, save_mean_field
+from wakewise.lattice.laws import convergence
+from wakewise.lattice.meanfield import DATA, SHIPPED
 
 
 def main() -> None:

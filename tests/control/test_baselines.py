@@ -3,13 +3,15 @@
 import numpy as np
 import pytest
 
-from wakewise.control import ControlSettings, PlanSettings, WakeView, make_controller
+from wakewise.control import ControlSettings, make_controller
 from wakewise.control.trim import ballasted
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Goal
+from wakewise.planning import PlanSettings
 from wakewise.targets import Region
-from wakewise.vehicles import compile_body, load_vehicle, step_rk4, thruster_lag
-from wakewise.wake import disturbance, wake_model
+from wakewise.thrusters import thruster_lag
+from wakewise.vehicles import compile_body, load_vehicle, step_rk4
+from wakewise.wake import WakeView, disturbance, wake_model
 
 VEHICLE = load_vehicle("paper")
 CENTRE = np.array([0.0, 0.0, 1.4])

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from wakewise.control import PlanSettings
 from wakewise.control.intent import LEASH_M, Intent, goal_of, moved_on, obeying, slewed
-from wakewise.control.reference import reference_of
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_from_euler
 from wakewise.interfaces import BodyState
+from wakewise.planning import PlanSettings
+from wakewise.planning.reference import reference_of
 
 HERE = BodyState(X_WB=Pose(np.array([0.5, -0.2, 1.0]), quat_from_euler(0.1, -0.2, 2.0)))
 

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from plan_cases import AROUND, CONE, REGION, VEHICLE, model, problem
 
-from wakewise.control import ControlSettings, Planner, PlanSettings, make_controller, planning_controller
+from wakewise.control import ControlSettings, make_controller, planning_controller
 from wakewise.evaluation.flight import sign_flips
 from wakewise.geometry import Pose, quat_from_euler, quat_from_rotvec, quat_multiply
 from wakewise.interfaces import BodyState, Goal
-from wakewise.vehicles import compile_body, step_rk4, thruster_lag
+from wakewise.planning import Planner, PlanSettings
+from wakewise.thrusters import thruster_lag
+from wakewise.vehicles import compile_body, step_rk4
 
 PLACE = Pose(np.array([0.45, 0.0, 1.05]), quat_from_euler(0.0, 0.0, np.pi))
 QUICK = ControlSettings(plan=PlanSettings(iterations=2, second_start_every=0))

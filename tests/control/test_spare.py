@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from wakewise.control import ControlSettings, WakeView, Weights, gentle_allocation, make_controller, vehicle_layout
+from wakewise.allocation import Weights, gentle_allocation
+from wakewise.control import ControlSettings, make_controller, vehicle_layout
 from wakewise.control.levers import LeverSettings, nearer_level, watched, with_drift
 from wakewise.control.spare import Respared, SpareState, joined_jets, meeting_pairs, meeting_view
 from wakewise.geometry import Pose, euler_from_quat, quat_from_euler
 from wakewise.interfaces import BodyState, Command, Goal
 from wakewise.targets import Region
 from wakewise.vehicles import load_vehicle
-from wakewise.wake import RoundJet
+from wakewise.wake import RoundJet, WakeView
 
 VEHICLE = load_vehicle("paper")
 LAYOUT = vehicle_layout(VEHICLE)

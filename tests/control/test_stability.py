@@ -3,15 +3,7 @@
 import numpy as np
 import pytest
 
-from wakewise.control.stability import (
-    Axis,
-    Gains,
-    margins,
-    open_loop,
-    stable_gain_scale,
-    vehicle_axes,
-    wished_gains,
-)
+from wakewise.control.stability import Axis, Gains, margins, open_loop, stable_gain_scale, vehicle_axes, wished_gains
 from wakewise.errors import InputError
 from wakewise.vehicles import load_vehicle
 

@@ -7,7 +7,8 @@ from wakewise.estimation import ErrorStateFilter, FilterSettings
 from wakewise.estimation.kernels import unexplained
 from wakewise.geometry import Pose, matrix_from_quat, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
 from wakewise.interfaces import BodyState, Measurement
-from wakewise.vehicles import compile_body, load_vehicle, step_rk4, thruster_lag
+from wakewise.thrusters import thruster_lag
+from wakewise.vehicles import compile_body, load_vehicle, step_rk4
 
 VEHICLE = load_vehicle("paper")
 BODY = compile_body(VEHICLE)

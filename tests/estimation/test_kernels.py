@@ -3,16 +3,7 @@
 import numpy as np
 import pytest
 
-from wakewise.estimation.kernels import (
-    CURRENT,
-    GAINS,
-    correct,
-    felt,
-    predict,
-    turn_between,
-    turned_by,
-    unexplained,
-)
+from wakewise.estimation.kernels import CURRENT, GAINS, correct, felt, predict, turn_between, turned_by, unexplained
 from wakewise.estimation.resting import DRAG, at_rest, turn
 from wakewise.geometry import matrix_from_quat, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
 from wakewise.vehicles import acceleration, compile_body, load_vehicle

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from wakewise.cli.main import run
-from wakewise.control import Surroundings, check_start
 from wakewise.errors import InputError
 from wakewise.operation import build_flight, build_mission, load_scenario
 from wakewise.operation.build import build_surroundings, build_target
+from wakewise.planning import Surroundings, check_start
 
 
 def refused(capsys, *arguments):

@@ -33,8 +33,8 @@ from wakewise.reports.film.make import silt_at
 from wakewise.reports.film.outside import FASTEST_M_S, speed_colours
 from wakewise.reports.film.vantage import vantage
 from wakewise.reports.film.wash import STEP_S, TRAIL, Motion, replay, wash_of
-from wakewise.tank import Water
 from wakewise.vehicles import load_vehicle, vehicle_names
+from wakewise.water import Water
 
 R_BODY_CAMERA = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 

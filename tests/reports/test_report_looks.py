@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from wakewise.experiments.textured import standing
+from wakewise.likeness.textured import standing
 from wakewise.reports import looks, write_comparison
 from wakewise.reports.looks import coloured_model, colours_html, film_html
 from wakewise.reports.report import report_page

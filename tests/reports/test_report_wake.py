@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from wakewise.experiments.wake_validation import ValidationOptions, figures, validate
 from wakewise.reports.wake import main_flow, wake_page
 from wakewise.reports.wake_plots import decays, profiles, scatters
+from wakewise.studies.wake_validation import ValidationOptions, figures, validate
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,9 @@ from wakewise.errors import InputError
 from wakewise.geometry import Pose, matrix_from_quat
 from wakewise.interfaces import BodyState
 from wakewise.tank import VehiclePlant
-from wakewise.tank.currents import AmbientSum, SteadyCurrent
-from wakewise.vehicles import compile_body, load_vehicle, perturbed, saturate, step_rk4, thruster_lag
+from wakewise.thrusters import saturate, thruster_lag
+from wakewise.vehicles import compile_body, load_vehicle, perturbed, step_rk4
+from wakewise.water.currents import AmbientSum, SteadyCurrent
 
 VEHICLE = load_vehicle("paper")
 SIZE_M = (6.0, 5.0, 1.5)

@@ -7,7 +7,7 @@ import pytest
 from wakewise.errors import InputError
 from wakewise.operation.scenario import check_scenario
 from wakewise.tank import TankSettings
-from wakewise.tank.currents import wave_number_per_m
+from wakewise.water.currents import wave_number_per_m
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,8 @@ import pytest
 
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
-from wakewise.tank import AmbientSum, SteadyCurrent, Tether
+from wakewise.tank import Tether
+from wakewise.water import AmbientSum, SteadyCurrent
 
 AT = Pose(np.array([0.0, 0.0, 1.0]))
 STILL = AmbientSum()

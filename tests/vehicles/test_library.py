@@ -12,15 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wakewise.errors import InputError
-from wakewise.vehicles import (
-    VehicleDraft,
-    draft_names,
-    draft_yaml,
-    library_curve,
-    load_draft,
-    load_vehicle,
-    vehicle_names,
-)
+from wakewise.thrusters import library_curve
+from wakewise.vehicles import VehicleDraft, draft_names, draft_yaml, load_draft, load_vehicle, vehicle_names
 from wakewise.vehicles.library import parse_vehicle
 
 

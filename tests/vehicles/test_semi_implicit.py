@@ -10,14 +10,7 @@ from moving_vehicles import ALL_VEHICLES, LEVEL, STILL, neutral, random_state, v
 
 from wakewise.arrays import Array
 from wakewise.geometry import matrix_from_quat
-from wakewise.vehicles import (
-    Vehicle,
-    compile_body,
-    load_vehicle,
-    mechanical_energy,
-    step_rk4,
-    step_semi_implicit,
-)
+from wakewise.vehicles import Vehicle, compile_body, load_vehicle, mechanical_energy, step_rk4, step_semi_implicit
 
 
 @pytest.fixture(scope="module", params=ALL_VEHICLES)

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wakewise.errors import InputError
-from wakewise.vehicles import Hydrodynamics, Thruster, Vehicle, load_vehicle, vehicle_names
+from wakewise.thrusters import Thruster
+from wakewise.vehicles import Hydrodynamics, Vehicle, load_vehicle, vehicle_names
 from wakewise.vehicles.vehicle import readable_null_space
 
 

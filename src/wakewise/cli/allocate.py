@@ -11,8 +11,8 @@ from wakewise.cli.console import print_json, print_table, shown
 from wakewise.cli.options import Json
 
 if TYPE_CHECKING:
+    from wakewise.allocation import Allocation
     from wakewise.arrays import Array
-    from wakewise.control import Allocation
     from wakewise.geometry import Pose
     from wakewise.vehicles import Vehicle
 
@@ -83,7 +83,7 @@ def allocate(
     """
     import numpy as np
 
-    from wakewise import control, wake
+    from wakewise import allocation, wake
     from wakewise.errors import InputError
     from wakewise.vehicles import load_vehicle
 
@@ -100,7 +100,7 @@ def allocate(
     lower, upper = chosen.thrust_lower_N.copy(), chosen.thrust_upper_N.copy()
     dead = sorted({_thruster(name, chosen) for name in failed or []})
     lower[dead] = upper[dead] = 0.0
-    layout = control.compile_layout(chosen.allocation_matrix, lower, upper)
+    layout = allocation.compile_layout(chosen.allocation_matrix, lower, upper)
     G = wake.gram(
         model,
         places,
@@ -110,10 +110,10 @@ def allocate(
         chosen.disk_areas_m2,
         superposition,
     )
-    cost = control.Weights(disturbance=1.0, effort=w_effort, previous=w_previous)
+    cost = allocation.Weights(disturbance=1.0, effort=w_effort, previous=w_previous)
     wanted = np.array(wrench)
-    gentle = control.gentle_allocation(layout, wanted, G, cost, before, priority, budget)
-    least = control.least_thrusts(layout, wanted, G, priority)
+    gentle = allocation.gentle_allocation(layout, wanted, G, cost, before, priority, budget)
+    least = allocation.least_thrusts(layout, wanted, G, priority)
     size = float(np.linalg.norm(wanted))
     figures: dict[str, Any] = {
         "vehicle": chosen.name,

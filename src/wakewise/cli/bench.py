@@ -52,8 +52,9 @@ def bench(
     A figure that needs reference data which is not there is null, with the reason in `why`. `gentle` flies for a
     quarter of an hour on two free cores; a run that was stopped goes on where it was.
     """
+    from wakewise.benches import BENCHES, run_bench
     from wakewise.errors import InputError
-    from wakewise.experiments.benches import BENCHES, BenchOptions, run_bench
+    from wakewise.trials import BenchOptions
 
     if plot is not None and name not in ("gentle", "operator"):
         raise InputError("--plot: only `wakewise bench gentle` and `wakewise bench operator` draw")

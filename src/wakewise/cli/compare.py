@@ -55,9 +55,9 @@ def compare(
     json: Json = False,
 ) -> None:
     """Fly the same mission with each method in the same water, and set the outcomes side by side."""
-    from wakewise.experiments import UNITS, compare_methods
     from wakewise.operation import load_scenario
     from wakewise.reports import write_comparison, write_report
+    from wakewise.trials import UNITS, compare_methods
 
     names = [name.strip() for name in methods.split(",") if name.strip()]
     if len(names) != len(set(names)) or not names:

@@ -32,9 +32,9 @@ def degrade(
     Each factor goes on until no model comes about, which is reported as such.
     """
     from wakewise.cli.options import overrides
-    from wakewise.experiments.degradation import FACTORS, degrade
     from wakewise.operation import load_scenario
     from wakewise.reports.degradation import plot_degradation
+    from wakewise.studies.degradation import FACTORS, degrade
 
     changes = overrides(sets, seed=None, vehicle=None, target=target, target_size=None)
     scenario = load_scenario(preset, None, changes)

@@ -72,7 +72,7 @@ def nerf(
 
     chosen = profile
     where = pick_device(device)
-    from wakewise.experiments.neural import field_of_model, field_of_trial, is_trial
+    from wakewise.studies.neural import field_of_model, field_of_trial, is_trial
 
     if profile == "auto":
         chosen = "gpu" if where.type == "cuda" else "cpu"

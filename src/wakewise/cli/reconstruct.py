@@ -79,7 +79,7 @@ def reconstruct_photos(
     figures = model.summary()
     if settings.mesh:
         from wakewise.errors import StageError
-        from wakewise.experiments.textured import write_textured
+        from wakewise.likeness.textured import write_textured
 
         with Bars().stage("colours") as progress, suppress(StageError):
             write_textured(out, photos, out / "mesh.glb", progress=progress)

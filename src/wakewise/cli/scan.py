@@ -59,9 +59,9 @@ def scan(
 
     Stages that are done are skipped, so running the same command again continues where it stopped.
     """
-    from wakewise.experiments import run_trial
     from wakewise.operation import load_scenario
     from wakewise.reports import write_report
+    from wakewise.trials import run_trial
 
     changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, method=method)
     resolved = load_scenario(preset, scenario, changes)

@@ -81,7 +81,9 @@ def show(
     """Show a vehicle: thrusters, rank, what redundancy it has, limits, where the figures are from."""
     from wakewise.errors import InputError
     from wakewise.files import write_text
-    from wakewise.vehicles import describe, drawing_svg, find_vehicle, parameters, vehicle_page
+    from wakewise.importers import find_vehicle
+    from wakewise.reports.vehicle import drawing_svg, vehicle_page
+    from wakewise.vehicles import describe, parameters
 
     draft = find_vehicle(vehicle, packages=_folders(package), skip_missing=skip_missing)
     facts = describe(draft)
@@ -118,7 +120,8 @@ def check(
     json: Json = False,
 ) -> None:
     """Check a vehicle's thrusters: rank, null space, achievable wrench, single failures, stated matrix."""
-    from wakewise.vehicles import check_report, compare_with, find_vehicle
+    from wakewise.importers import compare_with, find_vehicle
+    from wakewise.vehicles import check_report
 
     draft = find_vehicle(vehicle, packages=_folders(package), skip_missing=skip_missing)
     facts = check_report(draft, None if matrix is None else compare_with(draft, matrix))

@@ -51,8 +51,8 @@ def import_file(
 ) -> None:
     """Import a vehicle file of another project; say what it holds, what was decided, and what is missing."""
     from wakewise.files import write_text
+    from wakewise.importers import import_vehicle
     from wakewise.vehicles import draft_yaml
-    from wakewise.vehicles.importers import import_vehicle
     from wakewise.vehicles.mixing import compare_matrix
 
     draft = import_vehicle(

@@ -55,9 +55,9 @@ def thruster(
 ) -> None:
     """Show a thrust curve: limits, deadband, and pulses, thrusts, speed and power both ways."""
     from wakewise.files import write_text
-    from wakewise.vehicles.thrust_curve import load_curve
-    from wakewise.vehicles.thrust_drawing import curve_svg
-    from wakewise.vehicles.thruster_facts import curve_facts, usual_voltage
+    from wakewise.reports.vehicle.thrust_drawing import curve_svg
+    from wakewise.thrusters.thrust_curve import load_curve
+    from wakewise.thrusters.thruster_facts import curve_facts, usual_voltage
 
     curve = load_curve(table)
     facts = curve_facts(curve, usual_voltage(curve) if supply_V is None else supply_V, thrust or (), pwm or ())
@@ -86,9 +86,9 @@ def thruster(
 
 def lag(data: Data, average_s: Average = None, json: Json = False) -> None:
     """Identify a thruster's lag and dead time from a measured step."""
-    from wakewise.vehicles.lag_fit import identify_lag
-    from wakewise.vehicles.step_file import read_step
-    from wakewise.vehicles.thruster_facts import lag_facts
+    from wakewise.thrusters.lag_fit import identify_lag
+    from wakewise.thrusters.step_file import read_step
+    from wakewise.thrusters.thruster_facts import lag_facts
 
     facts = lag_facts(identify_lag(*read_step(data), average_s=average_s))
     if json:

@@ -61,7 +61,7 @@ def fit(
 
     chosen = family(model)
     if data.is_dir():
-        from wakewise.experiments.piv import samples_of_folder
+        from wakewise.studies.piv import samples_of_folder
 
         samples = samples_of_folder(data)
     else:
@@ -126,8 +126,8 @@ def validate(
     json: Json = False,
 ) -> None:
     """Hold every wake model against every flow, on held-out thrusts, beside the paper's 0.99 and 0.82."""
-    from wakewise.experiments.wake_validation import ValidationOptions, figures
-    from wakewise.experiments.wake_validation import validate as run
+    from wakewise.studies.wake_validation import ValidationOptions, figures
+    from wakewise.studies.wake_validation import validate as run
 
     with Bars().stage("validate") as progress:
         result = run(

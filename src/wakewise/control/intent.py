@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from wakewise.arrays import Array, freeze
-from wakewise.control.plan_problem import PlanSettings
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, look_at, quat_from_euler, quat_from_matrix
 from wakewise.interfaces import BodyState, Goal
+from wakewise.planning.problem import PlanSettings
 
 LEASH_M = 0.10
 """Farthest that the commanded place may be from the vehicle: what 0.1 m/s makes in a second."""

@@ -7,14 +7,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wakewise.allocation import Allocation, Layout, compile_layout
 from wakewise.arrays import Array, freeze
-from wakewise.control.allocation import Allocation
 from wakewise.control.tracker import Tracker, TrackerState
-from wakewise.control.view import WakeView
 from wakewise.interfaces import BodyState, Command, Goal
+from wakewise.vehicles import Vehicle
+from wakewise.wake.view import WakeView
 
 Allocate = Callable[[Array, Array | None, Array], Allocation]
 """`(wrench_B, gram or None, thrusts before) -> Allocation`; the Gram matrix is None if the wake model gave nonsense."""
+
+
+def vehicle_layout(vehicle: Vehicle) -> Layout:
+    """Allocation matrix and limits of a vehicle, ready for use."""
+    return compile_layout(vehicle.allocation_matrix, vehicle.thrust_lower_N, vehicle.thrust_upper_N)
+
 
 FULL = 1.0 - 1e-9
 """Shares of a wrench above this are all of it, but for rounding."""

@@ -22,17 +22,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from wakewise.arrays import Array, freeze
-from wakewise.control.guard import Guard
+from wakewise.control.instant import instant_allocator
 from wakewise.control.loop import ControllerState, TrackingController
-from wakewise.control.plan_problem import Horizon, PlanProblem, PlanSettings, state_of
-from wakewise.control.planner import PlanModel, Planner, compile_plan
-from wakewise.control.reference import between, reference_of
 from wakewise.control.settings import ControlSettings
-from wakewise.control.surroundings import Surroundings
 from wakewise.control.tracker import Tracker, TrackerState, make_tracker
-from wakewise.control.wake_aware import wake_aware
 from wakewise.geometry import Pose, quat_conjugate, quat_multiply, rotvec_from_quat
 from wakewise.interfaces import BodyState, Command, Goal, WakeModel
+from wakewise.planning.guard import Guard
+from wakewise.planning.planner import PlanModel, Planner, compile_plan
+from wakewise.planning.problem import Horizon, PlanProblem, PlanSettings, state_of
+from wakewise.planning.reference import between, reference_of
+from wakewise.planning.surroundings import Surroundings
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
 from wakewise.wake import arrival_time_s
@@ -344,7 +344,7 @@ def planning_controller(
         name=name,
         guard=Guard(planner=warmed(solver(model)), deadline_s=chosen.deadline_s, clock=clock, enforce=enforce),
         tracker=make_tracker(vehicle, settings),
-        backup=wake_aware(vehicle, region, model.wake, settings),
+        backup=instant_allocator(vehicle, region, model.wake, settings),
         hold_s=settings.hold_s,
     )
 

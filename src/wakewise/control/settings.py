@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import Field
 
 from wakewise.control.levers import LeverSettings
-from wakewise.control.plan_problem import PlanSettings
+from wakewise.planning.problem import PlanSettings
 from wakewise.settings import Settings
 from wakewise.wake import WakeSettings
 

@@ -18,15 +18,15 @@ from typing import Any
 
 import numpy as np
 
+from wakewise.allocation.allocate import Allocation, Layout, Weights, gentle_allocation
 from wakewise.arrays import Array, IntArray
-from wakewise.control.allocation import Allocation, Layout, Weights, gentle_allocation
+from wakewise.control.loop import vehicle_layout
 from wakewise.control.settings import ControlSettings
-from wakewise.control.view import WakeView
-from wakewise.control.wake_aware import vehicle_layout
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Command, Controller, Goal, WakeModel
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
+from wakewise.wake.view import WakeView
 
 LEAST_COSINE = -0.5
 """Cosine of 120 deg: jets that cross at more turn aside rather than join."""

@@ -19,17 +19,17 @@ from itertools import product
 
 import numpy as np
 
+from wakewise.allocation.allocate import Weights, gentle_allocation
 from wakewise.arrays import Array
-from wakewise.control.allocation import Weights, gentle_allocation
 from wakewise.control.levers import watched
+from wakewise.control.loop import vehicle_layout
 from wakewise.control.settings import ControlSettings
-from wakewise.control.view import WakeView
-from wakewise.control.wake_aware import vehicle_layout
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.interfaces import WakeModel
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle, compile_body, restoring_wrench
+from wakewise.wake.view import WakeView
 
 WATER_KG_M3, GRAVITY_M_S2 = 1000.0, 9.80665
 FLOATS_N = (-2.0, -1.0, 0.0, 1.0, 1.5, 2.0, 3.0)

@@ -35,16 +35,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from wakewise.arrays import Array, freeze
-from wakewise.estimation.kernels import (
-    GAINS,
-    GYRO,
-    correct,
-    felt,
-    predict,
-    turn_between,
-    turned_by,
-    unexplained,
-)
+from wakewise.estimation.kernels import GAINS, GYRO, correct, felt, predict, turn_between, turned_by, unexplained
 from wakewise.estimation.settings import FilterSettings
 from wakewise.geometry import Pose, matrix_from_quat
 from wakewise.interfaces import BodyState, Measurement

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.control import Surroundings, check_start, covering_spheres, make_controller, state_of
+from wakewise.control import make_controller
 from wakewise.errors import InputError
 from wakewise.estimation import ErrorStateFilter
 from wakewise.geometry import Pose, quat_from_rotvec, quat_multiply
@@ -21,6 +21,7 @@ from wakewise.interfaces import BodyState, Controller, Estimator, ScalarGrid
 from wakewise.missions import Route, RoutePilot, TankBounds, check_clearance, plan_route
 from wakewise.operation.loop import Truth, WaterTruth
 from wakewise.operation.scenario import Scenario, TargetSettings
+from wakewise.planning import Surroundings, check_start, covering_spheres, state_of
 from wakewise.tank import Holding, Tank, build_ambient, holding
 from wakewise.tank.fitting import check_fit
 from wakewise.targets import Region, Target, coral, coral_kinds, delicacy, load_mesh, place_on_bed, sample_region

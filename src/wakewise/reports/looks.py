@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError, StageError
-from wakewise.experiments.photo_colours import Depths
-from wakewise.experiments.textured import read_textured
-from wakewise.imaging.colour import WaterFit, balanced, fit_water, without_water
 from wakewise.imaging.sensor import srgb_encode
+from wakewise.likeness.colour import WaterFit, balanced, fit_water, without_water
+from wakewise.likeness.photo_colours import Depths
+from wakewise.likeness.textured import read_textured
 from wakewise.reports.ink import data_uri
 from wakewise.reports.page import panel
 from wakewise.reports.trial import Photograph, Surface, Trial

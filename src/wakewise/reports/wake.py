@@ -7,10 +7,10 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from wakewise.experiments.wake_validation import WakeValidation
 from wakewise.files import write_text
 from wakewise.reports.page import missing, plot, section, tile, whole_page
 from wakewise.reports.wake_plots import decays, profiles, scatters
+from wakewise.studies.wake_validation import WakeValidation
 
 _GOOD, _FAIR = 0.9, 0.5
 _SEEN = {"oracle-swirl": "lattice, swirl", "oracle": "lattice, no swirl", "parcels": "parcels"}

@@ -7,15 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wakewise.arrays import Array
-from wakewise.experiments.wake_validation import (
-    MeasuredFlow,
-    WakeValidation,
-    axial_decay,
-    exit_speeds,
-    find_flow,
-    profile,
-)
 from wakewise.reports.ink import CORAL, INK, LINE, MUTED, SAND, SLATE, TEAL, VIOLET, dress, new_figure
+from wakewise.studies.wake_validation import MeasuredFlow, WakeValidation, axial_decay, exit_speeds, find_flow, profile
 from wakewise.wake.jets import AxialJet
 from wakewise.wake.samples import CORE, WAKE, JetSamples
 from wakewise.wake.scores import predicted_speed

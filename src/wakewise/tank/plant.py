@@ -12,13 +12,14 @@ from wakewise.errors import InputError
 from wakewise.geometry import Pose, matrix_from_quat
 from wakewise.interfaces import BodyState
 from wakewise.tank.contact import Surroundings
-from wakewise.tank.currents import AmbientSum
 from wakewise.tank.settings import ThrusterFailure
 from wakewise.tank.tether import Tether
 from wakewise.tank.thrust_losses import FailingThrusters, inflow_factors
-from wakewise.vehicles import Vehicle, compile_body, saturate, thruster_lag
+from wakewise.thrusters import saturate, thruster_lag
+from wakewise.vehicles import Vehicle, compile_body
 from wakewise.vehicles.kernels import rotate
 from wakewise.vehicles.runge_kutta import rk4_kernel
+from wakewise.water.currents import AmbientSum
 
 _GRAVITY_W_M_S2 = np.array([0.0, 0.0, 9.80665])
 

@@ -10,14 +10,14 @@ import numpy as np
 from wakewise.arrays import Array, BoolArray, freeze
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
-from wakewise.tank.blockage import Blockage
-from wakewise.tank.closure import PLAIN, SWIRLING
+from wakewise.lattice import LatticeFlow, MeanField, load_mean_field
 from wakewise.tank.contact import Surroundings
-from wakewise.tank.lattice import LatticeFlow, MeanField, load_mean_field
 from wakewise.tank.probe_tables import ThrustHistory
-from wakewise.tank.water import Water
 from wakewise.targets import Mesh, Target
 from wakewise.vehicles import Vehicle
+from wakewise.water.blockage import Blockage
+from wakewise.water.closure import PLAIN, SWIRLING
+from wakewise.water.water import Water
 
 FLOWS = ("parcels", "lattice")
 _STEP_S = 0.02

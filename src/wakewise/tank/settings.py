@@ -173,7 +173,7 @@ class TankSettings(Settings):
         return self
 
     def _check_wave(self, depth_m: float) -> None:
-        from wakewise.tank.currents import wave_number_per_m
+        from wakewise.water.currents import wave_number_per_m
 
         # Steepest wave over a level bed: H / L = 0.142 tanh(k h) (R. Miche 1944, Ann. Ponts Chauss. 114).
         k = wave_number_per_m(self.wave_period_s, depth_m)

@@ -10,11 +10,8 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.interfaces import BodyState, Measurement, ScalarGrid
-from wakewise.tank.blockage import Blockage
-from wakewise.tank.closure import PLAIN, SWIRLING
-from wakewise.tank.currents import build_ambient
+from wakewise.tank.ambient import build_ambient
 from wakewise.tank.grains import speed_at_stress_m_s
-from wakewise.tank.induction import impulse_velocity
 from wakewise.tank.measuring import TargetProbes, WaterMeasure
 from wakewise.tank.plant import VehiclePlant
 from wakewise.tank.probes import surface_points
@@ -22,9 +19,13 @@ from wakewise.tank.sediment import SHEAR_HEIGHT_M, Silt, SiltLaws
 from wakewise.tank.sensors import Sensors
 from wakewise.tank.settings import TankSettings
 from wakewise.tank.tether import Tether
-from wakewise.tank.water import Water
 from wakewise.targets import Target
-from wakewise.vehicles import Vehicle, electrical_power_W
+from wakewise.thrusters import electrical_power_W
+from wakewise.vehicles import Vehicle
+from wakewise.water.blockage import Blockage
+from wakewise.water.closure import PLAIN, SWIRLING
+from wakewise.water.induction import impulse_velocity
+from wakewise.water.water import Water
 
 GRID_SPACING_M = 0.05
 _GRID_HALF_M = 0.8

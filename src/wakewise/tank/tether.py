@@ -9,7 +9,7 @@ import numpy as np
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
-from wakewise.tank.instant import Ambient
+from wakewise.water.instant import Ambient
 
 DRAG_COEFFICIENT = 1.1
 """Of a smooth circular cylinder across the flow, Reynolds numbers 1e3 to 2e5 (S. F. Hoerner, Fluid-Dynamic Drag, 1965,

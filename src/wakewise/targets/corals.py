@@ -13,16 +13,7 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
-from wakewise.targets.fields import (
-    Grid,
-    add_cones,
-    add_dome,
-    add_plates,
-    cut_below,
-    labyrinth,
-    roughen,
-    zero_surface,
-)
+from wakewise.targets.fields import Grid, add_cones, add_dome, add_plates, cut_below, labyrinth, roughen, zero_surface
 from wakewise.targets.mesh import Mesh
 
 LARGEST_DIMENSION_M = 0.15

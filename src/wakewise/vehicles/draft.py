@@ -10,13 +10,13 @@ import numpy as np
 from wakewise.arrays import Array, frozen
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
+from wakewise.thrusters.thruster import Thruster, mount, require_limit
 from wakewise.vehicles.hydrodynamics import (
     Hydrodynamics,
     require_added_mass,
     require_linear_damping,
     require_quadratic_damping,
 )
-from wakewise.vehicles.thruster import Thruster, mount, require_limit
 from wakewise.vehicles.vehicle import (
     Provenance,
     Vehicle,

@@ -11,8 +11,8 @@ import numpy as np
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
+from wakewise.thrusters.thruster import Thruster
 from wakewise.vehicles.hydrodynamics import Hydrodynamics
-from wakewise.vehicles.thruster import Thruster
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,41 +1,40 @@
-"""What the thrusters do to the water, as a controller sees it: jet models and the disturbance D of a target.
+"""What the thrusters do to the water, as a controller sees it: wake models and the disturbance D of a target.
 
-The simulated tank never uses this room: a planner that knew the truth would prove nothing.
+D is here and nowhere else: the weighted mean square of the water's speed at the target's points. The simulated tank
+never uses this room: a planner that knew the truth would prove nothing.
+
+Start reading in `disturbance.py` (D and its Gram matrix) and `models.py` (models by name). Models: `cones.py` (the
+paper's), `jets.py` (round turbulent jets), `floor.py` (their wall jets), `families.py` (what can be fitted). Sums:
+`sums.py` and `floor_sums.py` with `kernels.py` (compiled), `gradients.py` (derivatives of D), `table.py` and
+`plan_disturbance.py` (D and derivatives over a planner's stage), `view.py` (D from a vehicle's pose). `travel.py`
+says when wash arrives; `calibration.py`, `samples.py`, `scores.py` and `fit_file.py` fit a model to measured
+velocities.
 """
 
 from wakewise.wake.cones import PaperJet, PowerJet
 from wakewise.wake.disturbance import disturbance, gram, incoherent, point_disturbance, split_roots
-from wakewise.wake.floor import FloorJet
-from wakewise.wake.gradients import (
-    DisturbanceSlopes,
-    GaussNewton,
-    GramSlopes,
-    Superposition,
-    disturbance_slopes,
-    gauss_newton,
-    gram_with_derivatives,
-    smooth_roots,
-)
+from wakewise.wake.floor import FloorJet, bed_of, free_jet
+from wakewise.wake.gradients import disturbance_slopes, gauss_newton, gram_with_derivatives, smooth_roots
 from wakewise.wake.jets import AxialJet, GaussianJet, RoundJet
 from wakewise.wake.models import WakeSettings, model_names, wake_model
 from wakewise.wake.travel import arrival_time_s, arrival_times_s
+from wakewise.wake.view import WakeView
 
 __all__ = [
     "AxialJet",
-    "DisturbanceSlopes",
     "FloorJet",
-    "GaussNewton",
     "GaussianJet",
-    "GramSlopes",
     "PaperJet",
     "PowerJet",
     "RoundJet",
-    "Superposition",
     "WakeSettings",
+    "WakeView",
     "arrival_time_s",
     "arrival_times_s",
+    "bed_of",
     "disturbance",
     "disturbance_slopes",
+    "free_jet",
     "gauss_newton",
     "gram",
     "gram_with_derivatives",

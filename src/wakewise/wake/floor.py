@@ -29,6 +29,7 @@ from numba import njit
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
+from wakewise.interfaces import WakeModel
 from wakewise.wake.jets import FRESH_WATER_KG_M3, AxialJet, RoundJet
 from wakewise.wake.sums import FAST, fill_rows, pose_slopes
 
@@ -212,3 +213,13 @@ def fill_velocities(  # type: ignore[no-untyped-def]
             V[k],
             dV[k],
         )
+
+
+def bed_of(wake: WakeModel) -> float | None:
+    """Depth of the bed (m) that a model knows of; None for models of free jets."""
+    return wake.bed_z_m if isinstance(wake, FloorJet) else None
+
+
+def free_jet(wake: WakeModel) -> WakeModel:
+    """The free jet of a model, without its floor."""
+    return wake.jet if isinstance(wake, FloorJet) else wake

@@ -21,7 +21,7 @@ from wakewise.files import whole_file
 from wakewise.geometry import matrix_from_quat
 from wakewise.interfaces import no_progress
 from wakewise.operation import Scenario, build_flight, build_mission
-from wakewise.tank import Water
+from wakewise.water import Water
 
 STEP_S = 0.04
 LIFE_S = 5.0

@@ -1,0 +1,34 @@
+"""Thruster allocation: one wrench to n thrusts, exactly, for any layout.
+
+An over-actuated vehicle has many sets of thrusts for one wrench: the null space of its allocation matrix. This room
+finds the one that is best, the least thrusts (`pseudo_inverse`, `least_thrusts`) or those whose jets disturb a target
+least (`gentle_allocation`), with a proof of the minimum, within limits, with failed thrusters and priorities. It
+knows arrays and errors only, so that it is a library of its own: nothing here knows what a vehicle or a wake is. D
+comes in as the Gram matrix G of `s' G s`, where s are roots of thrusts.
+
+Start reading in `allocate.py` (what is asked and answered). `layout.py` is the matrix and its null space, `reach.py`
+what the limits leave. The search for the minimum: `search.py` for one or two spare thrusts, `boxes.py` with
+`cells.py` and `coupled.py` (branch and bound) for more, `convex.py` for the convex cost of effort alone.
+"""
+
+from wakewise.allocation.allocate import (
+    Allocation,
+    Layout,
+    Weights,
+    compile_layout,
+    disturbance_of,
+    gentle_allocation,
+    least_thrusts,
+    pseudo_inverse,
+)
+
+__all__ = [
+    "Allocation",
+    "Layout",
+    "Weights",
+    "compile_layout",
+    "disturbance_of",
+    "gentle_allocation",
+    "least_thrusts",
+    "pseudo_inverse",
+]

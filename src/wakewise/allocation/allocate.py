@@ -1,0 +1,322 @@
+"""One wrench to many thrusts: the least thrusts, or the gentlest ones, that make the same wrench.
+
+All thrusts that make a wrench differ by null-space thrusts only: T = T_0 + Z lambda. `pseudo_inverse` takes the
+smallest |T| within limits; `gentle_allocation` takes the T that disturbs the target least. Both give up the same part
+of a wrench that the limits do not allow (`reach`), so that they can be compared at equal wrench.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wakewise.allocation.boxes import box_search
+from wakewise.allocation.cells import CLOSED
+from wakewise.allocation.convex import convex_allocation, is_incoherent
+from wakewise.allocation.layout import Layout, compile_layout
+from wakewise.allocation.reach import AXES, by_priority, is_all, parse_priority, within_limits
+from wakewise.allocation.search import cost, disjoint_search, split_allocation
+from wakewise.arrays import Array, freeze, frozen
+from wakewise.errors import InputError
+
+__all__ = [
+    "Allocation",
+    "Layout",
+    "Weights",
+    "compile_layout",
+    "disturbance_of",
+    "gentle_allocation",
+    "least_thrusts",
+    "pseudo_inverse",
+]
+
+COUPLING_LIMIT = 1e-10
+"""Gram entries between two parts of the null space below this share of the largest count as zero: they are rounding."""
+
+BUDGET = 2000
+"""Most boxes that branch and bound looks at unless told otherwise: a few milliseconds with two spare thrusters."""
+
+_STARTS = (0, 0, 6, 12, 24, 32)
+_RESTS, _RESTS_KEPT = 400, 8
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Allocation:
+    """Thrusts for one wrench, and how they were found.
+
+    Parameters
+    ----------
+    thrusts_N : ndarray, shape (n,)
+    wrench_B, requested_B : ndarray, shape (6,)
+        What the thrusts make, and what was asked for.
+    disturbance : float or None
+        D = s' G s in (m/s)^2, None where no Gram matrix was given.
+    method : str
+        "pseudo-inverse" (least thrusts); "unique" (no thruster to spare); "lines" (the null space splits into lines,
+        each searched exactly); "convex" (a quadratic program, where squares of speeds add up); "boxes" (branch and
+        bound, any layout).
+    gap : float
+        How far the weighted cost may lie above its global minimum, relative: proven by a lower bound, zero for
+        "pseudo-inverse" and "unique". Up to 1e-5 counts as closed; more means that the budget of "boxes" was spent.
+    scale : float
+        Share of the attainable part of the requested wrench that the limits allow in its own direction, 1 if all of it.
+    """
+
+    thrusts_N: Array
+    wrench_B: Array
+    requested_B: Array
+    disturbance: float | None
+    method: str
+    gap: float
+    scale: float
+
+    def __post_init__(self) -> None:
+        freeze(self, thrusts_N=(None,), wrench_B=(6,), requested_B=(6,))
+
+    @property
+    def given_up_B(self) -> Array:
+        """Requested wrench that is not made, shape (6,)."""
+        return np.asarray(self.requested_B - self.wrench_B)
+
+    @property
+    def given_up(self) -> dict[str, float]:
+        """The same by axis (X, Y, Z in N, K, M, N in N m), only what is more than rounding."""
+        limit = 1e-9 * (1.0 + float(np.linalg.norm(self.requested_B)))
+        return {axis: float(x) for axis, x in zip(AXES, self.given_up_B, strict=True) if abs(x) > limit}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Weights:
+    """Weights of the cost w_D D + w_u |T|^2 + w_p |T - T_previous|^2, each per unit of its own term."""
+
+    disturbance: float = 1.0
+    effort: float = 1e-3
+    previous: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("disturbance", "effort", "previous"):
+            value = float(getattr(self, name))
+            if not (np.isfinite(value) and value >= 0.0):
+                raise InputError(f"weight {name}: {value:g}, must be finite and not negative")
+
+    @property
+    def packed(self) -> Array:
+        """(w_D, w_u, w_p), shape (3,)."""
+        return np.array([self.disturbance, self.effort, self.previous], dtype=np.float64)
+
+
+def pseudo_inverse(B: Array, wrench_B: Array, lower_N: Array, upper_N: Array) -> Allocation:
+    """Least thrusts that make a wrench within limits.
+
+    Parameters
+    ----------
+    B : ndarray, shape (6, n)
+        Wrench per newton of each thruster.
+    wrench_B : ndarray, shape (6,)
+    lower_N, upper_N : ndarray, shape (n,)
+        Limits; both zero for a thruster that has failed.
+
+    Returns
+    -------
+    Allocation
+        If the plain pseudo-inverse breaks a limit, the null space is used to stay within; if no thrusts within limits
+        make the wrench, the largest share of it in the same direction is made (`scale`).
+
+    Raises
+    ------
+    InputError
+        As `compile_layout`, and if the wrench is not six finite numbers.
+    """
+    return least_thrusts(compile_layout(B, lower_N, upper_N), wrench_B)
+
+
+def least_thrusts(
+    layout: Layout, wrench_B: Array, gram: Array | None = None, priority: str | None = None
+) -> Allocation:
+    """`pseudo_inverse` for a layout compiled once; with `gram`, shape (2 n, 2 n), also says the disturbance.
+
+    `priority`, such as "ZKMN,XY", says which axes to give up last where the limits (or missing thrusters) do not allow
+    the whole wrench; without it the wrench keeps its direction.
+    """
+    requested = frozen(wrench_B, (6,), "wrench")
+    thrusts, scale = _start(layout, requested, priority)
+    return Allocation(
+        thrusts_N=thrusts,
+        wrench_B=layout.B @ thrusts,
+        requested_B=requested,
+        disturbance=None if gram is None else disturbance_of(gram, thrusts),
+        method="pseudo-inverse",
+        gap=0.0,
+        scale=scale,
+    )
+
+
+def _start(layout: Layout, requested: Array, priority: str | None) -> tuple[Array, float]:
+    """Least thrusts of what can be made of a wrench, and the share that keeps its direction."""
+    groups = None if priority is None else parse_priority(priority)
+    thrusts, scale = within_limits(layout, layout.inverse @ requested)
+    if groups is not None and not is_all(layout, thrusts, requested):
+        thrusts = by_priority(layout, requested, groups)
+    return thrusts, scale
+
+
+def disturbance_of(gram: Array, thrusts_N: Array) -> float:
+    """D = s' G s in (m/s)^2 with s_i = sqrt|T_i| in the slot of the jet that is on; G has shape (2 n, 2 n)."""
+    return float(cost(gram, np.array(thrusts_N), np.array(thrusts_N), np.array([1.0, 0.0, 0.0])))
+
+
+def gentle_allocation(
+    layout: Layout,
+    wrench_B: Array,
+    gram: Array,
+    weights: Weights,
+    previous_N: Array | None = None,
+    priority: str | None = None,
+    budget: int = BUDGET,
+) -> Allocation:
+    """Thrusts of least w_D D + w_u |T|^2 + w_p |T - T_previous|^2 among those that make the wrench within limits.
+
+    The global minimum, with a proven gap. Where the null space falls apart into lines that share no thruster and no
+    Gram entry (vectored layouts of four horizontal and four vertical thrusters do), each line is searched exactly; a
+    diagonal Gram matrix makes the problem convex; everything else is left to branch and bound, whose gap is what it
+    reached within its budget. The cost never exceeds that of `least_thrusts`.
+
+    Parameters
+    ----------
+    layout : Layout
+    wrench_B : ndarray, shape (6,)
+    gram : ndarray, shape (2 n, 2 n)
+        Of `wakewise.wake.gram`: jets of T > 0 first, jets of T < 0 after.
+    weights : Weights
+    previous_N : ndarray, shape (n,), optional
+        Thrusts of the step before; zeros if not given.
+    priority : str, optional
+        As `least_thrusts`.
+    budget : int
+        Most boxes to look at, where the layout needs branch and bound.
+
+    Raises
+    ------
+    InputError
+        If the wrench, the Gram matrix or the previous thrusts have a wrong shape or are not finite, the priority is not
+        a list of axes, or the budget is less than 1.
+    """
+    n = layout.B.shape[1]
+    requested = frozen(wrench_B, (6,), "wrench")
+    G = frozen(gram, (2 * n, 2 * n), "Gram matrix")
+    previous = np.zeros(n) if previous_N is None else frozen(previous_N, (n,), "previous thrusts")
+    if budget < 1:
+        raise InputError(f"budget: {budget} boxes, must be at least 1")
+    if priority is not None:
+        parse_priority(priority)
+    packed = weights.packed
+    lower, upper = layout.lower_N, layout.upper_N
+    scale = 1.0
+    if len(layout.lines) == layout.k > 0:
+        done, thrusts, gap = split_allocation(
+            G, layout.inverse, requested, layout.lines, lower, upper, previous, packed, COUPLING_LIMIT
+        )
+        method = "lines"
+    else:
+        done = False
+    if not done or (priority is not None and not is_all(layout, thrusts, requested)):
+        start, scale = _start(layout, requested, priority)
+        thrusts, method, gap = _search(layout, start, G, previous, packed, budget)
+    value = cost(G, thrusts, previous, packed)
+    return Allocation(
+        thrusts_N=thrusts,
+        wrench_B=layout.B @ thrusts,
+        requested_B=requested,
+        disturbance=cost(G, thrusts, previous, np.array([1.0, 0.0, 0.0])),
+        method=method,
+        gap=gap / value if value > 0.0 else 0.0,
+        scale=scale,
+    )
+
+
+def _search(
+    layout: Layout, start: Array, G: Array, previous: Array, packed: Array, budget: int
+) -> tuple[Array, str, float]:
+    """Least cost among the thrusts that make the wrench of `start`, how it was found, and its proven gap (absolute)."""
+    lower, upper = layout.lower_N, layout.upper_N
+    if layout.k == 0:
+        return start, "unique", 0.0
+    groups = _coupled_groups(layout, G)
+    method = "lines" if all(group.shape[1] == 1 for group in groups) else "boxes"
+    if method == "boxes" and is_incoherent(G):
+        found = convex_allocation(layout.B, start, lower, upper, G, previous, packed)
+        # The solver's own tolerance is not always enough; what it leaves open goes the way of all other layouts.
+        exact = found is not None and is_all(layout, found[0], layout.B @ start)
+        if found is not None and exact and found[1] <= CLOSED * cost(G, found[0], previous, packed):
+            return found[0], "convex", found[1]
+    spare = np.any(np.abs(layout.null) > 1e-12, axis=1)
+    thrusts, gap = start.copy(), 0.0
+    for group in groups:
+        own = np.any(np.abs(group) > 1e-12, axis=1)
+        # Thrusters of other groups neither move nor count; those that never move count.
+        here = own | ~spare
+        base, before = np.where(here, start, 0.0), np.where(here, previous, 0.0)
+        if group.shape[1] == 1:
+            result, part = disjoint_search(G, base, group.T.copy(), lower, upper, before, packed)
+        else:
+            starts = _feasible_starts(layout, base, before, group)
+            if group.shape[1] > 2:
+                starts = np.vstack([starts, _at_rest(layout, base, before, group, G, packed)])
+            result, part, _ = box_search(G, starts, group, lower, upper, before, packed, budget)
+        if cost(G, result, before, packed) <= cost(G, base, before, packed):
+            thrusts[own] = result[own]
+        gap += part
+    return thrusts, method, gap
+
+
+def _coupled_groups(layout: Layout, G: Array) -> list[Array]:
+    """Parts of the null space, those joined that share a Gram entry; orthonormal bases, shape (n, k_g) each."""
+    strength = np.abs(G).reshape(2, layout.B.shape[1], 2, -1).max(axis=(0, 2))
+    owner = [np.any(np.abs(block) > 1e-12, axis=1) for block in layout.blocks]
+    limit = COUPLING_LIMIT * float(strength.max(initial=0.0))
+    groups: list[list[int]] = []
+    for new in range(len(owner)):
+        joined = [new]
+        for group in groups.copy():
+            if any(strength[np.ix_(owner[new], owner[old])].max() > limit for old in group):
+                groups.remove(group)
+                joined = [*group, *joined]
+        groups.append(joined)
+    return [np.ascontiguousarray(np.hstack([layout.blocks[b] for b in group])) for group in groups]
+
+
+def _feasible_starts(layout: Layout, start: Array, previous: Array, Z: Array) -> Array:
+    """The least thrusts, the previous ones brought to this wrench, and points along fixed random directions."""
+    k = Z.shape[1]
+    toward = Z @ (Z.T @ (previous - start))
+    # A fixed stream: the same wrench gives the same thrusts.
+    directions = np.random.default_rng(0).normal(size=(_STARTS[min(k, len(_STARTS) - 1)], k))
+    starts = [start, start + _reach(layout, start, toward, 1.0) * toward]
+    for number, direction in enumerate(directions):
+        step = Z @ (direction / np.linalg.norm(direction))
+        share = ((number + 1) / len(directions)) ** 2
+        starts.append(start + share * _reach(layout, start, step, np.inf) * step)
+    return np.clip(np.array(starts), layout.lower_N, layout.upper_N)
+
+
+def _at_rest(layout: Layout, start: Array, previous: Array, Z: Array, G: Array, packed: Array) -> Array:
+    """The cheapest of many points where as many thrusters rest as the null space has dimensions: minima like these."""
+    k = Z.shape[1]
+    moving = np.flatnonzero(np.any(np.abs(Z) > 1e-12, axis=1))
+    rng = np.random.default_rng(0)
+    sets = np.array([rng.permutation(moving)[:k] for _ in range(_RESTS)])
+    sets = sets[np.abs(np.linalg.det(Z[sets])) > 1e-3 / 2.0**k]
+    shifts = np.linalg.solve(Z[sets], start[sets][:, :, None])[:, :, 0]
+    T = start - shifts @ Z.T
+    np.put_along_axis(T, sets, 0.0, axis=1)
+    T = T[np.all((layout.lower_N <= T) & (layout.upper_N >= T), axis=1)]
+    values = np.array([cost(G, row, previous, packed) for row in T])
+    return np.ascontiguousarray(T[np.argsort(values, kind="stable")[:_RESTS_KEPT]])
+
+
+def _reach(layout: Layout, start: Array, step: Array, most: float) -> float:
+    """Largest t <= most that keeps start + t step within limits."""
+    moving = np.abs(step) > 1e-12
+    room = np.where(step > 0.0, layout.upper_N, layout.lower_N) - start
+    return max(float(np.min(room[moving] / step[moving], initial=most)), 0.0)

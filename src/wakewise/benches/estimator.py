@@ -1,0 +1,147 @@
+"""The filter in the default tank: how wrong, how well it knows that, and what ten seconds without a camera cost."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from wakewise.arrays import Array
+from wakewise.estimation import dead_reckoned, local_north_east_down
+from wakewise.geometry import quat_conjugate, quat_from_euler, quat_multiply, rotvec_from_quat
+from wakewise.operation import Scenario
+from wakewise.operation.build import Mission, build_flight, build_mission
+from wakewise.trials.timing import BenchOptions
+
+SEEDS, SECONDS, SETTLED_S = 50, 10.0, 4.0
+# The camera is lost while the vehicle still hovers, and comes back when it has flown to its orbit and begun it.
+LOSS_S, BACK_S = (10.0, 20.0), 2.0
+
+
+def run(options: BenchOptions) -> dict[str, Any]:
+    """Fly the start of the default mission with many seeds; the seeds are none that the settings were chosen with."""
+    scenario = Scenario()
+    mission = build_mission(scenario)
+    flights, spent_s = [], 0.0
+    for k in range(SEEDS):
+        errors, covariances, cpu_s = _flight(scenario.model_copy(update={"seed": 3000 + k}), mission, SECONDS)
+        flights.append((errors, covariances))
+        spent_s += cpu_s
+        options.progress(k + 1, 2 * SEEDS, f"flight {k + 1} of {SEEDS}")
+    begin = round(SETTLED_S * scenario.control.rate_hz)
+    errors = np.array([e[begin:] for e, _ in flights])
+    # One instant of each flight: within a flight errors hang together, between seeds they do not.
+    last = [(e[-1], P[-1]) for e, P in flights]
+    pose = np.array([_nees(e[:6], P[:6, :6]) for e, P in last])
+    whole = np.array([_nees(e, P) for e, P in last])
+    twist = np.array([_nees(e[6:], P[6:, 6:]) for e, P in last])
+    (low, high), (low12, high12) = _bounds(6), _bounds(12)
+    why: dict[str, str] = {}
+    drift = _dead_reckoning_pct(options.data)
+    if drift is None:
+        why["dead_reckoning_drift_pct"] = "no auv_dvl in the data folder"
+    return {
+        "position_rmse_mm": 1e3 * _rms(errors[..., :3]),
+        "attitude_rmse_deg": float(np.degrees(_rms(errors[..., 3:6]))),
+        "velocity_rmse_mm_s": 1e3 * _rms(errors[..., 6:9]),
+        "nees_in_bounds": bool(low <= pose.mean() <= high),
+        "nees_pose_mean": float(pose.mean()),
+        "nees_pose_bounds": [low, high],
+        "nees_pose_and_twist_mean": float(whole.mean()),
+        "nees_pose_and_twist_bounds": [low12, high12],
+        "nees_twist_mean": float(twist.mean()),
+        "nees_twist_in_bounds": bool(low <= twist.mean() <= high),
+        "seeds": SEEDS,
+        **_loss(scenario, mission, options),
+        "dead_reckoning_drift_pct": drift,
+        "step_cpu_us": 1e6 * spent_s / (SEEDS * SECONDS * scenario.control.rate_hz),
+        "why": why,
+    }
+
+
+def _flight(scenario: Scenario, mission: Mission, seconds: float) -> tuple[Array, Array, float]:
+    """Errors, shape (k, 12), covariances, shape (k, 12, 12), per step, and the filter's CPU time in s."""
+    flight = build_flight(scenario, mission)
+    dt_s = 1.0 / scenario.control.rate_hz
+    control, state, estimate = flight.controller.init(), flight.estimator.init(flight.start), flight.start
+    errors, covariances, spent_s = [], [], 0.0
+    for k in range(round(seconds / dt_s)):
+        control, command = flight.controller.step(control, dt_s, estimate, flight.pilot.goal(k * dt_s, estimate))
+        measured = flight.tank.step(command.thrusts_N, dt_s)
+        began = time.thread_time()
+        state, estimate = flight.estimator.step(state, dt_s, measured, command.thrusts_N)
+        spent_s += time.thread_time() - began
+        true = flight.tank.state
+        turn = rotvec_from_quat(quat_multiply(quat_conjugate(estimate.X_WB.q), true.X_WB.q))
+        errors.append(np.concatenate([true.X_WB.p_m - estimate.X_WB.p_m, turn, true.nu_B - estimate.nu_B]))
+        covariances.append(estimate.covariance)
+    return np.array(errors), np.array(covariances), spent_s
+
+
+def _loss(scenario: Scenario, mission: Mission, options: BenchOptions) -> dict[str, Any]:
+    """What ten seconds without poses and tracking do, and whether the filter knows: NEES of the pose over all seeds.
+
+    The water is clean and moves in steps of 0.1 s, which is cheaper and which neither vehicle nor sensors notice.
+    """
+    blind = scenario.tank.model_copy(
+        update={"pose_outages_s": (LOSS_S,), "tracking_rate_hz": 0.0, "silt": 0.0, "flow_step_s": 0.1}
+    )
+    rate_hz = scenario.control.rate_hz
+    begin, middle, end = (round(t * rate_hz) - 1 for t in (LOSS_S[0], sum(LOSS_S) / 2, LOSS_S[1]))
+    nees, worst_m, at_end, claimed, after = [], 0.0, [], [], []
+    for k in range(SEEDS):
+        lost = scenario.model_copy(update={"seed": 4000 + k, "tank": blind})
+        errors, covariances, _ = _flight(lost, mission, LOSS_S[1] + BACK_S)
+        nees.append([_nees(errors[i, :6], covariances[i, :6, :6]) for i in (middle, end, -1)])
+        worst_m = max(worst_m, float(np.linalg.norm(errors[begin:, :3], axis=1).max()))
+        at_end.append(errors[end, :3])
+        claimed.append(np.trace(covariances[end, :3, :3]))
+        after.append(errors[-1, :3])
+        options.progress(SEEDS + k + 1, 2 * SEEDS, f"flight {k + 1} of {SEEDS} that loses its camera")
+    during, last, back = (float(v) for v in np.mean(nees, axis=0))
+    low, high = _bounds(6)
+    return {
+        "loss_in_bounds": bool(low <= during <= high and low <= last <= high),
+        "loss_nees": last,
+        "loss_nees_after_5_s": during,
+        "loss_nees_2_s_later": back,
+        "loss_nees_bounds": [low, high],
+        "loss_rmse_mm": 1e3 * _rms(np.array(at_end)),
+        "loss_sigma_mm": 1e3 * float(np.sqrt(np.mean(claimed))),
+        "loss_worst_mm": 1e3 * worst_m,
+        "loss_rmse_2_s_later_mm": 1e3 * _rms(np.array(after)),
+    }
+
+
+def _dead_reckoning_pct(data: Path | None) -> float | None:
+    """Median end error over distance run of the real Doppler logs, in percent."""
+    folders = sorted((data / "auv_dvl").glob("Trajectory*")) if data is not None else []
+    drifts = []
+    for folder in folders:
+        log = np.loadtxt(next(folder.glob("DVL*.csv")), delimiter=",", skiprows=1)
+        truth = np.loadtxt(next(folder.glob("GT*.csv")), delimiter=",", skiprows=1)
+        n = min(len(log), len(truth))
+        q = np.array([quat_from_euler(*angles) for angles in truth[:n, 7:10]])
+        path = dead_reckoned(log[:n, 0], q, log[:n, 1:4])
+        place = local_north_east_down(truth[:n, 2], truth[:n, 1], truth[:n, 3])
+        run_m = np.linalg.norm(np.diff(place, axis=0), axis=1).sum()
+        drifts.append(100.0 * np.linalg.norm(path[-1] - place[-1]) / run_m)
+    return float(np.median(drifts)) if drifts else None
+
+
+def _bounds(components: int) -> tuple[float, float]:
+    """Between these the mean NEES of independent flights lies in 95 % of cases, if the filter is right."""
+    low, high = (float(chi2.ppf(p, components * SEEDS)) / SEEDS for p in (0.025, 0.975))
+    return low, high
+
+
+def _nees(error: Array, covariance: Array) -> float:
+    return float(error @ np.linalg.solve(covariance, error))
+
+
+def _rms(errors: Array) -> float:
+    """Root mean square of the length of three-vectors."""
+    return float(np.sqrt(np.mean(np.sum(errors**2, axis=-1))))

@@ -1,0 +1,40 @@
+"""Which benches there are."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from wakewise.errors import InputError
+from wakewise.trials.timing import BenchOptions
+
+BENCHES = {
+    "allocator": "exact allocation against SciPy's SLSQP and the pseudo-inverse",
+    "disturbance": "the Gram matrix of D against the sum over points",
+    "estimator": "the filter in the default tank: error, consistency, ten seconds without a camera",
+    "dynamics": "one step of the vehicle, with and without Jacobians",
+    "gentle": "what each method and each lever does to the target's water, in the tank and in the paper's own world",
+    "planner": "the planner against the paper's recipe and IPOPT",
+    "reconstruction": "models of three corals from clear photographs: accuracy, completeness, time and memory",
+    "operator": "an operator's velocity obeyed, against the water's disturbance, by w_track",
+    "imaging": "one photograph: speed by part, memory, geometry, flat port, features",
+    "lattice": "the lattice-Boltzmann solver: cell updates per core, and its distance from the twin",
+    "tank": "the world of a trial against the clock",
+}
+"""Name of each bench and what it measures; the module of that name in this folder holds it, or one of `_STUDIES`."""
+
+_STUDIES = {"gentle": "wakewise.studies.gentle.bench", "operator": "wakewise.studies.operator"}
+
+
+def run_bench(name: str, options: BenchOptions) -> dict[str, Any]:
+    """Run one bench and return its figures.
+
+    Raises
+    ------
+    InputError
+        If there is no bench of that name.
+    """
+    if name not in BENCHES:
+        raise InputError(f"bench {name!r}: no such bench, allowed {', '.join(BENCHES)}")
+    result: dict[str, Any] = import_module(_STUDIES.get(name, f"wakewise.benches.{name}")).run(options)
+    return result

@@ -1,0 +1,36 @@
+"""`dp`: dynamic positioning by PID and the least thrusts, the baseline of every comparison."""
+
+from __future__ import annotations
+
+from wakewise.allocation import Allocation, least_thrusts
+from wakewise.arrays import Array
+from wakewise.control.loop import TrackingController, vehicle_layout
+from wakewise.control.settings import ControlSettings
+from wakewise.control.tracker import make_tracker
+from wakewise.interfaces import WakeModel
+from wakewise.planning import Surroundings
+from wakewise.targets import Region
+from wakewise.vehicles import Vehicle
+from wakewise.wake import WakeView
+
+
+def dynamic_positioning(
+    vehicle: Vehicle,
+    region: Region,
+    wake: WakeModel,
+    settings: ControlSettings,
+    around: Surroundings | None = None,  # noqa: ARG001
+) -> TrackingController:
+    """`dp`: the tracker with the least thrusts; the wake model is only asked what D they cause."""
+    layout = vehicle_layout(vehicle)
+
+    def allocate(wrench_B: Array, gram: Array | None, _: Array) -> Allocation:
+        return least_thrusts(layout, wrench_B, gram)
+
+    return TrackingController(
+        name="dp",
+        tracker=make_tracker(vehicle, settings),
+        view=WakeView.of(vehicle, region, wake, settings.wake.sum),
+        allocate=allocate,
+        hold_s=settings.hold_s,
+    )

@@ -1,0 +1,64 @@
+"""The controller that spends spare thrusters on keeping its jets away from the target, one instant at a time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from wakewise.allocation.allocate import Allocation, Weights, gentle_allocation, least_thrusts
+from wakewise.arrays import Array
+from wakewise.control.levers import levelled, watched
+from wakewise.control.loop import TrackingController, vehicle_layout
+from wakewise.control.settings import ControlSettings
+from wakewise.control.spare import meeting_view
+from wakewise.control.tracker import make_tracker
+from wakewise.interfaces import Controller, WakeModel
+from wakewise.planning import Surroundings
+from wakewise.targets import Region
+from wakewise.vehicles import Vehicle
+from wakewise.wake import bed_of
+from wakewise.wake.view import WakeView
+
+
+def instant_allocator(
+    vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings
+) -> TrackingController:
+    """The same tracker as `dp`, and the gentlest thrusts that make the same wrench.
+
+    D is divided by the sum of the region's weights, so that the cost does not depend on how many points sample it.
+    """
+    layout = vehicle_layout(vehicle)
+    view = WakeView.of(vehicle, region, wake, settings.wake.sum)
+    weights = Weights(
+        disturbance=settings.w_disturbance / view.total_weight, effort=settings.w_effort, previous=settings.w_previous
+    )
+
+    def allocate(wrench_B: Array, gram: Array | None, previous_N: Array) -> Allocation:
+        if gram is None:
+            return least_thrusts(layout, wrench_B)
+        return gentle_allocation(layout, wrench_B, gram, weights, previous_N)
+
+    return TrackingController(
+        name="instant",
+        tracker=make_tracker(vehicle, settings),
+        view=view,
+        allocate=allocate,
+        hold_s=settings.hold_s,
+    )
+
+
+def instant(
+    vehicle: Vehicle,
+    region: Region,
+    wake: WakeModel,
+    settings: ControlSettings,
+    around: Surroundings | None = None,  # noqa: ARG001
+) -> Controller[Any]:
+    """`instant`: the tracker, and the gentlest thrusts for its wrench, one instant at a time."""
+    levers = settings.levers
+    chosen = settings
+    if levers.incoherent:
+        chosen = settings.model_copy(update={"wake": settings.wake.model_copy(update={"sum": "incoherent"})})
+    controller = instant_allocator(vehicle, watched(region, levers, bed_of(wake)), wake, chosen)
+    view = meeting_view(controller.view, vehicle_layout(vehicle)) if levers.meet else controller.view
+    return levelled(replace(controller, view=view), levers)

@@ -1,0 +1,22 @@
+"""Vehicles from other projects' files: URDF and xacro, SDF, Stonefish, allocation matrices.
+
+Nothing of a file is executed, and nothing outside what it names is read. What could not be found is missing and said,
+never guessed.
+
+Start reading in `read.py` (`import_vehicle`: which reader takes a file) and `find.py` (a vehicle by library name, by
+path, by format). Readers: `urdf.py`, `sdf.py`, `stonefish.py`, `matrices.py` and `yamls.py` with
+`yaml_parameters.py`; formats from outside are found through the entry points `wakewise.vehicle_formats`. Their
+helpers: `xacro*.py`, `expressions.py` and `scopes.py` expand macros, `xml.py` and `packages.py` find files,
+`bodies.py`, `plugins.py`, `water.py` and `found.py` put a vehicle together, `stated_matrix.py` reads the matrix that
+a file states, to be held against its geometry.
+"""
+
+from wakewise.importers.find import compare_with, find_vehicle
+from wakewise.importers.read import import_vehicle, read_matrix
+
+__all__ = [
+    "compare_with",
+    "find_vehicle",
+    "import_vehicle",
+    "read_matrix",
+]

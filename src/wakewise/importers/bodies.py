@@ -1,0 +1,233 @@
+"""Links and joints of a vehicle placed in the axes of its body, whichever format they came from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from wakewise.arrays import Array
+from wakewise.geometry import Pose, quat_from_euler
+from wakewise.importers.found import R_LINK_CAMERA, Found
+from wakewise.importers.xml import Element, Place, PlacedError, number, numbers
+
+IDENTITY = Pose(np.zeros(3))
+
+
+@dataclass(eq=False)
+class Shape:
+    """A collision shape with a known volume, or None for a mesh; `X_LS` is its pose in its link."""
+
+    X_LS: Pose
+    volume_m3: float | None
+
+
+@dataclass(eq=False)
+class Link:
+    """A rigid body: where it is, and what it weighs. Inertia is about its centre of mass, in the axes of the link."""
+
+    name: str
+    place: Place
+    X_BL: Pose = IDENTITY
+    mass_kg: float | None = None
+    p_LG_m: Array = field(default_factory=lambda: np.zeros(3))
+    inertia_kg_m2: Array | None = None
+    added_mass: Array | None = None
+    shapes: list[Shape] = field(default_factory=list)
+
+
+@dataclass(eq=False)
+class Joint:
+    """A joint: its child link, and its axis in body axes (None if the joint has none)."""
+
+    name: str
+    kind: str
+    child: str
+    X_BJ: Pose
+    axis: Array | None
+    place: Place
+
+
+@dataclass(eq=False)
+class Camera:
+    """A camera sensor: pose of its Gazebo frame (looks along x) and horizontal field of view."""
+
+    name: str
+    X_BS: Pose
+    fov_rad: float | None
+
+
+@dataclass(eq=False)
+class Bodies:
+    """A vehicle's links and joints, its plugins, and its cameras; `base` is the link whose frame is the body."""
+
+    name: str
+    base: str
+    links: dict[str, Link]
+    joints: dict[str, Joint]
+    plugins: list[Element]
+    cameras: list[Camera]
+
+    def link(self, name: str) -> Link | None:
+        """A link by name, with or without its scope."""
+        return self.links.get(name) or next((v for k, v in self.links.items() if _tail(k) == _tail(name)), None)
+
+    def joint(self, name: str) -> Joint | None:
+        """A joint by name, with or without its scope."""
+        return self.joints.get(name) or next((v for k, v in self.joints.items() if _tail(k) == _tail(name)), None)
+
+
+def _tail(name: str) -> str:
+    return name.replace("::", "/").rpartition("/")[2]
+
+
+def pose_of(xyz: Array, rpy: Array) -> Pose:
+    """Pose from a position and roll, pitch, yaw about fixed axes, as URDF, SDF and Stonefish write them."""
+    return Pose(xyz, quat_from_euler(float(rpy[0]), float(rpy[1]), float(rpy[2])))
+
+
+def inertia_matrix(values: dict[str, float]) -> Array:
+    """Symmetric matrix from the six entries ixx ... izz."""
+    xx, xy, xz, yy, yz, zz = (values.get(key, 0.0) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def checked_mass(text: str | None, place: Place, link: str) -> float:
+    """A link's mass.
+
+    Raises
+    ------
+    InputError
+        If it is missing, not a number, or negative; a massless link is allowed, a massless vehicle is not.
+    """
+    if text is None:
+        raise PlacedError(f"{place}: link {link}: inertial without a mass")
+    mass = number(text, place, f"mass of link {link}")
+    if mass < 0.0:
+        raise PlacedError(f"{place}: mass of link {link} is {mass:g}, must be at least 0")
+    return mass
+
+
+def shape_volume(tag: str, sizes: dict[str, Array]) -> float | None:
+    """Volume of a primitive shape; None for a mesh or anything else."""
+    radius = float(sizes["radius"][0]) if "radius" in sizes else 0.0
+    length = float(sizes["length"][0]) if "length" in sizes else 0.0
+    match tag:
+        case "box" if "size" in sizes:
+            return float(np.prod(sizes["size"]))
+        case "sphere":
+            return 4.0 / 3.0 * np.pi * radius**3
+        case "cylinder":
+            return float(np.pi * radius**2 * length)
+        case "capsule":
+            return float(np.pi * radius**2 * (length + 4.0 / 3.0 * radius))
+        case "ellipsoid" if "radii" in sizes:
+            return float(4.0 / 3.0 * np.pi * np.prod(sizes["radii"]))
+        case _:
+            return None
+
+
+def geometry_volume(geometry: Element | None) -> float | None:
+    """Volume of a `<geometry>` of URDF (attributes) or SDF (elements)."""
+    if geometry is None or not geometry.children:
+        return None
+    shape = geometry.children[0]
+    counts = {"size": 3, "radii": 3, "radius": 1, "length": 1}
+    sizes: dict[str, Array] = {}
+    for key, count in counts.items():
+        text = shape.attributes.get(key) or shape.value(key)
+        if text is not None:
+            sizes[key] = numbers(text, shape.place, f"{shape.tag} {key}", count)
+    return shape_volume(shape.tag, sizes)
+
+
+def read_mass(bodies: Bodies, found: Found) -> None:
+    """Mass, centre of gravity and inertia of all links together, as a simulator would move them.
+
+    Raises
+    ------
+    InputError
+        If the masses add up to nothing, or the inertia is not positive definite.
+    """
+    weighed = [link for link in bodies.links.values() if link.mass_kg is not None]
+    if not weighed:
+        return
+    total = sum(link.mass_kg or 0.0 for link in weighed)
+    heaviest = max(weighed, key=lambda link: link.mass_kg or 0.0)
+    if total <= 0.0:
+        raise PlacedError(f"{heaviest.place}: masses of the links add up to {total:g} kg, must be more than 0")
+    for link in weighed:
+        _require_inertia(link)
+    found.mass_kg = total
+    centres = {link.name: link.X_BL.apply(link.p_LG_m) for link in weighed}
+    centre = sum((link.mass_kg or 0.0) * centres[link.name] for link in weighed) / total
+    found.p_G_m = np.asarray(centre, dtype=np.float64)
+    if heaviest.inertia_kg_m2 is not None:
+        inertia = np.zeros((3, 3))
+        for link in weighed:
+            arm = centres[link.name] - found.p_G_m
+            own = np.zeros((3, 3)) if link.inertia_kg_m2 is None else link.X_BL.R @ link.inertia_kg_m2 @ link.X_BL.R.T
+            inertia += own + (link.mass_kg or 0.0) * (float(arm @ arm) * np.eye(3) - np.outer(arm, arm))
+        found.inertia_kg_m2 = 0.5 * (inertia + inertia.T)
+    others = [link for link in weighed if link is not heaviest]
+    if others:
+        found.notes.append(
+            f"mass: link {heaviest.name} {heaviest.mass_kg:g} kg and {len(others)} further links, together "
+            f"{sum(link.mass_kg or 0.0 for link in others):g} kg, are counted as one rigid body"
+        )
+    where = f"{heaviest.place.file.name}:{heaviest.place.line}"
+    found.derived["body"] = found.derived["inertia"] = (
+        f"{found.kind} {where}: link {heaviest.name} and all others as one body"
+    )
+
+
+def _require_inertia(link: Link) -> None:
+    inertia = link.inertia_kg_m2
+    if inertia is None:
+        return
+    scale = float(np.abs(inertia).max())
+    lowest = float(np.linalg.eigvalsh(inertia)[0])
+    # A dummy link may have no inertia at all; a link that carries the vehicle may not.
+    if lowest < -1e-9 * scale or (lowest <= 0.0 and (link.mass_kg or 0.0) > 0.1):
+        raise PlacedError(
+            f"{link.place}: inertia of link {link.name} has smallest eigenvalue {lowest:g}, must be positive definite"
+        )
+
+
+def read_camera(bodies: Bodies, found: Found) -> None:
+    """Mount and field of view of the first camera."""
+    if not bodies.cameras:
+        return
+    camera = bodies.cameras[0]
+    found.X_BC = Pose.from_matrix(camera.X_BS.R @ R_LINK_CAMERA, camera.X_BS.p_m)
+    found.camera_fov_rad = camera.fov_rad
+    more = f", the first of {len(bodies.cameras)}" if len(bodies.cameras) > 1 else ""
+    found.notes.append(f"camera: {camera.name}{more}")
+    found.derived["camera_mount"] = f"{found.kind} {found.file.name}: sensor {camera.name}"
+
+
+def read_displacement(bodies: Bodies, found: Found) -> None:
+    """Displaced volume and centre of buoyancy from collision shapes, which Gazebo's buoyancy system weighs.
+
+    Taken only where that makes the vehicle float within 30 % of its mass in fresh water, since collision shapes of
+    other files are drawn for contact, not for buoyancy.
+    """
+    shapes = [(link, shape) for link in bodies.links.values() for shape in link.shapes]
+    if found.displaced_volume_m3 is not None or found.mass_kg is None or not shapes:
+        return
+    if any(shape.volume_m3 is None for _, shape in shapes):
+        found.notes.append("displaced volume: collision meshes are not measured, so it is not known")
+        return
+    volume = sum(shape.volume_m3 or 0.0 for _, shape in shapes)
+    if not 0.7 < 1000.0 * volume / found.mass_kg < 1.3:
+        found.notes.append(
+            f"displaced volume: collision shapes hold {volume:.4g} m3, which does not fit {found.mass_kg:.4g} kg, "
+            f"so they are not taken for it"
+        )
+        return
+    moment = sum((s.volume_m3 or 0.0) * (link.X_BL @ s.X_LS).p_m for link, s in shapes)
+    found.displaced_volume_m3 = volume
+    found.p_buoyancy_m = np.asarray(moment, dtype=np.float64) / volume
+    found.notes.append(f"displaced volume: inferred from {len(shapes)} collision shapes, as Gazebo's buoyancy does")
+    found.derived["buoyancy"] = f"{found.kind} {found.file.name}: collision shapes"
+    found.estimates.add("buoyancy")

@@ -1,0 +1,71 @@
+"""One way to name any vehicle: a library name, a vehicle file, or a file of another project."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from wakewise.errors import InputError
+from wakewise.importers.stated_matrix import read_number_matrix
+from wakewise.vehicles.check import AnyVehicle
+from wakewise.vehicles.draft import VehicleDraft
+from wakewise.vehicles.library import draft_names, load_draft
+from wakewise.vehicles.mixing import Comparison, compare_either_frame, compare_signs, compare_with_ardusub
+
+_OURS = re.compile(r"^(does_not_claim|thruster_layout):", re.MULTILINE)
+
+
+def find_vehicle(
+    name_or_path: str, *, packages: Mapping[str, Path] | None = None, skip_missing: bool = False
+) -> VehicleDraft:
+    """Read a vehicle of the library, a vehicle file, or any file of another project that can be imported.
+
+    `packages` and `skip_missing` are those of `importers.import_vehicle`; only files of other projects use them.
+
+    Raises
+    ------
+    InputError
+        If there is no such vehicle or file, or it cannot be read as a vehicle.
+    """
+    path = Path(name_or_path)
+    if name_or_path in draft_names() or not path.is_file() or _is_ours(path):
+        return load_draft(name_or_path)
+    from wakewise.importers.read import import_vehicle
+
+    return import_vehicle(path, packages=packages, skip_missing=skip_missing)
+
+
+def compare_with(vehicle: AnyVehicle, matrix: str) -> Comparison:
+    """Compare the geometry with a stated matrix: the word ardusub, or a file of numbers or YAML that holds one.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it holds no matrix, or the matrix has another number of thrusters.
+    """
+    if not vehicle.thrusters:
+        raise InputError(f"vehicle {vehicle.name}: holds no places of thrusters to compare {matrix} with")
+    if matrix == "ardusub":
+        return compare_with_ardusub(vehicle)
+    path = Path(matrix)
+    if path.suffix in (".yaml", ".yml"):
+        from wakewise.importers.read import read_matrix
+
+        stated, notes = read_matrix(path)
+        found = compare_either_frame(vehicle, stated, path.name)
+        return replace(found, notes=(*notes, *found.notes))
+    stated, signs_only = read_number_matrix(path)
+    if signs_only:
+        return compare_signs(vehicle, stated, path.name)
+    return compare_either_frame(vehicle, stated, path.name)
+
+
+def _is_ours(path: Path) -> bool:
+    if path.suffix not in (".yaml", ".yml"):
+        return False
+    try:
+        return _OURS.search(path.read_text("utf-8")) is not None
+    except (OSError, UnicodeDecodeError):
+        return True

@@ -1,0 +1,216 @@
+"""One way in: a vehicle file of another project becomes a draft, whatever its format."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from wakewise.arrays import Array
+from wakewise.errors import InputError
+from wakewise.importers.bodies import Bodies, read_camera, read_displacement, read_mass
+from wakewise.importers.found import FRAME_CHOICES, THRUST_CHOICES, Found, make_draft, wrench_rows_to_frd
+from wakewise.importers.matrices import read_matrix_only, read_yaml
+from wakewise.importers.packages import Folders
+from wakewise.importers.plugins import read_thrusters, words
+from wakewise.importers.sdf import left_out, read_sdf
+from wakewise.importers.stonefish import read_stonefish
+from wakewise.importers.urdf import read_urdf
+from wakewise.importers.water import read_water
+from wakewise.importers.xacro import Xacro
+from wakewise.importers.xml import Element, PlacedError, parse_xml, read_text
+from wakewise.importers.yamls import parse_yaml
+from wakewise.vehicles.draft import VehicleDraft
+from wakewise.vehicles.vehicle import Provenance
+
+_AGREE = 1e-3
+
+
+def import_vehicle(
+    path: str | Path,
+    *,
+    convention: str = "auto",
+    thrust: str = "auto",
+    matrix: Path | None = None,
+    packages: Mapping[str, Path] | None = None,
+    arguments: Mapping[str, str] | None = None,
+    skip_missing: bool = False,
+) -> VehicleDraft:
+    """Read a vehicle description of another project.
+
+    Parameters
+    ----------
+    path : str or Path
+        URDF, xacro, Gazebo SDF, Stonefish scenario, or YAML with an allocation matrix or thruster geometry; the
+        format is told by what is in the file, not by its name.
+    convention : str
+        Body axes of the file: "auto" (by format and evidence), "FLU" or "FRD".
+    thrust : str
+        "auto", "axis", "reversed", or an axis of each thruster's own frame such as "+x"; see `make_draft`.
+    matrix : Path, optional
+        YAML file with the matrix that the project ships; kept beside the geometry for comparison.
+    packages : mapping of str to Path, optional
+        Folders of packages that are not found near the file.
+    arguments : mapping of str to str, optional
+        Values of xacro and Stonefish arguments.
+    skip_missing : bool
+        Leave out xacro includes that are not there, with a note, instead of refusing the file.
+
+    Returns
+    -------
+    VehicleDraft
+        In FRD. What the file does not hold is None and listed in `missing`; `notes` says what was decided and why.
+
+    Raises
+    ------
+    InputError
+        In one line with file and line, for anything that cannot be read or is not a vehicle.
+    """
+    path = Path(path)
+    for value, choices, option in ((convention, FRAME_CHOICES, "frame"), (thrust, THRUST_CHOICES, "thrust direction")):
+        if value not in choices:
+            raise InputError(f"{option} {value!r}: allowed {', '.join(choices)}")
+    try:
+        # Overflow in numbers of absurd size shows as an infinity, which the record refuses; it needs no warning.
+        with np.errstate(all="ignore"):
+            found = _read(path, packages or {}, arguments or {}, skip_missing=skip_missing)
+            draft = make_draft(found, convention, thrust)
+            return draft if matrix is None else _with_matrix(draft, matrix, convention)
+    except (RecursionError, ArithmeticError, np.linalg.LinAlgError) as fault:
+        raise InputError(f"{path}: cannot be read ({type(fault).__name__})") from fault
+
+
+def _read(path: Path, packages: Mapping[str, Path], arguments: Mapping[str, str], *, skip_missing: bool) -> Found:
+    text = read_text(path)
+    if not text.lstrip().startswith("<"):
+        found = Found(path.stem, "YAML", path, "FLU", "")
+        read_yaml(parse_yaml(text, path), path.name, found)
+        return found
+    root = parse_xml(text, path)
+    folders = Folders(path, packages)
+    notes: list[str] = []
+    macros: list[str] = []
+    if _is_xacro(root):
+        xacro = Xacro(folders, arguments, skip_missing=skip_missing)
+        root = xacro.expand(root)
+        notes, macros = xacro.notes, list(xacro.macros)
+    elif arguments and root.tag != "scenario" and not _is_stonefish(root):
+        raise InputError(f"{path}: has no xacro arguments, {', '.join(arguments)} cannot be set")
+    if root.tag == "scenario" or (root.tag == "robot" and _is_stonefish(root)):
+        found = Found(path.stem, "Stonefish", path, "FRD", "by format: Stonefish worlds are NED and its bodies FRD")
+        read_stonefish(root, folders, arguments, found)
+    elif root.tag == "robot":
+        if not root.all("link") and macros:
+            raise PlacedError(
+                f"{root.place}: only defines macros ({', '.join(macros)[:120]}); import the file that calls them"
+            )
+        found = _from_bodies(read_urdf(root), "URDF", path)
+    elif root.tag in {"sdf", "gazebo", "model", "world"}:
+        wrapped = root if root.tag in {"sdf", "gazebo"} else Element("sdf", {}, root.place, [root])
+        found = _from_bodies(read_sdf(wrapped, folders, notes), "SDF", path)
+    else:
+        raise PlacedError(
+            f"{root.place}: root element <{root.tag[:40]}> is not read; "
+            f"robot (URDF, xacro), sdf (Gazebo) and scenario (Stonefish) are"
+        )
+    found.notes[:0] = notes
+    if not found.thrusters and found.matrix is None and found.mass_kg is None and found.added_mass is None:
+        raise PlacedError(f"{root.place}: holds neither thrusters nor mass nor hydrodynamics{left_out(found.notes)}")
+    if not found.thrusters:
+        found.notes.append("no thruster was found in the file")
+    return found
+
+
+def _is_xacro(root: Element) -> bool:
+    return any("xacro" in value for key, value in root.attributes.items() if key.startswith("xmlns")) or any(
+        element.tag.startswith("xacro:") for element in root.walk()
+    )
+
+
+def _is_stonefish(root: Element) -> bool:
+    return root.first("base_link") is not None
+
+
+def _from_bodies(bodies: Bodies, kind: str, path: Path) -> Found:
+    found = Found(bodies.name, kind, path, "FLU", "")
+    _detect_frame(bodies, found)
+    read_mass(bodies, found)
+    read_thrusters(bodies, found)
+    read_water(bodies, found)
+    if any("hydrodynamics" in words(p) or "buoyancy" in words(p) for p in bodies.plugins):
+        read_displacement(bodies, found)
+    read_camera(bodies, found)
+    return found
+
+
+def _detect_frame(bodies: Bodies, found: Found) -> None:
+    """URDF and SDF bodies are FLU by ROS REP 103; ArduPilot's plugin and the base link's name can say otherwise."""
+    for plugin in bodies.plugins:
+        turn = plugin.value("modelXYZToAirplaneXForwardZDown")
+        if "ardupilot" not in words(plugin) or turn is None:
+            continue
+        parts = turn.split()
+        rolled = len(parts) == 6 and abs(abs(float_or_nan(parts[3])) - np.pi) < 0.01
+        level = len(parts) == 6 and all(abs(float_or_nan(p)) < 0.01 for p in parts[3:])
+        if rolled:
+            found.frame_why = "detected: ArduPilot's plugin turns the body by pi about x to point z down"
+            return
+        if level:
+            found.frame, found.frame_why = "FRD", "detected: ArduPilot's plugin takes the body as x forward, z down"
+            return
+    name = bodies.base.lower()
+    if name.endswith(("_ned", "_frd", "_fsd")):
+        found.frame, found.frame_why = "FRD", f"detected: the base link is called {bodies.base}"
+        return
+    found.frame_why = f"by format: {found.kind} bodies have z up (ROS REP 103)"
+
+
+def float_or_nan(text: str) -> float:
+    """A number, or NaN if the text is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return float("nan")
+
+
+def read_matrix(path: Path, convention: str = "auto", geometry: Array | None = None) -> tuple[Array, list[str]]:
+    """Allocation matrix of a YAML file, shape (6, n), in FRD, and notes on how it was read.
+
+    Names of frames in the file decide its axes; else `convention`; else the `geometry`, shape (6, n), by which axes
+    make more entries agree; else they are FLU as in ROS.
+
+    Raises
+    ------
+    InputError
+        If the file holds none or it has the wrong shape.
+    """
+    found = Found(path.stem, "YAML", path, "FLU", "")
+    read_matrix_only(parse_yaml(read_text(path), path), found)
+    if found.matrix is None:
+        raise InputError(f"{path}: holds no allocation matrix")
+    frame, why = found.frame, found.frame_why
+    turned = wrench_rows_to_frd(found.matrix)
+    if not why.startswith("detected"):
+        if convention != "auto":
+            frame, why = ("FRD" if convention == "FRD" else "FLU"), "told"
+        elif geometry is not None and geometry.shape == turned.shape:
+            agree = {
+                name: int(np.sum(np.abs(stated - geometry) <= _AGREE))
+                for name, stated in (("FLU", turned), ("FRD", found.matrix))
+            }
+            frame = "FRD" if agree["FRD"] > agree["FLU"] else "FLU"
+            why = f"inferred: {agree[frame]} of {geometry.size} entries agree with the geometry so read"
+            why += f", {agree['FLU' if frame == 'FRD' else 'FRD']} the other way"
+    return turned if frame == "FLU" else found.matrix, [*found.notes, f"frame of the matrix: {frame} ({why})"]
+
+
+def _with_matrix(draft: VehicleDraft, path: Path, convention: str) -> VehicleDraft:
+    """Keep a shipped matrix beside the geometry."""
+    n = len(draft.thrusters)
+    matrix, notes = read_matrix(path, convention, draft.allocation_matrix if n else None)
+    if n and matrix.shape[1] != n:
+        raise InputError(f"{path}: allocation matrix has {matrix.shape[1]} columns, the vehicle has {n} thrusters")
+    origin = Provenance(group="shipped_matrix", source=f"YAML {path.name}", estimate=False)
+    return replace(draft, shipped_matrix=matrix, notes=(*draft.notes, *notes), provenance=(*draft.provenance, origin))

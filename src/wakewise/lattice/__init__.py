@@ -1,0 +1,30 @@
+"""An oracle for the wakes: a lattice-Boltzmann solver for jets in a box, and the mean fields it computed.
+
+The water of a trial is made of parcels (`wakewise.water`), which are laws of jets put together. The lattice knows no
+law of jets: it solves for the flow of a pushing disk, and laws, parcels and wake models are held against it.
+
+Start reading in `cases.py` (what was computed) and `flow.py` (its velocity at points). `kernel.py` is the solver,
+`twin.py` its readable twin, `run.py` and `compute.py` a computation, `averages.py` and `meanfield.py` what is kept of
+it, `laws.py` what it says of the laws of round jets.
+"""
+
+from wakewise.lattice.cases import CASES, Case, DiskJet, case_hash, find_case
+from wakewise.lattice.compute import compute_mean_field, compute_run
+from wakewise.lattice.flow import LatticeFlow
+from wakewise.lattice.meanfield import MeanField, load_mean_field, save_mean_field
+from wakewise.lattice.run import LatticeRun
+
+__all__ = [
+    "CASES",
+    "Case",
+    "DiskJet",
+    "LatticeFlow",
+    "LatticeRun",
+    "MeanField",
+    "case_hash",
+    "compute_mean_field",
+    "compute_run",
+    "find_case",
+    "load_mean_field",
+    "save_mean_field",
+]

@@ -1,0 +1,30 @@
+"""Model predictive control (MPC, receding horizon): the motion and thrusts of the next two seconds.
+
+`PlanProblem` is the question, `Horizon` the answer, `Planner` finds it: a majorised Gauss-Newton step, condensed to a
+quadratic program in the thrusts, solved within a millisecond or two. `Guard` stands round it: a late, infeasible or
+bad plan is counted and replaced.
+
+Start reading in `problem.py` (the cost in symbols), then `planner.py` (the iterations). `kernels.py` rolls the
+horizon out with derivatives, `condensing.py` makes the quadratic program, `qp.py` solves it, `barrier.py` and
+`surroundings.py` keep it clear of floor, walls and target, `reference.py` says what is wished along the way,
+`guard.py` what is flown when. What the thrusts do to the water is asked of `wakewise.wake`. Nothing here knows how a
+plan is flown: see `wakewise.control`.
+"""
+
+from wakewise.planning.guard import check_start
+from wakewise.planning.paper_planner import PaperPlanner
+from wakewise.planning.planner import Planner
+from wakewise.planning.problem import Horizon, PlanProblem, PlanSettings, state_of
+from wakewise.planning.surroundings import Surroundings, covering_spheres
+
+__all__ = [
+    "Horizon",
+    "PaperPlanner",
+    "PlanProblem",
+    "PlanSettings",
+    "Planner",
+    "Surroundings",
+    "check_start",
+    "covering_spheres",
+    "state_of",
+]

@@ -1,0 +1,158 @@
+"""Between a planner that may fail and a loop that must not: deadlines, checks, and what to do instead.
+
+Order of preference: the fresh plan; the previous plan moved on in time, as long as enough of it is left; none, upon
+which the controller falls back on PID and allocator. Every refusal is counted by its kind, logged, and said in words.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from wakewise.arrays import Array
+from wakewise.errors import InputError, WakewiseError
+from wakewise.planning.planner import Planner, holding_thrusts, shifted
+from wakewise.planning.problem import Horizon, PlanProblem
+from wakewise.planning.surroundings import Surroundings
+from wakewise.targets import Region
+from wakewise.vehicles import Vehicle
+
+log = logging.getLogger(__name__)
+
+USABLE_SHARE = 0.5
+"""Share of the horizon up to which an old plan may be flown on."""
+
+
+@dataclass(frozen=True, eq=False)
+class Guarded:
+    """A plan to fly (None: there is none), the time since it began in s, and what went wrong (None: nothing)."""
+
+    plan: Horizon | None
+    age_s: float
+    trouble: str | None
+
+
+@dataclass(eq=False)
+class Guard:
+    """Asks a planner and judges the answer.
+
+    Parameters
+    ----------
+    planner : Planner
+    deadline_s : float
+        From question to answer.
+    clock : callable
+        Seconds; `time.perf_counter` where the world does not wait. In a simulated world, which does, the time of the
+        solving thread (`time.thread_time`) gives the same flight on a busy machine.
+    counts : dict
+        How often each kind of trouble was met.
+    enforce : bool
+        Whether a late plan is left out. A simulated world waits for its controller; there a late plan is counted and
+        flown, so that the same seed gives the same flight whether or not the machine was busy or had to compile.
+    """
+
+    planner: Planner
+    deadline_s: float
+    clock: Callable[[], float] = time.perf_counter
+    counts: dict[str, int] = field(default_factory=dict)
+    enforce: bool = True
+
+    def count(self, kind: str, words: str) -> str:
+        """Count and log a trouble; returns its words."""
+        self.counts[kind] = self.counts.get(kind, 0) + 1
+        # The first of a kind is news, the thousandth is not.
+        log.log(logging.WARNING if self.counts[kind] == 1 else logging.DEBUG, "planner: %s", words)
+        return words
+
+    def ask(self, make: Callable[[], PlanProblem], previous: Horizon | None, age_s: float) -> Guarded:
+        """A plan for the problem that `make` states, or the previous one, of that age, moved on, or none."""
+        stage_s = self.planner.model.settings.stage_s
+        began = self.clock()
+        try:
+            problem = make()
+            start = self._start(problem, previous, age_s)
+            until = began + 0.5 * self.deadline_s if self.enforce else float("inf")
+            plan = self.planner.plan(problem, start, deadline=until, clock=self.clock)
+            trouble = self._judge(plan)
+        except WakewiseError as error:
+            plan, trouble = None, ("refused", f"plan refused: {error}")
+        except Exception as error:
+            plan, trouble = None, ("failed", f"planner failed: {type(error).__name__}: {error}")
+        if trouble is None and self.clock() - began > self.deadline_s:
+            words = f"plan late: {1e3 * (self.clock() - began):.0f} ms of {1e3 * self.deadline_s:.0f} allowed"
+            if not self.enforce:
+                self.count("late", words)
+            else:
+                trouble = ("late", words)
+        if trouble is None:
+            return Guarded(plan, 0.0, None)
+        words = self.count(*trouble)
+        if previous is not None and age_s <= USABLE_SHARE * stage_s * len(previous.commands_N):
+            return Guarded(previous, age_s, f"{words}: previous plan goes on")
+        return Guarded(None, 0.0, f"{words}: PID and allocator")
+
+    def _start(self, problem: PlanProblem, previous: Horizon | None, age_s: float) -> Array:
+        model = self.planner.model
+        if previous is not None:
+            return shifted(previous, round(age_s / model.settings.stage_s))
+        return np.tile(holding_thrusts(model, problem), (model.settings.stages, 1))
+
+    def _judge(self, plan: Horizon) -> tuple[str, str] | None:
+        table = self.planner.model.table
+        if not (np.isfinite(plan.cost) and np.isfinite(plan.commands_N).all() and np.isfinite(plan.states).all()):
+            return "not finite", "plan not finite"
+        if np.any(plan.commands_N < table.lower - 1e-9) or np.any(plan.commands_N > table.upper + 1e-9):
+            return "limits", "plan breaks thrust limits"
+        if plan.solver == "not convex":
+            return "infeasible", "plan's QP has no solution"
+        return None
+
+
+def check_start(
+    vehicle: Vehicle,
+    region: Region,
+    state: Array,
+    surroundings: Surroundings,
+    clearance_m: float = 0.0,
+    what: str = "start",
+) -> None:
+    """Refuse a start from which no plan can be good, before the loop begins.
+
+    `state` is position, quaternion, twist, shape (13,); `what` it is called in the message.
+
+    Raises
+    ------
+    InputError
+        An empty region or weights that are negative or NaN, points of the target inside the hull, a hull that touches
+        something or is nearer to it than `clearance_m`, or a state that is not finite.
+    """
+    from wakewise.planning.barrier import plane_gap, sphere_gap
+    from wakewise.planning.kernels import rotation
+
+    x = np.array(state, dtype=np.float64)
+    if x.shape != (13,) or not np.isfinite(x).all():
+        raise InputError(f"{what}: must be 13 finite numbers (position, quaternion, twist)")
+    if len(region.points_W_m) == 0:
+        raise InputError("region: no points, the target is empty")
+    if np.any(region.weights < 0.0) or not np.sum(region.weights) > 0.0:
+        raise InputError("region: weights must not be negative, and at least one must be more than 0")
+    R = np.empty((3, 3))
+    rotation(x, R)
+    half = 0.5 * np.array(vehicle.size_m)
+    inside = np.all(np.abs((region.points_W_m - x[:3]) @ R) < half, axis=1) & (region.distance_m == 0.0)
+    if np.any(inside):
+        raise InputError(f"{what}: {int(inside.sum())} points of the target lie inside the vehicle, it must be outside")
+    slope = np.empty(6)
+    planes = len(surroundings.planes)
+    for number, row in enumerate((*surroundings.planes, *surroundings.spheres)):
+        gap = plane_gap if number < planes else sphere_gap
+        clear = gap(x[:3], R, half, np.array(row), slope)
+        if clear < clearance_m:
+            raise InputError(
+                f"{what}: the hull comes within {clear:.3f} m of {surroundings.name(number)}, "
+                f"allowed is {clearance_m:g} m or more"
+            )

@@ -1,0 +1,321 @@
+"""Compiled: a plan's states, its cost, and the cost's derivatives stage by stage.
+
+Commands are the only unknowns (single shooting), so every set of commands within limits is a plan that the vehicle's
+model can fly. Errors of state are (position in W, rotation vector in B, twist in B), as in
+`wakewise.vehicles.jacobians`.
+
+Thruster lag, tau T' = u - T, is exact per stage: with a = exp(-h / tau) and b = (1 - a) tau / h,
+
+    T_k+1 = a T_k + (1 - a) u_k,    mean over the stage = b T_k + (1 - b) u_k,
+
+and the mean is what pushes and what blows during the stage. Jets that take their time are a second lag of the same
+kind behind it, from mean thrusts to mean jets; without one they are the mean thrusts themselves.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from wakewise.arrays import Array
+from wakewise.planning.barrier import add_barrier, least_gap
+from wakewise.vehicles.runge_kutta import rk4_jacobian_kernel, rk4_kernel
+from wakewise.wake.plan_disturbance import stage_disturbance
+
+
+class PlanTable(NamedTuple):
+    """What stays the same from plan to plan.
+
+    packed : (20, 6) vehicle; allocation : (6, n); keep, mean : (n,), a and b of the lag; mean_map : (N, N n), mean
+    thrusts by commands; half_size : (3,); planes, spheres : (p, 4), (s, 4); weights : (10,), see
+    `planner.compile_plan`.
+    """
+
+    packed: Array
+    allocation: Array
+    lower: Array
+    upper: Array
+    keep: Array
+    mean: Array
+    mean_map: Array
+    half_size: Array
+    planes: Array
+    spheres: Array
+    weights: Array
+    stage_s: float
+    majorise: float
+
+
+class PlanCase(NamedTuple):
+    """One question, in writable arrays: see `PlanProblem`.
+
+    quiet is w_D per stage, barrier (2,) is mu and reach; jets, jet_keep, jet_mean : (n,), jets now and a and b of their
+    lag (0, 0 for none); jet_map : (N, N n), mean jets by commands.
+    """
+
+    state: Array
+    thrusts: Array
+    command: Array
+    force_W: Array
+    moment_B: Array
+    current_W: Array
+    reference: Array
+    quiet: Array
+    barrier: Array
+    jets: Array
+    jet_keep: Array
+    jet_mean: Array
+    jet_map: Array
+
+
+class PlanWork(NamedTuple):
+    """Results of `horizon`, and room to work in.
+
+    X : (N + 1, 13); T, jets : (N, n), mean thrusts and mean jets; A : (N, 12, 12), B : (N, 12, n), step by error state
+    and mean thrusts; Q : (N + 1, 6, 6) by pose, S : (N, n, 6), R : (N, n, n), gx : (N + 1, 12), gT : (N, n) of the
+    cost, S, R and gT by the jets.
+    """
+
+    X: Array
+    T: Array
+    jets: Array
+    A: Array
+    B: Array
+    Q: Array
+    S: Array
+    R: Array
+    gx: Array
+    gT: Array
+    D: Array
+    parts: Array
+
+
+W_EFFORT, W_CHANGE, W_TRACK, W_PATH, W_ATTITUDE, W_TWIST, TOLERANCE, RATE_N, RHO, REACH, LEAST = range(11)
+"""Places in `PlanTable.weights`."""
+
+
+CLOSEST = 6
+"""Place in `PlanWork.parts` of the least clearance; before it: D, path, attitude, twist, barrier, commands."""
+
+
+def plan_work(stages: int, thrusters: int) -> PlanWork:
+    """Room for a horizon."""
+    N, n = stages, thrusters
+    return PlanWork(
+        X=np.zeros((N + 1, 13)),
+        T=np.zeros((N, n)),
+        jets=np.zeros((N, n)),
+        A=np.zeros((N, 12, 12)),
+        B=np.zeros((N, 12, n)),
+        Q=np.zeros((N + 1, 6, 6)),
+        S=np.zeros((N, n, 6)),
+        R=np.zeros((N, n, n)),
+        gx=np.zeros((N + 1, 12)),
+        gT=np.zeros((N, n)),
+        D=np.zeros(N),
+        parts=np.zeros(8),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def rotation(state, R):  # type: ignore[no-untyped-def]
+    """R_WB of a state's quaternion."""
+    w, x, y, z = state[3], state[4], state[5], state[6]
+    R[0, 0], R[0, 1], R[0, 2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
+    R[1, 0], R[1, 1], R[1, 2] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
+    R[2, 0], R[2, 1], R[2, 2] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+
+
+@njit(cache=True, error_model="numpy")
+def attitude_cost(state, wished, weight, tolerance, g, H):  # type: ignore[no-untyped-def]
+    """Add weight max(0, |e| - tolerance)^2, e = 2 vec(q_ref^-1 q), to gradient g and Gauss-Newton H by the turn."""
+    w, x, y, z = state[3], state[4], state[5], state[6]
+    a, b, c, d = wished[3], -wished[4], -wished[5], -wished[6]
+    ew = a * w - b * x - c * y - d * z
+    sign = 1.0 if ew >= 0.0 else -1.0
+    ew *= sign
+    e = np.empty(3)
+    e[0] = sign * (a * x + b * w + c * z - d * y)
+    e[1] = sign * (a * y - b * z + c * w + d * x)
+    e[2] = sign * (a * z + b * y - c * x + d * w)
+    # With e = vec here, 2 de = (ew I + [e]) dtheta.
+    J = np.empty((3, 3))
+    J[0, 0], J[0, 1], J[0, 2] = ew, -e[2], e[1]
+    J[1, 0], J[1, 1], J[1, 2] = e[2], ew, -e[0]
+    J[2, 0], J[2, 1], J[2, 2] = -e[1], e[0], ew
+    size = 2.0 * np.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
+    over = size - tolerance
+    if over <= 0.0:
+        return 0.0
+    if tolerance == 0.0:
+        for r in range(3):
+            for k in range(3):
+                g[3 + r] += 4.0 * weight * J[k, r] * e[k]
+                for t in range(3):
+                    H[3 + r, 3 + t] += 2.0 * weight * J[k, r] * J[k, t]
+    else:
+        slope = np.empty(3)
+        for r in range(3):
+            slope[r] = 2.0 * (J[0, r] * e[0] + J[1, r] * e[1] + J[2, r] * e[2]) / size
+        for r in range(3):
+            g[3 + r] += 2.0 * weight * over * slope[r]
+            for t in range(3):
+                H[3 + r, 3 + t] += 2.0 * weight * slope[r] * slope[t]
+    return weight * over * over
+
+
+@njit(cache=True, error_model="numpy")
+def horizon(table, wake, scratch, case, U, work, slopes):  # type: ignore[no-untyped-def]
+    """Cost of commands U, (N, n); fills `work` (derivatives only with `slopes`). For `parts` see `CLOSEST`."""
+    N, n = U.shape
+    h, weights = table.stage_s, table.weights
+    X, parts = work.X, work.parts
+    R, inputs, thrust, jet = np.empty((3, 3)), np.empty(9), case.thrusts.copy(), case.jets.copy()
+    Bw, force = np.empty((12, 6)), np.empty(3)
+    g, H = np.zeros(6 + n), np.zeros((6 + n, 6 + n))
+    state = case.state.copy()
+    parts[:] = 0.0
+    parts[6] = np.inf
+    X[0] = state
+    inputs[6:] = case.current_W
+    mu = case.barrier[0]
+    for k in range(N + 1):
+        rotation(state, R)
+        g[:] = 0.0
+        H[:, :] = 0.0
+        if k < N:
+            for i in range(n):
+                work.T[k, i] = table.mean[i] * thrust[i] + (1.0 - table.mean[i]) * U[k, i]
+                thrust[i] = table.keep[i] * thrust[i] + (1.0 - table.keep[i]) * U[k, i]
+                work.jets[k, i] = case.jet_mean[i] * jet[i] + (1.0 - case.jet_mean[i]) * work.T[k, i]
+                jet[i] = case.jet_keep[i] * jet[i] + (1.0 - case.jet_keep[i]) * work.T[k, i]
+            weight = h * case.quiet[k]
+            work.D[k] = 0.0
+            if weight > 0.0:
+                D = stage_disturbance(wake, scratch, state[:3], state[3:7], R, work.jets[k], slopes, g, H)
+                work.D[k] = D
+                parts[0] += weight * D
+                if slopes:
+                    for r in range(6 + n):
+                        g[r] *= weight
+                        for c in range(6 + n):
+                            H[r, c] *= weight
+            if slopes:
+                for r in range(n):
+                    work.gT[k, r] = g[6 + r]
+                    for c in range(6):
+                        work.S[k, r, c] = H[6 + r, c]
+                    for c in range(n):
+                        work.R[k, r, c] = table.majorise * H[6 + r, 6 + c]
+        gx = work.gx[k]
+        gx[:6] = g[:6]
+        gx[6:] = 0.0
+        if k > 0:
+            wished = case.reference[k]
+            along = h * weights[W_PATH] + (weights[W_TRACK] if k == N else 0.0)
+            for r in range(3):
+                e = state[r] - wished[r]
+                parts[1] += along * e * e
+                gx[r] += 2.0 * along * e
+                H[r, r] += 2.0 * along
+            turned = h * weights[W_ATTITUDE] + (weights[W_ATTITUDE] if k == N else 0.0)
+            parts[2] += attitude_cost(state, wished, turned, weights[TOLERANCE], gx, H)
+            for r in range(6):
+                e = state[7 + r] - wished[7 + r]
+                parts[3] += h * weights[W_TWIST] * e * e
+                gx[6 + r] = 2.0 * h * weights[W_TWIST] * e
+            value, closest = add_barrier(
+                state[:3],
+                R,
+                table.half_size,
+                table.planes,
+                table.spheres,
+                case.barrier[1],
+                weights[LEAST],
+                h * mu,
+                gx,
+                H,
+            )
+            parts[4] += value
+            parts[6] = min(parts[6], closest)
+        if slopes:
+            for r in range(6):
+                for c in range(6):
+                    work.Q[k, r, c] = H[r, c]
+        if k == N:
+            break
+        for r in range(3):
+            force[r] = R[0, r] * case.force_W[0] + R[1, r] * case.force_W[1] + R[2, r] * case.force_W[2]
+            inputs[r] = force[r]
+            inputs[3 + r] = case.moment_B[r]
+        for r in range(6):
+            for i in range(n):
+                inputs[r] += table.allocation[r, i] * work.T[k, i]
+        if slopes:
+            A = work.A[k]
+            rk4_jacobian_kernel(table.packed, state, inputs, h, A, Bw)
+            for r in range(12):
+                # The force keeps its direction in W: seen from B it turns by -theta x f.
+                b0, b1, b2 = Bw[r, 0], Bw[r, 1], Bw[r, 2]
+                A[r, 3] += b1 * force[2] - b2 * force[1]
+                A[r, 4] += b2 * force[0] - b0 * force[2]
+                A[r, 5] += b0 * force[1] - b1 * force[0]
+                for i in range(n):
+                    total = 0.0
+                    for c in range(6):
+                        total += Bw[r, c] * table.allocation[c, i]
+                    work.B[k, r, i] = total
+        else:
+            rk4_kernel(table.packed, state, inputs, h)
+        X[k + 1] = state
+    parts[5] = command_cost(table, case.command, U)
+    return parts[0] + parts[1] + parts[2] + parts[3] + parts[4] + parts[5]
+
+
+@njit(cache=True, error_model="numpy")
+def command_cost(table, before, U):  # type: ignore[no-untyped-def]
+    """Effort, change and excess of rate of commands U, (N, n), after `before`, (n,)."""
+    N, n = U.shape
+    weights, total = table.weights, 0.0
+    for k in range(N):
+        for i in range(n):
+            step = U[k, i] - (before[i] if k == 0 else U[k - 1, i])
+            over = max(abs(step) - weights[RATE_N], 0.0)
+            total += table.stage_s * weights[W_EFFORT] * U[k, i] ** 2
+            total += weights[W_CHANGE] * step * step + weights[RHO] * over * over
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def lag_jets(table, case, lags):  # type: ignore[no-untyped-def]
+    """Set a, b and the map of the jets in `case` from lags in s, (n,); lags of 0 leave the thrusts as they are."""
+    N, size = case.jet_map.shape
+    n = lags.shape[0]
+    for i in range(n):
+        share = lags[i] / table.stage_s
+        case.jet_keep[i] = np.exp(-1.0 / share) if share > 1e-3 else 0.0
+        case.jet_mean[i] = (1.0 - case.jet_keep[i]) * share if share > 1e-3 else 0.0
+    before = np.zeros(size)
+    for k in range(N):
+        for j in range(size):
+            i = j % n
+            mean = table.mean_map[k, j]
+            case.jet_map[k, j] = case.jet_mean[i] * before[j] + (1.0 - case.jet_mean[i]) * mean
+            before[j] = case.jet_keep[i] * before[j] + (1.0 - case.jet_keep[i]) * mean
+
+
+@njit(cache=True, error_model="numpy")
+def set_reach(table, case):  # type: ignore[no-untyped-def]
+    """Set the barrier's reach: where the reference itself is nearer than the settings' reach nothing is felt there.
+
+    Otherwise a mission that was checked for clearance would be pushed off its path all along a low orbit. It never
+    falls below the clearance that the barrier is there to keep.
+    """
+    R = np.empty((3, 3))
+    reach = table.weights[REACH]
+    for k in range(case.reference.shape[0]):
+        rotation(case.reference[k], R)
+        reach = min(reach, least_gap(case.reference[k, :3], R, table.half_size, table.planes, table.spheres))
+    case.barrier[1] = max(reach, table.weights[LEAST])

@@ -1,0 +1,65 @@
+"""The water's own motion as a tank's settings ask for it, put together from `wakewise.water`."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from wakewise.errors import InputError
+from wakewise.tank.settings import TankSettings
+from wakewise.water import AiryWave, AmbientSum, BackgroundTurbulence, PumpJet, SteadyCurrent, read_current_series
+from wakewise.water.instant import Ambient
+
+
+def build_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSum:
+    """Put together what the settings ask for; the generator draws the background turbulence only.
+
+    Raises
+    ------
+    InputError
+        If the series' file is not usable, or the pump's outlet is outside the water.
+    """
+    length, width, depth = settings.size_m
+    parts: list[Ambient] = []
+    if settings.current_file is not None:
+        parts.append(
+            read_current_series(
+                Path(settings.current_file).expanduser(),
+                start_s=settings.current_file_from_s,
+                stop_s=settings.current_file_to_s,
+                gain=settings.current_file_gain,
+                longest_gap_s=settings.current_file_gap_s,
+            )
+        )
+    elif any(settings.current_m_s):
+        parts.append(SteadyCurrent(velocity_W_m_s=np.array(settings.current_m_s)))
+    if settings.wave_amplitude_m > 0.0:
+        parts.append(
+            AiryWave(
+                amplitude_m=settings.wave_amplitude_m,
+                period_s=settings.wave_period_s,
+                heading_rad=math.radians(settings.wave_heading_deg),
+                depth_m=depth,
+            )
+        )
+    if settings.pump_speed_m_s > 0.0:
+        x, y, z = settings.pump_at_m
+        if abs(x) > length / 2 or abs(y) > width / 2 or not 0.0 <= z <= depth:
+            raise InputError(
+                f"tank.pump_at_m: ({x:g}, {y:g}, {z:g}) m is outside the water of {length:g} x {width:g} x {depth:g} m"
+            )
+        parts.append(
+            PumpJet(
+                outlet_W_m=np.array(settings.pump_at_m),
+                towards_W=np.array(settings.pump_towards),
+                speed_m_s=settings.pump_speed_m_s,
+                diameter_m=settings.pump_diameter_m,
+                bed_z_m=depth,
+                reach_m=math.hypot(length, width),
+            )
+        )
+    if settings.background_m_s > 0.0:
+        parts.append(BackgroundTurbulence.drawn(settings.background_m_s, settings.background_length_m, rng))
+    return AmbientSum(parts=tuple(parts))

@@ -1,0 +1,19 @@
+"""Trials: a scenario flown, photographed, reconstructed and judged, stage by stage, in one folder.
+
+Each stage takes files and leaves files, is skipped when done, and goes on where it was cut off.
+
+Start reading in `trial.py` (a trial is a page). `stages.py` is who watches and what it cost, `metrics.py` every
+figure with its unit and definition, `timing.py` how benches and studies measure and what they are asked.
+"""
+
+from wakewise.trials.metrics import DEFINITIONS, UNITS
+from wakewise.trials.timing import BenchOptions
+from wakewise.trials.trial import compare_methods, run_trial
+
+__all__ = [
+    "DEFINITIONS",
+    "UNITS",
+    "BenchOptions",
+    "compare_methods",
+    "run_trial",
+]

@@ -1,0 +1,209 @@
+"""One trial in one folder: fly, photograph, reconstruct, evaluate. Each stage leaves files and is skipped when done."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import platform
+from collections.abc import Callable
+from contextlib import suppress
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from wakewise import __version__
+from wakewise.errors import InputError, StageError
+from wakewise.evaluation import Crop, evaluate_surface, flight_figures
+from wakewise.files import write_json, write_text
+from wakewise.geometry import matrix_from_quat
+from wakewise.likeness.textured import write_textured
+from wakewise.missions import SETTLING
+from wakewise.operation import (
+    Mission,
+    Scenario,
+    build_mission,
+    differences,
+    fly_mission,
+    photo_name,
+    photograph_flight,
+    read_scenario,
+    write_scenario,
+)
+from wakewise.reconstruction import read_cloud, read_lens, reconstruct
+from wakewise.targets import write_mesh
+from wakewise.trials.metrics import Figures, Gathering, comparison
+from wakewise.trials.stages import Ledger, Quiet, Watch
+
+_SURFACE_FIGURES = (
+    "rmse_mm",
+    "rmse_cap_mm",
+    "accuracy_median_mm",
+    "completeness_pct",
+    "completeness_visible_pct",
+    "completeness_1mm_pct",
+    "completeness_2mm_pct",
+    "f_score",
+    "accuracy_p90_mm",
+    "completeness_visible_1mm_pct",
+    "completeness_visible_2mm_pct",
+    "visible_pct",
+    "icp_displacement_mm",
+    "icp_matched_pct",
+    "outside_pct",
+)
+_MODEL_FIGURES = ("reprojection_px", "cameras_rmse_mm", "features_per_image", "inlier_matches")
+# What is reconstructed is a little more than the target: estimated cameras put it some millimetres off its place.
+REGION_SHARE = 1.25
+
+
+def run_trial(scenario: Scenario, folder: Path, watch: Watch | None = None) -> Figures:
+    """Run what is left of a trial and return its figures, which are the content of metrics.json.
+
+    Raises
+    ------
+    InputError
+        If the scenario cannot be flown, or the folder holds another trial.
+    """
+    watch = watch or Quiet()
+    mission = build_mission(scenario)
+    claim(folder, scenario)
+    ledger = Ledger(folder / "stages.json")
+
+    def stage(name: str, product: str, work: Callable[[Callable[..., None]], None]) -> None:
+        if (folder / product).exists():
+            watch.skipped(name)
+            return
+        with watch.stage(name) as progress, ledger.account(name):
+            work(progress)
+
+    stage("plan", "planned.csv", lambda _: write_plan(scenario, mission, folder))
+    stage("fly", "steps.parquet", lambda progress: fly_mission(scenario, mission, folder, progress))
+    stage("photograph", "images.csv", lambda progress: photograph_flight(scenario, mission, folder, progress))
+    stage("reconstruct", "model.json", lambda progress: reconstruct_trial(scenario, mission, folder, progress))
+    stage("evaluate", "score.json", lambda _: write_json(folder / "score.json", evaluate_trial(mission, folder)))
+    figures = json.loads((folder / "score.json").read_text(encoding="utf-8"))
+    gathering = Gathering(figures=figures["figures"], reasons=figures["reasons"])
+    gathering.add({"method": scenario.method, "seed": scenario.seed})
+    gathering.add({"wall_s": ledger.total("wall_s"), "cpu_s": ledger.total("cpu_s")})
+    result = gathering.finish()
+    write_json(folder / "metrics.json", result)
+    # For people only, so it is no part of what the trial is said to have cost.
+    mesh, coloured = folder / "mesh.ply", folder / "mesh.glb"
+    if coloured.exists() and mesh.exists() and coloured.stat().st_mtime >= mesh.stat().st_mtime:
+        watch.skipped("colours")
+    elif mesh.exists():
+        with watch.stage("colours") as progress:
+            texture_trial(mission, folder, progress)
+    return result
+
+
+def compare_methods(scenarios: dict[str, Scenario], folder: Path, watch: Watch | None = None) -> Figures:
+    """Run one trial per method, each in its own folder, and set their figures side by side (comparison.json)."""
+    result = comparison({name: run_trial(scenario, folder / name, watch) for name, scenario in scenarios.items()})
+    write_json(folder / "comparison.json", result)
+    return result
+
+
+def claim(folder: Path, scenario: Scenario) -> None:
+    """Write scenario.yaml, or check that the one in the folder is the same trial.
+
+    Raises
+    ------
+    InputError
+        If the folder holds another trial, or is a file.
+    """
+    path = folder / "scenario.yaml"
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"--out {folder}: is a file, must be a folder or not exist")
+    if path.exists():
+        changed = differences(read_scenario(path), scenario)
+        if changed:
+            raise InputError(
+                f"--out {folder}: holds another trial ({'; '.join(changed[:3])}); give another --out or remove it"
+            )
+        return
+    packages = ("numpy", "numba", "pycolmap", "opencv-python-headless", "embreex")
+    versions = {"wakewise": __version__, "python": platform.python_version()} | {p: version(p) for p in packages}
+    write_scenario(path, scenario, versions)
+
+
+def write_plan(scenario: Scenario, mission: Mission, folder: Path) -> None:
+    """Write the truth (truth.ply) and where the photographs are to be taken from (planned.csv)."""
+    write_mesh(folder / "truth.ply", mission.target.mesh)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("name", "time_s", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"))
+    route = mission.route
+    for name, time_s, X_WC in zip(route.exposure_names, route.exposures_s, route.X_WC_planned, strict=True):
+        writer.writerow(
+            (photo_name(name, scenario), f"{time_s:.6f}", *(f"{value:.9f}" for value in (*X_WC.p_m, *X_WC.q)))
+        )
+    write_text(folder / "planned.csv", text.getvalue())
+
+
+def reconstruct_trial(scenario: Scenario, mission: Mission, folder: Path, progress: Callable[..., None]) -> None:
+    """Reconstruct from the photographs and the vehicle's own estimates; model.json says how it went.
+
+    Nothing true goes in: pairs, scale and place come from the estimated camera poses, the region from the plan. A model
+    that does not come about is a result too, so its reason is kept instead of its figures.
+    """
+    photos = pl.read_csv(folder / "images.csv")
+    names = photos["name"].to_list()
+    centres = photos.select("est_x_m", "est_y_m", "est_z_m").to_numpy()
+    axes = matrix_from_quat(photos.select("est_qw", "est_qx", "est_qy", "est_qz").to_numpy())[:, :, 2]
+    try:
+        model = reconstruct(
+            folder / "images",
+            folder,
+            scenario.reconstruction,
+            lens=read_lens(folder),
+            reference_positions=dict(zip(names, centres, strict=True)),
+            reference_axes=dict(zip(names, axes, strict=True)),
+            region=(mission.target.centre_W_m, REGION_SHARE * mission.target.radius_m),
+            progress=progress,
+        )
+        summary: dict[str, Any] = model.summary()
+        write_json(folder / "model.json", {"figures": summary, "failure": None})
+    except StageError as fault:
+        write_json(folder / "model.json", {"figures": {}, "failure": str(fault)})
+
+
+def texture_trial(mission: Mission, folder: Path, progress: Callable[..., None]) -> None:
+    """Write the model in the photographs' colours (mesh.glb), for people; a mesh that no photograph sees gets none."""
+    bed_z_m = mission.target.bed_z_m
+    with suppress(StageError):
+        write_textured(folder, folder / "images", folder / "mesh.glb", bed_z_m=bed_z_m, progress=progress)
+
+
+def evaluate_trial(mission: Mission, folder: Path) -> dict[str, Any]:
+    """Judge flight and model against the truth; what could not be computed gets a reason."""
+    gathering = Gathering()
+    steps = pl.read_parquet(folder / "steps.parquet")
+    gathering.add(flight_figures(steps.filter(pl.col("leg") != SETTLING)))
+    solve_ms = pl.read_parquet(folder / "timings.parquet")["solve_ms"].to_numpy()[50:]
+    gathering.add({"solve_ms_median": float(np.median(solve_ms)), "solve_ms_p99": float(np.percentile(solve_ms, 99))})
+    photos = pl.read_csv(folder / "images.csv")
+    gathering.add({"images": len(photos)})
+    model = json.loads((folder / "model.json").read_text(encoding="utf-8"))
+    summary, failure = model["figures"], model["failure"]
+    gathering.add({"registered_images": summary.get("registered_images", 0)})
+    gathering.add({key: summary.get(key) for key in _MODEL_FIGURES})
+    if failure is None:
+        try:
+            score = evaluate_surface(
+                read_cloud(folder / "dense.ply").points_m,
+                mission.target.mesh,
+                crop=Crop(bed_z_m=mission.target.bed_z_m),
+                camera_centres_W_m=photos.select("true_x_m", "true_y_m", "true_z_m").to_numpy(),
+            )
+            gathering.add({key: getattr(score, key) for key in (*_SURFACE_FIGURES, "success")})
+        except StageError as fault:
+            failure = str(fault)
+    if failure is not None:
+        gathering.add({"success": False})
+        gathering.missing((*_SURFACE_FIGURES, *_MODEL_FIGURES), f"no model: {failure}")
+    return {"figures": gathering.figures, "reasons": gathering.reasons}

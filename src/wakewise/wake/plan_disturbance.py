@@ -1,0 +1,365 @@
+"""Compiled: D of one stage with its gradient and its Gauss-Newton matrix, in the vehicle's own axes.
+
+The same figures as `wakewise.wake.gradients.gauss_newton`, which is this module's twin in the tests, made for a planner
+that asks twenty times per plan: points as rows of coordinates, the paper's cone without branches, jets that miss the
+region left out before anything is computed, and no sum that is known to be zero. |v|^2 does not depend on the axes
+it is expressed in, so everything is done in B; only the slopes by position are turned to W at the end.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from wakewise.arrays import Array
+from wakewise.wake.floor_sums import floor_stage_sum
+from wakewise.wake.kernels import as_tuple, speed_and_slope
+from wakewise.wake.stage import smooth_root
+from wakewise.wake.table import PLAIN_CONE
+
+FAST = {"reassoc", "contract", "nsz", "arcp"}
+
+
+class WakeScratch(NamedTuple):
+    """Room to work in, sized for P points and n thrusters."""
+
+    q: Array
+    sums: Array
+    slopes: Array
+    jets: Array
+    pose: Array
+    active: Array
+
+
+def wake_scratch(points: int, thrusters: int) -> WakeScratch:
+    """Room for a region of so many points and so many thrusters."""
+    return WakeScratch(
+        q=np.empty((3, points)),
+        sums=np.empty((3, points)),
+        slopes=np.empty((9, points)),
+        jets=np.empty((thrusters, points)),
+        pose=np.empty((6, 3, points)),
+        active=np.empty(thrusters, np.int64),
+    )
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _dot(a, b, count):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for j in range(count):
+        total += a[j] * b[j]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def may_reach(own, tx, ty, tz, ax, ay, az, mx, my, mz, radius):  # type: ignore[no-untyped-def]
+    """False if neither jet of a thruster at t can reach any point of a sphere round m, all in B."""
+    ex, ey, ez = mx - tx, my - ty, mz - tz
+    along = abs(ex * ax + ey * ay + ez * az)
+    across = np.sqrt(max(ex * ex + ey * ey + ez * ez - along * along, 0.0))
+    far = along + radius
+    widest = own[3] + own[4] * far + (own[5] - 1.0) * far * far
+    return across - radius <= np.sqrt(max(widest, 0.0))
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _plain_cone(q, roots, count, tx, ty, tz, ax, ay, az, c0, low, high, f_row, g):  # type: ignore[no-untyped-def]
+    """Signed speed by the force axis (negative astern of T > 0) into `f_row`, the gradient of |f| into `g`, (3, P)."""
+    narrow = 1.0 / (high - low) if high > low else 1e12
+    for j in range(count):
+        ex, ey, ez = q[0, j] - tx, q[1, j] - ty, q[2, j] - tz
+        r2 = ex * ex + ey * ey + ez * ez
+        inverse2 = 1.0 / r2
+        inverse = np.sqrt(inverse2)
+        along = (ax * ex + ay * ey + az * ez) * inverse
+        cosine = abs(along)
+        sign = 1.0 if along > 0.0 else -1.0
+        t = (cosine - low) * narrow
+        t = t if t > 0.0 else 0.0
+        t = t if t < 1.0 else 1.0
+        edge, edge_slope = t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t) * narrow
+        c2 = cosine * cosine
+        scale = c0 * inverse2 * roots[j]
+        f = scale * c2 * c2 * edge
+        by_cosine = scale * c2 * (4.0 * cosine * edge + c2 * edge_slope)
+        a = by_cosine * sign * inverse
+        b = -a * along * inverse - 2.0 * f * inverse2
+        f_row[j] = sign * f
+        g[0, j] = a * ax + b * ex
+        g[1, j] = a * ay + b * ey
+        g[2, j] = a * az + b * ez
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _any_jet(q, roots, count, tx, ty, tz, ax, ay, az, own, kind, numbers, f_row, g):  # type: ignore[no-untyped-def]
+    """As `_plain_cone`, for every kind of jet."""
+    for j in range(count):
+        ex, ey, ez = q[0, j] - tx, q[1, j] - ty, q[2, j] - tz
+        along = ax * ex + ay * ey + az * ez
+        r2 = ex * ex + ey * ey + ez * ez
+        x = abs(along)
+        if x > 0.0 and r2 <= own[3] + own[4] * x + own[5] * x * x:
+            f, alpha, beta = speed_and_slope(kind, numbers, own[0], own[1], own[2], x, r2)
+            sign = 1.0 if along > 0.0 else -1.0
+            a, b = sign * alpha * roots[j], beta * roots[j]
+            f_row[j] = sign * f * roots[j]
+            g[0, j] = a * ax + b * ex
+            g[1, j] = a * ay + b * ey
+            g[2, j] = a * az + b * ez
+        else:
+            f_row[j] = 0.0
+            g[0, j] = 0.0
+            g[1, j] = 0.0
+            g[2, j] = 0.0
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def stage_disturbance(table, scratch, p, quat, R, thrusts, slopes, gradient, H):  # type: ignore[no-untyped-def]
+    """D; with `slopes` also its gradient, (6 + n,), and 2 J'J, (6 + n, 6 + n), both overwritten.
+
+    Rows: position in W, rotation vector in B, thrusts.
+    """
+    if table.walls:
+        kind = table.kind
+        D, first, second, _ = floor_stage_sum(
+            table.rows,
+            table.weights,
+            p,
+            quat,
+            table.positions,
+            table.axes,
+            table.areas,
+            kind,
+            table.numbers,
+            table.floor,
+            thrusts,
+            table.smooth_N,
+            table.coherent,
+            slopes,
+        )
+        if slopes:
+            gradient[:] = first
+            H[:, :] = second
+        return D
+    return _free_jets(table, scratch, p, R, thrusts, slopes, gradient, H)
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _free_jets(table, scratch, p, R, thrusts, slopes, gradient, H):  # type: ignore[no-untyped-def]
+    q, sums, S, jets, pose, active = scratch
+    count, n = q.shape[1], thrusts.shape[0]
+    if slopes:
+        gradient[:] = 0.0
+        H[:, :] = 0.0
+    D = 0.0
+    dx, dy, dz = table.middle[0] - p[0], table.middle[1] - p[1], table.middle[2] - p[2]
+    mx = R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * dz
+    my = R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * dz
+    mz = R[0, 2] * dx + R[1, 2] * dy + R[2, 2] * dz
+    active_count = 0
+    for i in range(n):
+        t, a = table.positions[i], table.axes[i]
+        if may_reach(table.own[i], t[0], t[1], t[2], a[0], a[1], a[2], mx, my, mz, table.radius):
+            active[active_count] = i
+            active_count += 1
+    if active_count == 0:
+        return 0.0
+    for r in range(3):
+        r0, r1, r2 = R[0, r], R[1, r], R[2, r]
+        for j in range(count):
+            q[r, j] = (
+                r0 * (table.points[0, j] - p[0]) + r1 * (table.points[1, j] - p[1]) + r2 * (table.points[2, j] - p[2])
+            )
+    sums[:, :] = 0.0
+    if slopes:
+        S[:, :] = 0.0
+    numbers = as_tuple(table.numbers)
+    f_row, g = pose[0, 0], pose[1]
+    for index in range(active_count):
+        i = active[index]
+        tx, ty, tz = table.positions[i, 0], table.positions[i, 1], table.positions[i, 2]
+        ax, ay, az = table.axes[i, 0], table.axes[i, 1], table.axes[i, 2]
+        if table.kind == PLAIN_CONE:
+            _plain_cone(
+                q,
+                table.roots,
+                count,
+                tx,
+                ty,
+                tz,
+                ax,
+                ay,
+                az,
+                table.own[i, 0],
+                table.numbers[4],
+                table.numbers[5],
+                f_row,
+                g,
+            )
+        else:
+            _any_jet(q, table.roots, count, tx, ty, tz, ax, ay, az, table.own[i], table.kind, numbers, f_row, g)
+        # A point ahead of the disk (along the force) is blown at by T < 0, along the axis; one astern by T > 0.
+        ahead, ahead_slope = smooth_root(-thrusts[i], table.smooth_N)
+        astern, astern_slope = smooth_root(thrusts[i], table.smooth_N)
+        if not table.coherent:
+            D += _alone(i, count, q, f_row, g, ahead, ahead_slope, astern, astern_slope, slopes, gradient, H)
+            continue
+        h = jets[i]
+        for x in range(3):
+            axis = table.axes[i, x]
+            if axis != 0.0:
+                for j in range(count):
+                    sums[x, j] += axis * f_row[j] * (ahead if f_row[j] > 0.0 else astern)
+        if slopes:
+            for j in range(count):
+                h[j] = -f_row[j] * ahead_slope if f_row[j] > 0.0 else f_row[j] * astern_slope
+            for x in range(3):
+                axis = table.axes[i, x]
+                if axis != 0.0:
+                    for j in range(count):
+                        s = axis * ahead if f_row[j] > 0.0 else -axis * astern
+                        S[3 * x, j] += s * g[0, j]
+                        S[3 * x + 1, j] += s * g[1, j]
+                        S[3 * x + 2, j] += s * g[2, j]
+    if table.coherent:
+        for x in range(3):
+            D += _dot(sums[x], sums[x], count)
+        if slopes:
+            _products(table.axes, active, active_count, count, q, sums, S, jets, pose, gradient, H)
+    if slopes:
+        _to_world(R, gradient, H)
+    return D
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _pose_rows(count, q, gx, gy, gz, out, x):  # type: ignore[no-untyped-def]
+    """Rows by position (in B) and rotation vector of a quantity with gradient (gx, gy, gz) by the point in B."""
+    for j in range(count):
+        a, b, c = gx[j], gy[j], gz[j]
+        qx, qy, qz = q[0, j], q[1, j], q[2, j]
+        out[0, x, j] = -a
+        out[1, x, j] = -b
+        out[2, x, j] = -c
+        # The point as seen from B moves by -theta x q, and g . (-theta x q) = theta . (g x q).
+        out[3, x, j] = b * qz - c * qy
+        out[4, x, j] = c * qx - a * qz
+        out[5, x, j] = a * qy - b * qx
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _products(axes, active, active_count, count, q, sums, S, jets, pose, gradient, H):  # type: ignore[no-untyped-def]
+    for x in range(3):
+        used = False
+        for index in range(active_count):
+            used = used or axes[active[index], x] != 0.0
+        if not used:
+            continue
+        _pose_rows(count, q, S[3 * x], S[3 * x + 1], S[3 * x + 2], pose, x)
+        p0, p1, p2 = pose[0, x], pose[1, x], pose[2, x]
+        p3, p4, p5 = pose[3, x], pose[4, x], pose[5, x]
+        for r in range(7):
+            row = pose[r, x] if r < 6 else sums[x]
+            s0, s1, s2, s3, s4, s5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            for j in range(count):
+                v = row[j]
+                s0 += v * p0[j]
+                s1 += v * p1[j]
+                s2 += v * p2[j]
+                s3 += v * p3[j]
+                s4 += v * p4[j]
+                s5 += v * p5[j]
+            _add_six(gradient if r == 6 else H[r], s0, s1, s2, s3, s4, s5, 2.0)
+        for index in range(active_count):
+            i = active[index]
+            axis = axes[i, x]
+            if axis != 0.0:
+                h = jets[i]
+                s0, s1, s2, s3, s4, s5, s6 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+                for j in range(count):
+                    v = h[j]
+                    s0 += v * p0[j]
+                    s1 += v * p1[j]
+                    s2 += v * p2[j]
+                    s3 += v * p3[j]
+                    s4 += v * p4[j]
+                    s5 += v * p5[j]
+                    s6 += v * sums[x, j]
+                _add_six(H[6 + i], s0, s1, s2, s3, s4, s5, 2.0 * axis)
+                gradient[6 + i] += 2.0 * axis * s6
+    for index in range(active_count):
+        i = active[index]
+        for other in range(index + 1):
+            k = active[other]
+            cosine = axes[i, 0] * axes[k, 0] + axes[i, 1] * axes[k, 1] + axes[i, 2] * axes[k, 2]
+            if abs(cosine) > 1e-14:
+                H[6 + i, 6 + k] = 2.0 * cosine * _dot(jets[i], jets[k], count)
+
+
+@njit(cache=True, error_model="numpy")
+def _add_six(row, s0, s1, s2, s3, s4, s5, factor):  # type: ignore[no-untyped-def]
+    row[0] += factor * s0
+    row[1] += factor * s1
+    row[2] += factor * s2
+    row[3] += factor * s3
+    row[4] += factor * s4
+    row[5] += factor * s5
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _alone(  # type: ignore[no-untyped-def]
+    i, count, q, f_row, g, ahead, ahead_slope, astern, astern_slope, slopes, gradient, H
+):
+    """One jet of the incoherent sum: its squared speed alone, with slopes; returns its share of D."""
+    D, by_thrust, second = 0.0, 0.0, 0.0
+    for j in range(count):
+        front = f_row[j] > 0.0
+        s, ds = (ahead, -ahead_slope) if front else (astern, astern_slope)
+        square = f_row[j] * f_row[j]
+        D += s * s * square
+        by_thrust += s * ds * square
+        second += ds * ds * square
+    if not slopes:
+        return D
+    gradient[6 + i] += 2.0 * by_thrust
+    H[6 + i, 6 + i] += 2.0 * second
+    six, rows = np.zeros(7), np.empty(6)
+    for j in range(count):
+        front = f_row[j] > 0.0
+        s, ds = (ahead, -ahead_slope) if front else (astern, astern_slope)
+        f = abs(f_row[j])
+        if f == 0.0:
+            continue
+        a, b, c = g[0, j], g[1, j], g[2, j]
+        rows[0], rows[1], rows[2] = -a, -b, -c
+        rows[3] = b * q[2, j] - c * q[1, j]
+        rows[4] = c * q[0, j] - a * q[2, j]
+        rows[5] = a * q[1, j] - b * q[0, j]
+        for r in range(6):
+            six[r] = s * rows[r]
+            gradient[r] += 2.0 * s * f * six[r]
+            H[6 + i, r] += 2.0 * ds * f * six[r]
+            for t in range(r + 1):
+                H[r, t] += 2.0 * six[r] * six[t]
+    return D
+
+
+@njit(cache=True, error_model="numpy")
+def _to_world(R, gradient, H):  # type: ignore[no-untyped-def]
+    """Fill the upper triangle from the lower and take rows and columns 0 to 2 from B to W."""
+    size = H.shape[0]
+    for r in range(size):
+        for t in range(r):
+            H[t, r] = H[r, t]
+    for r in range(size):
+        a, b, c = H[r, 0], H[r, 1], H[r, 2]
+        for t in range(3):
+            H[r, t] = R[t, 0] * a + R[t, 1] * b + R[t, 2] * c
+    for r in range(size):
+        a, b, c = H[0, r], H[1, r], H[2, r]
+        for t in range(3):
+            H[t, r] = R[t, 0] * a + R[t, 1] * b + R[t, 2] * c
+    a, b, c = gradient[0], gradient[1], gradient[2]
+    for t in range(3):
+        gradient[t] = R[t, 0] * a + R[t, 1] * b + R[t, 2] * c

@@ -1,0 +1,85 @@
+"""What a controller believes its jets would do to the target from where it believes to be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from wakewise.arrays import Array, freeze
+from wakewise.errors import InputError
+from wakewise.geometry import Pose
+from wakewise.interfaces import WakeModel
+from wakewise.targets import Region
+from wakewise.vehicles import Vehicle
+from wakewise.wake.disturbance import gram
+from wakewise.wake.gradients import Superposition
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WakeView:
+    """Places and axes of the thrusters on the body, the region's points in the world, and a wake model between them."""
+
+    wake: WakeModel
+    points_W_m: Array
+    weights: Array
+    positions_B_m: Array
+    axes_B: Array
+    areas_m2: Array
+    superposition: Superposition = "coherent"
+
+    def __post_init__(self) -> None:
+        n, m = len(self.points_W_m), len(self.positions_B_m)
+        freeze(self, points_W_m=(n, 3), weights=(n,), positions_B_m=(m, 3), axes_B=(m, 3), areas_m2=(m,))
+        if not np.sum(self.weights) > 0.0 or np.any(self.weights < 0.0):
+            raise InputError("region: weights must not be negative, and at least one must be more than 0")
+
+    @classmethod
+    def of(
+        cls, vehicle: Vehicle, region: Region, wake: WakeModel, superposition: Superposition = "coherent"
+    ) -> WakeView:
+        """View of a region from a vehicle."""
+        return cls(
+            wake=wake,
+            points_W_m=region.points_W_m,
+            weights=region.weights,
+            positions_B_m=vehicle.thruster_positions_B_m,
+            axes_B=vehicle.thruster_axes_B,
+            areas_m2=vehicle.disk_areas_m2,
+            superposition=superposition,
+        )
+
+    @property
+    def total_weight(self) -> float:
+        """Sum of the region's weights: D divided by it is a mean square speed."""
+        return float(np.sum(self.weights))
+
+    def gram(self, X_WB: Pose) -> Array:
+        """Matrix G of D = s' G s, shape (2 n, 2 n), with the jets where a pose puts them."""
+        origins_W, axes_W = _placed(X_WB.p_m, X_WB.q, self.positions_B_m, self.axes_B)
+        return gram(
+            self.wake, self.points_W_m, self.weights, origins_W, axes_W, self.areas_m2, superposition=self.superposition
+        )
+
+
+@njit(cache=True)
+def _placed(p: Array, q: Array, positions_B: Array, axes_B: Array) -> tuple[Array, Array]:
+    """Thruster origins and axes in the world, shape (m, 3) each, of a body at p with unit quaternion q."""
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    R = np.array(
+        [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+        ]
+    )
+    origins, axes = np.empty(positions_B.shape), np.empty(axes_B.shape)
+    for i in range(len(positions_B)):
+        for row in range(3):
+            origins[i, row] = p[row]
+            axes[i, row] = 0.0
+            for column in range(3):
+                origins[i, row] += R[row, column] * positions_B[i, column]
+                axes[i, row] += R[row, column] * axes_B[i, column]
+    return origins, axes

@@ -1,0 +1,25 @@
+"""The true water of the tank: turbulent jets as vortex parcels, walls, target, currents. Arrays and targets only.
+
+The controllers' wake models (`wakewise.wake`) are not used here, nor is this room there: a planner that knew the
+truth would prove nothing. Jets are made of impulse parcels that take time to travel, entrain, merge, strike the bed
+and run out along it.
+
+Start reading in `water.py` (one step of all of it) and `instant.py` (the velocity at any points, now). `parcels.py`,
+`closure.py` and `drift.py` are a free jet, `meeting.py` jets that meet, `walljets.py` and `bedjets*.py` jets on the
+bed, `blockage.py` and `faces.py` target and walls, `clusters.py`, `induction.py` and `chunks.py` fast sums,
+`currents.py` and `current_series.py` what moves without thrusters. Laws and their sources stand beside the equations.
+"""
+
+from wakewise.water.current_series import read_current_series
+from wakewise.water.currents import AiryWave, AmbientSum, BackgroundTurbulence, PumpJet, SteadyCurrent
+from wakewise.water.water import Water
+
+__all__ = [
+    "AiryWave",
+    "AmbientSum",
+    "BackgroundTurbulence",
+    "PumpJet",
+    "SteadyCurrent",
+    "Water",
+    "read_current_series",
+]

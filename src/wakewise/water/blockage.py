@@ -1,0 +1,151 @@
+"""A solid body in the water: sources in its surface that turn the flow aside.
+
+Potential flow about a body of any shape by sources on its surface (J. L. Hess and A. M. O. Smith 1967, Prog. Aerosp.
+Sci. 8, 1, doi 10.1016/0376-0421(67)90003-6), here as a few smooth sources a little below the surface whose strengths
+make the velocity across the surface least, in the mean square, at points spread over it. Together they give out no
+water. Shapes finer than the distance between sources are blocked in part only: `leakage` says how much passes. What it
+has not: a boundary layer, separation, or a wake behind the body.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import njit
+
+from wakewise.arrays import Array, IntArray, freeze
+from wakewise.targets import Target
+from wakewise.water.induction import FixedSources, smooth_share
+
+_POINTS = 480
+_SOURCES = 160
+_DAMPING = 1e-4  # of the mean square singular value: strengths stay of the order of the flow
+
+
+@dataclass(frozen=True, eq=False)
+class Blockage:
+    """Sources that keep water out of a body standing on the bed.
+
+    Parameters
+    ----------
+    points_m, normals : ndarray, shape (k, 3)
+        On the surface, and outward from it: where the flow across is made least.
+    sources_m : ndarray, shape (s, 3)
+    sigmas_m : ndarray, shape (s,)
+    response : ndarray, shape (s, k)
+        Strengths in m3/s for a unit velocity across the surface at each point.
+    bed_z_m : float
+        The sources are mirrored there.
+    """
+
+    points_m: Array
+    normals: Array
+    sources_m: Array
+    sigmas_m: Array
+    response: Array
+    bed_z_m: float
+    _both: FixedSources = field(init=False, repr=False)
+    _middle: Array = field(init=False, repr=False)
+    _reach_m: float = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        k, s = len(self.points_m), len(self.sigmas_m)
+        images = np.array(self.sources_m)
+        images[:, 2] = 2 * self.bed_z_m - images[:, 2]
+        both = FixedSources(np.concatenate([self.sources_m, images]), np.tile(self.sigmas_m, 2))
+        middle = np.mean(self.points_m, axis=0)
+        object.__setattr__(self, "_both", both)
+        object.__setattr__(self, "_middle", middle)
+        object.__setattr__(self, "_reach_m", 4.0 * float(np.linalg.norm(self.points_m - middle, axis=1).max()))
+        freeze(self, points_m=(k, 3), normals=(k, 3), sources_m=(s, 3), sigmas_m=(s,), response=(s, k))
+
+    @classmethod
+    def of(cls, target: Target) -> Blockage:
+        """For a target on its bed; the same target always gives the same sources."""
+        points, normals, area = _surface(target, _POINTS, np.random.default_rng(0))
+        inner, inward, _ = _surface(target, _SOURCES, np.random.default_rng(1))
+        # Deep enough to lie inside the body, where they may make water: half ball flow is then right to 6 %.
+        size = math.sqrt(area / _SOURCES)
+        sigmas = np.full(_SOURCES, 0.5 * size)
+        sources = inner - 0.8 * size * inward
+        across = _across(points, normals, sources, sigmas, target.bed_z_m)
+        # Least squares over strengths that sum to zero: work in the space across (1, ..., 1).
+        closed = np.eye(_SOURCES) - 1.0 / _SOURCES
+        M = across @ closed
+        normal = M.T @ M
+        damping = _DAMPING * float(np.trace(normal)) / _SOURCES
+        response = -(closed @ np.linalg.solve(normal + damping * np.eye(_SOURCES), M.T))
+        return cls(points, normals, sources, sigmas, response, target.bed_z_m)
+
+    def strengths_m3_s(self, undisturbed_m_s: Array) -> Array:
+        """Source strengths, shape (s,), for the velocity that there would be at `points_m` without the body."""
+        strengths: Array = self.response @ np.einsum("ni,ni->n", undisturbed_m_s, self.normals)
+        return strengths
+
+    def near(self, points_W_m: Array) -> IntArray:
+        """Indices of the points, shape (n, 3), that are within four times the body's radius."""
+        return _near(points_W_m, self._middle, self._reach_m)
+
+    def velocity(self, points_W_m: Array, strengths_m3_s: Array) -> Array:
+        """What the sources add, shape (n, 3), at points, shape (n, 3); nothing beyond four times the body's radius."""
+        out = np.zeros_like(points_W_m)
+        self.add_velocity(points_W_m, self.near(points_W_m), strengths_m3_s, out)
+        return out
+
+    def add_velocity(self, points_W_m: Array, near: IntArray, strengths_m3_s: Array, out: Array) -> None:
+        """Add to `out` what the sources add at some of the points."""
+        if len(near):
+            both = np.concatenate([strengths_m3_s, strengths_m3_s])
+            out[near] += self._both.velocity(points_W_m[near], both)
+
+    def leakage(self, undisturbed_m_s: Array) -> float:
+        """Root mean square velocity across the surface with the body's answer, over that without it."""
+        answer = self.velocity(self.points_m, self.strengths_m3_s(undisturbed_m_s))
+        before = np.einsum("ni,ni->n", undisturbed_m_s, self.normals)
+        after = before + np.einsum("ni,ni->n", answer, self.normals)
+        return float(np.sqrt(np.mean(after**2) / max(np.mean(before**2), 1e-30)))
+
+
+@njit(cache=True)
+def _near(points: Array, middle: Array, reach: float) -> IntArray:
+    found = np.empty(points.shape[0], np.int64)
+    count = 0
+    for p in range(points.shape[0]):
+        dx, dy, dz = points[p, 0] - middle[0], points[p, 1] - middle[1], points[p, 2] - middle[2]
+        if dx * dx + dy * dy + dz * dz < reach * reach:
+            found[count] = p
+            count += 1
+    return found[:count]
+
+
+def _across(points: Array, normals: Array, sources: Array, sigmas: Array, bed_z_m: float) -> Array:
+    """Velocity across the surface at each point for a unit source and its image in the bed, shape (k, s)."""
+    total = np.zeros((len(points), len(sources)))
+    for flip in (1.0, -1.0):
+        place = sources.copy()
+        if flip < 0.0:
+            place[:, 2] = 2 * bed_z_m - place[:, 2]
+        d = (points[:, None] - place) / sigmas[:, None]
+        q = np.einsum("ksi,ksi->ks", d, d)
+        total += smooth_share(q) * np.einsum("ksi,ki->ks", d, normals) / sigmas**2
+    return total
+
+
+def _surface(target: Target, count: int, rng: np.random.Generator) -> tuple[Array, Array, float]:
+    """Points evenly by area over the surface above the bed, outward normals there, and its whole area."""
+    corners = target.mesh.vertices_m[target.mesh.faces]
+    turned = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    volume = np.einsum("ni,ni->n", corners[:, 0] - target.centre_W_m, turned).sum()
+    twice = np.linalg.norm(turned, axis=1)
+    area = np.where(corners.mean(axis=1)[:, 2] < target.bed_z_m - 1e-4, 0.5 * twice, 0.0)
+    sums = np.cumsum(area)
+    picks = (np.arange(count) + rng.uniform(size=count)) / count * sums[-1]
+    face = np.minimum(np.searchsorted(sums, picks, side="right"), len(area) - 1)
+    a, b = rng.uniform(size=(2, count))
+    fold = a + b > 1
+    a, b = np.where(fold, 1 - a, a)[:, None], np.where(fold, 1 - b, b)[:, None]
+    one, two, three = (corners[face, k] for k in range(3))
+    normals = turned[face] / twice[face, None] * (1.0 if volume > 0 else -1.0)
+    return one + a * (two - one) + b * (three - one), normals, float(sums[-1])

@@ -1,0 +1,174 @@
+"""The water at one instant: its velocity at any points, and where it stirs the bed.
+
+An instant holds arrays that nobody changes, so it stays what it was while the water moves on, and several threads may
+look at it at once. What takes long to prepare is prepared when first asked for.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from scipy.special import i0
+
+from wakewise.arrays import Array
+from wakewise.water.bedjets import Rings, layer_speed
+from wakewise.water.bedjets_sums import LOG_WIDTH, REACH
+from wakewise.water.blockage import Blockage
+from wakewise.water.chunks import over_points
+from wakewise.water.clusters import ImpulseField, in_space
+from wakewise.water.faces import Room
+from wakewise.water.parcels import CENTRE_SPEED, Parcels, gusty_impulse_m4_s
+from wakewise.water.walljets import WallRows
+
+
+class Ambient(Protocol):
+    """The water's own motion, which no thruster made."""
+
+    def velocity(self, points_W_m: Array, time_s: float) -> Array:
+        """Velocity in m/s, shape (n, 3), at points, shape (n, 3), and a time after the start."""
+        ...
+
+
+class Instant:
+    """Flow of all jets and of the ambient water, with the answer of a body to both.
+
+    Parameters
+    ----------
+    time_s : float
+    parcels : Parcels
+        The free jets.
+    rings : Rings
+        The wall jets on the bed.
+    rows : WallRows
+        All wall jets with their images.
+    room : Room
+    bed_z_m : float
+        Infinite for none.
+    ambient : Ambient
+    body : Blockage or None
+    gust_scale : float
+        Of the parcels' turbulence; 0 for the mean flow.
+    """
+
+    def __init__(
+        self,
+        *,
+        time_s: float,
+        parcels: Parcels,
+        rings: Rings,
+        rows: WallRows,
+        room: Room,
+        bed_z_m: float,
+        ambient: Ambient,
+        body: Blockage | None,
+        gust_scale: float,
+    ) -> None:
+        self.time_s = time_s
+        self.parcels = parcels
+        self.rings = rings
+        self._rows = rows
+        self._room = room
+        self._bed = bed_z_m
+        self._ambient = ambient
+        self._body = body
+        self._gust_scale = gust_scale
+
+    def velocity(self, points_W_m: Array) -> Array:
+        """Velocity of the water in m/s, shape (n, 3), at points, shape (n, 3)."""
+        points = np.atleast_2d(np.asarray(points_W_m, dtype=np.float64))
+        u = self.jets(points) + self._ambient.velocity(points, self.time_s)
+        return self._turned_aside(points, u, jets=True, ambient=True)
+
+    def ambient_velocity(self, points_W_m: Array) -> Array:
+        """Velocity of the same water without thrusters, shape (n, 3), at points, shape (n, 3)."""
+        points = np.atleast_2d(np.asarray(points_W_m, dtype=np.float64))
+        u = self._ambient.velocity(points, self.time_s)
+        return self._turned_aside(points, u, jets=False, ambient=True)
+
+    def excess_velocity(self, points_W_m: Array) -> Array:
+        """Velocity less that of the same water without thrusters, shape (n, 3), at points, shape (n, 3)."""
+        points = np.atleast_2d(np.asarray(points_W_m, dtype=np.float64))
+        return self._turned_aside(points, self.jets(points), jets=True, ambient=False)
+
+    def jets(self, points: Array) -> Array:
+        """Free jets and wall jets with their images, without the body's answer, shape (n, 3)."""
+        # In an order that suits both sums.
+        order = in_space(points)
+        sorted_points = np.ascontiguousarray(points[order])
+        field, rows, bed = self._field, self._rows, self._bed
+        pairs = field.pairs(len(points))
+        if not pairs:
+            sums = field.velocity(sorted_points)
+            sums[sorted_points[:, 2] == bed, 2] = 0.0  # there is only rounding
+            sums += rows.velocity(sorted_points)
+        else:
+            sums = np.zeros_like(sorted_points)
+
+            def both(some: Array, result: Array) -> None:
+                field.write(some, result)
+                result[some[:, 2] == bed, 2] = 0.0
+                rows.add(some, result)
+
+            over_points(both, sorted_points, sums, pairs + rows.pairs(len(points)))
+        u = np.empty_like(sums)
+        u[order] = sums
+        return u
+
+    def answer_to_jets(self) -> Array:
+        """Strengths in m3/s of the body's sources against the jets, shape (s,); none without a body."""
+        return self._answer_to_jets
+
+    def stirred_bed(self, least_speed_m_s: float) -> Array:
+        """Circles (x, y, radius), shape (n, 3), round the bed where jets may be faster than a speed."""
+        speed = layer_speed(self.rings)
+        fast = speed > least_speed_m_s
+        rings = self.rings.take(fast)
+        # Beyond its crest a wall jet's speed falls off as a Gaussian of the logarithm of the distance.
+        beyond = np.exp(np.minimum(LOG_WIDTH * np.sqrt(2 * np.log(speed[fast] / least_speed_m_s)), REACH))
+        # A leaning one reaches w^(1/4) times farther: a circle round its foremost and its hindmost place.
+        heading, kappa = rings.heading_kappa
+        widest = beyond * rings.radius_m
+        ahead, behind = (widest * (np.exp(s * kappa) / i0(kappa)) ** 0.25 for s in (1.0, -1.0))
+        middle, reach = rings.centre_m + (0.5 * (ahead - behind))[:, None] * heading, 0.5 * (ahead + behind)
+        parcels = self.parcels
+        # On the bed a parcel and its image are at most twice as fast as one at its centre.
+        swift = 4 * CENTRE_SPEED * parcels.size_m4_s / parcels.sigma_m**3 > least_speed_m_s
+        near = self._bed - parcels.position_m[:, 2] < 4 * parcels.sigma_m
+        low, wide = parcels.position_m[near & swift], parcels.sigma_m[near & swift]
+        circles: Array = np.concatenate(
+            [np.column_stack([middle, reach]), np.column_stack([low[:, :2], 4 * wide])],
+        )
+        return circles
+
+    @cached_property
+    def _field(self) -> ImpulseField:
+        parcels = self.parcels
+        impulses = gusty_impulse_m4_s(parcels, self._gust_scale)
+        return ImpulseField.of(*self._room.with_images(parcels.position_m, impulses, parcels.sigma_m))
+
+    @cached_property
+    def _answer_to_jets(self) -> Array:
+        body = self._body
+        return np.zeros(0) if body is None else body.strengths_m3_s(self.jets(body.points_m))
+
+    @cached_property
+    def _answer_to_ambient(self) -> Array:
+        body = self._body
+        if body is None:
+            return np.zeros(0)
+        return body.strengths_m3_s(self._ambient.velocity(body.points_m, self.time_s))
+
+    def _turned_aside(self, points: Array, u: Array, *, jets: bool, ambient: bool) -> Array:
+        """Add the body's answer to the jets and to the ambient water, if any point is near enough to feel it."""
+        body = self._body
+        if body is None:
+            return u
+        near = body.near(points)
+        if len(near):
+            u = u.copy()
+            strengths = [self._answer_to_jets] if jets else []
+            strengths += [self._answer_to_ambient] if ambient else []
+            body.add_velocity(points, near, np.add.reduce(strengths), u)
+        return u

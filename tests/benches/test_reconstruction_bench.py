@@ -1,0 +1,35 @@
+"""The bench of models: every figure it promises, on one small coral."""
+
+import pytest
+
+from wakewise.benches import BENCHES, reconstruction
+from wakewise.operation import load_scenario
+from wakewise.trials.timing import BenchOptions
+
+SMALL = {
+    "target.kind": "brain",
+    "mission.elevations_deg": [45],
+    "mission.views": [14],
+    "mission.standoff_m": 0.35,
+    "imaging.width": 320,
+    "imaging.height": 240,
+    "imaging.fov_deg": 50,
+    "imaging.samples": 1,
+}
+
+
+@pytest.mark.slow
+def test_the_bench_has_every_figure_at_the_top_and_per_coral(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Accuracy, completeness, times by stage and memory of its own process, none of them missing in clear water."""
+    small = load_scenario("quick", None, SMALL)
+    monkeypatch.setattr(reconstruction, "coral_kinds", lambda: ("brain",))
+    monkeypatch.setattr(reconstruction, "load_scenario", lambda *_: small)
+    monkeypatch.setattr(reconstruction.imaging, "run", lambda _: {"frame_s": 0.1})
+    assert "reconstruction" in BENCHES
+    found = reconstruction.run(BenchOptions())
+    promised = {"rmse_mm", "completeness_visible_pct", "stages_s", "total_s", "memory_MB", "render_s_per_frame"}
+    for figures in (found, found["corals"]["brain"]):
+        assert all(figures[key] is not None for key in promised)
+    assert found["why"] == {}
+    assert set(found["stages_s"]) == {"match", "map", "dense", "mesh", "evaluate"}
+    assert 50.0 < found["memory_MB"] < 3000.0

@@ -1,0 +1,165 @@
+"""One small trial from flight to report: whole, resumable, reproducible, and its water is not its controller's."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from wakewise.operation import Scenario, build_mission, fly_mission, load_scenario
+from wakewise.operation.build import build_flight
+from wakewise.reports import write_report
+from wakewise.trials import run_trial
+from wakewise.wake import point_disturbance, wake_model
+
+SMALL = {
+    "name": "small",
+    "mission.elevations_deg": [30, 50],
+    "mission.views": [10, 8],
+    "mission.standoff_m": 0.4,
+    "mission.speed_m_s": 0.3,
+    "mission.acceleration_m_s2": 0.2,
+    "mission.settle_s": 1.0,
+    "imaging.width": 480,
+    "imaging.height": 360,
+    "target.kind": "brain",
+    "tank.silt": 0.02,
+    "reconstruction.mesh_depth": 7,
+}
+
+
+def small(**changes: object) -> Scenario:
+    return load_scenario("quick", None, SMALL | changes)
+
+
+class Stages:
+    """A watch that remembers what ran and what was skipped."""
+
+    def __init__(self) -> None:
+        self.ran: list[str] = []
+        self.skips: list[str] = []
+
+    def stage(self, name: str):
+        self.ran.append(name)
+        from contextlib import nullcontext
+
+        return nullcontext(lambda *_: None)
+
+    def skipped(self, name: str) -> None:
+        self.skips.append(name)
+
+
+@pytest.fixture(scope="module")
+def trial(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
+    folder = tmp_path_factory.mktemp("trials") / "first"
+    return folder, run_trial(small(), folder)
+
+
+def test_a_trial_leaves_every_file_whole(trial: tuple[Path, dict]) -> None:
+    """All files of a trial are there, none temporary, and the figures are those of metrics.json."""
+    folder, figures = trial
+    for name in ("scenario.yaml", "steps.parquet", "timings.parquet", "exposures.npz", "log.mcap", "planned.csv"):
+        assert (folder / name).stat().st_size > 0
+    assert len(list((folder / "images").iterdir())) == 18
+    assert (folder / "dense.ply").exists()
+    assert (folder / "mesh.glb").read_bytes()[:4] == b"glTF"
+    assert not list(folder.rglob(".*"))
+    assert json.loads((folder / "metrics.json").read_text()) == figures
+
+
+def test_the_small_scan_makes_a_model(trial: tuple[Path, dict]) -> None:
+    """Most photographs find their place and the model is near the truth, even at a quarter of the usual pixels."""
+    _, figures = trial
+    assert figures["registered_images"] >= 16
+    assert figures["rmse_mm"] < 4.0
+    assert figures["completeness_pct"] > 70.0
+    assert figures["collisions"] == 0
+    assert figures["target_speed_mean_m_s"] > 0.0
+    assert figures["why"] == {}
+
+
+def test_running_again_does_nothing_and_running_after_a_loss_does_only_what_is_missing(
+    trial: tuple[Path, dict], tmp_path: Path
+) -> None:
+    """A finished trial is skipped stage by stage; a lost photograph is rendered again, the same to the byte."""
+    folder, figures = trial
+    again = Stages()
+    assert run_trial(small(), folder, again) == figures
+    assert again.ran == []
+    assert again.skips == ["plan", "fly", "photograph", "reconstruct", "evaluate", "colours"]
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    lost = copy / "images" / "007.png"
+    before = lost.read_bytes()
+    lost.unlink()
+    for name in ("images.csv", "model.json", "score.json"):
+        (copy / name).unlink()
+    resumed = Stages()
+    run_trial(small(), copy, resumed)
+    # A mesh that comes out the same keeps its colours.
+    assert [name for name in resumed.ran if name != "colours"] == ["photograph", "reconstruct", "evaluate"]
+    assert lost.read_bytes() == before
+    assert (copy / "images.csv").read_bytes() == (folder / "images.csv").read_bytes()
+
+
+def test_the_same_seed_flies_the_same_flight_and_another_does_not(tmp_path: Path) -> None:
+    """steps.parquet is the same bytes for the same seed; another seed meets another trim and other noise."""
+    flown = []
+    for name, seed in (("a", 1), ("b", 1), ("c", 2)):
+        short = {"mission.elevations_deg": [40], "mission.views": [3], "mission.speed_m_s": 0.5}
+        scenario = small(seed=seed, **short)
+        (tmp_path / name).mkdir()
+        fly_mission(scenario, build_mission(scenario), tmp_path / name)
+        flown.append((tmp_path / name / "steps.parquet").read_bytes())
+    assert flown[0] == flown[1]
+    assert flown[0] != flown[2]
+
+
+def test_the_report_of_a_real_trial_is_one_file_without_addresses(trial: tuple[Path, dict]) -> None:
+    """report.html names the verdict and the figures, and asks no host for anything."""
+    folder, figures = trial
+    page = write_report(folder).read_text(encoding="utf-8")
+    assert ("Success" in page) or ("Fail" in page)
+    for key in figures["units"]:
+        assert key in page
+    assert 'src="http' not in page
+
+
+def test_the_controllers_water_is_not_the_tanks() -> None:
+    """What the controller's wake model says of the target's water differs from what the tank's jets do there."""
+    scenario = small()
+    mission = build_mission(scenario)
+    flight = build_flight(scenario, mission)
+    vehicle, tank = mission.vehicle, flight.tank
+    for _ in range(100):
+        tank.step(np.array([0.0, 0, 0, 0, -3, -3, -3, -3]), 0.02)
+    X_WB = tank.state.X_WB
+    origins, axes = X_WB.apply(vehicle.thruster_positions_B_m), vehicle.thruster_axes_B @ X_WB.R.T
+    points = origins[4:] + 0.3 * axes[4:]
+    believed = [
+        point_disturbance(wake_model("jet"), p[None], np.ones(1), origins, axes, vehicle.disk_areas_m2, tank.thrusts_N)
+        for p in points
+    ]
+    real = (tank.excess_velocity(points) ** 2).sum(axis=1)
+    # One place of several may agree by chance: the true jets are turbulent, and each thruster has its own gain.
+    apart = np.abs(np.sqrt(believed) - np.sqrt(real)) / np.sqrt(real)
+    assert np.median(apart) > 0.02
+    assert flight.true_vehicle.mass_kg != vehicle.mass_kg
+    assert not np.allclose(flight.true_vehicle.thrust_gains, vehicle.thrust_gains)
+
+
+def test_the_table_of_a_flight_makes_sense(trial: tuple[Path, dict]) -> None:
+    """The vehicle was where the table says: estimates near truth, thrusts within limits, exposures as planned."""
+    folder, _ = trial
+    steps = pl.read_parquet(folder / "steps.parquet")
+    late = steps.filter(pl.col("time_s") > 1.0)
+    error = (
+        late.select("est_x_m", "est_y_m", "est_z_m").to_numpy()
+        - late.select("true_x_m", "true_y_m", "true_z_m").to_numpy()
+    )
+    assert np.sqrt((error**2).sum(axis=1).mean()) < 0.005
+    thrusts = steps.select([f"thrust_{i + 1}_N" for i in range(8)]).to_numpy()
+    assert np.abs(thrusts).max() <= 51.0 * 1.1
+    assert steps["exposing"].sum() == 18
