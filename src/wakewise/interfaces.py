@@ -6,6 +6,7 @@ World W is NED, body B is FRD, camera C has OpenCV axes. SI units and radians.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Generic, Protocol, TypeVar
@@ -188,25 +189,82 @@ class Pilot(Protocol):
         ...
 
 
-class Camera(Protocol):
-    """Maps between points before the camera and pixels, with pixel centres at +0.5 as COLMAP has them."""
+@dataclass(frozen=True, kw_only=True)
+class WaterTruth:
+    """What the water does at the target at one instant, in the figures that a trial is judged by.
+
+    Speeds of `target_*` and `bed_*` are in excess of the same water without thrusters: on points spread evenly over the
+    target's surface, and 1 to 2 cm above the bed within 0.3 m of its foot. What follows is of the whole water, currents
+    included: `target_pressure_*` is 1/2 rho u^2 on the surface, `bed_shear_p95_Pa` the stress on the bed within the
+    0.3 m, and `tracer_speed_mean_m_s` what PIV would call the speed there, the straight way of tracers over the time
+    of one picture. `turbidity_per_m` is the mean beam attenuation by silt in the water within 0.3 m of the target's
+    centre, and `ray_optical_depth` that attenuation along the rays from the camera to the side of the target that it
+    faces, from end to end, a mean without unit. NaN where a witness does not know.
+    """
+
+    target_speed_mean_m_s: float
+    target_speed_p95_m_s: float
+    bed_speed_p95_m_s: float
+    turbidity_per_m: float
+    target_pressure_mean_Pa: float = math.nan
+    target_pressure_p95_Pa: float = math.nan
+    bed_shear_p95_Pa: float = math.nan
+    tracer_speed_mean_m_s: float = math.nan
+    ray_optical_depth: float = math.nan
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Truth:
+    """What really was at one instant, for the record only: no controller sees it."""
+
+    state: BodyState
+    thrusts_N: Array
+    power_W: float
+    collision: bool
+
+
+class Witness(Protocol):
+    """Knows the truth of a simulated world; there is none at sea."""
+
+    def observe(self) -> Truth:
+        """Vehicle, thrusters and collisions now."""
+        ...
+
+    def water(self) -> WaterTruth:
+        """Water at the target now; dearer than `observe`, so asked less often."""
+        ...
+
+    def silt(self) -> ScalarGrid:
+        """Silt concentration around the target now, kg/m3."""
+        ...
+
+
+class World(Protocol):
+    """Where a vehicle flies: simulated tank, the paper's water, an autopilot, the sea."""
 
     @property
-    def width(self) -> int:
-        """Image width in pixels."""
+    def name(self) -> str:
+        """Name used in scenario files and tables."""
         ...
 
-    @property
-    def height(self) -> int:
-        """Image height in pixels."""
+    def begin(self) -> tuple[Plant, Witness | None]:
+        """The vehicle in its water at the start of a flight, and who knows the truth of it; a fresh one at each call.
+
+        A simulated world begins alike each time, so that flights in it can be compared.
+        """
         ...
 
-    def project(self, points_C_m: Array) -> Array:
-        """Pixels, shape (n, 2), of points, shape (n, 3), in the camera frame."""
-        ...
 
-    def rays(self, pixels: Array) -> Array:
-        """Directions with unit z, shape (n, 3), in the camera frame, of pixels, shape (n, 2)."""
+class Current(Protocol):
+    """Water that no thruster moves.
+
+    Beside `velocity` it may say, and is asked with these defaults where it does not: `steady` (False) and `uniform`
+    (False), whether it is the same at all times and everywhere; `end_s` (infinite), until when it is known;
+    `stirred_bed()` (none), circles (x, y, radius), shape (n, 3), in which it sweeps the bed.
+    """
+
+    def velocity(self, points_W_m: Array, time_s: float) -> Array:
+        """Velocity in m/s at points, both shape (n, 3), in the world, `time_s` after the start."""
         ...
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,9 @@ from scipy.stats import chi2
 from wakewise.arrays import Array
 from wakewise.estimation import dead_reckoned, local_north_east_down
 from wakewise.geometry import quat_conjugate, quat_from_euler, quat_multiply, rotvec_from_quat
-from wakewise.operation import Scenario
-from wakewise.operation.build import Mission, build_flight, build_mission
+from wakewise.interfaces import BodyState, Estimator, Measurement, Witness
+from wakewise.operation import Parts, Scenario, fly
+from wakewise.operation.loop import Step
 from wakewise.trials.timing import BenchOptions
 
 SEEDS, SECONDS, SETTLED_S = 50, 10.0, 4.0
@@ -24,10 +26,11 @@ LOSS_S, BACK_S = (10.0, 20.0), 2.0
 def run(options: BenchOptions) -> dict[str, Any]:
     """Fly the start of the default mission with many seeds; the seeds are none that the settings were chosen with."""
     scenario = Scenario()
-    mission = build_mission(scenario)
+    parts = scenario.parts()
+    _ = parts.preflight
     flights, spent_s = [], 0.0
     for k in range(SEEDS):
-        errors, covariances, cpu_s = _flight(scenario.model_copy(update={"seed": 3000 + k}), mission, SECONDS)
+        errors, covariances, cpu_s = _flight(_seeded(parts, scenario.model_copy(update={"seed": 3000 + k})), SECONDS)
         flights.append((errors, covariances))
         spent_s += cpu_s
         options.progress(k + 1, 2 * SEEDS, f"flight {k + 1} of {SEEDS}")
@@ -55,37 +58,64 @@ def run(options: BenchOptions) -> dict[str, Any]:
         "nees_twist_mean": float(twist.mean()),
         "nees_twist_in_bounds": bool(low <= twist.mean() <= high),
         "seeds": SEEDS,
-        **_loss(scenario, mission, options),
+        **_loss(parts, options),
         "dead_reckoning_drift_pct": drift,
         "step_cpu_us": 1e6 * spent_s / (SEEDS * SECONDS * scenario.control.rate_hz),
         "why": why,
     }
 
 
-def _flight(scenario: Scenario, mission: Mission, seconds: float) -> tuple[Array, Array, float]:
-    """Errors, shape (k, 12), covariances, shape (k, 12, 12), per step, and the filter's CPU time in s."""
-    flight = build_flight(scenario, mission)
-    dt_s = 1.0 / scenario.control.rate_hz
-    control, state, estimate = flight.controller.init(), flight.estimator.init(flight.start), flight.start
-    errors, covariances, spent_s = [], [], 0.0
-    for k in range(round(seconds / dt_s)):
-        control, command = flight.controller.step(control, dt_s, estimate, flight.pilot.goal(k * dt_s, estimate))
-        measured = flight.tank.step(command.thrusts_N, dt_s)
+@dataclass(kw_only=True, eq=False)
+class Timed:
+    """An estimator and the thread CPU time that its steps took; implements `wakewise.interfaces.Estimator`."""
+
+    inner: Estimator[Any]
+    spent_s: float = 0.0
+
+    def init(self, start: BodyState) -> Any:
+        """State at the start."""
+        return self.inner.init(start)
+
+    def step(
+        self, state: Any, dt_s: float, measurements: tuple[Measurement, ...], thrusts_N: Array
+    ) -> tuple[Any, BodyState]:
+        """Advance the estimator within."""
         began = time.thread_time()
-        state, estimate = flight.estimator.step(state, dt_s, measured, command.thrusts_N)
-        spent_s += time.thread_time() - began
-        true = flight.tank.state
+        answer = self.inner.step(state, dt_s, measurements, thrusts_N)
+        self.spent_s += time.thread_time() - began
+        return answer
+
+
+def _flight(parts: Parts, seconds: float) -> tuple[Array, Array, float]:
+    """Errors, shape (k, 12), covariances, shape (k, 12, 12), after each step, and the filter's CPU time in s."""
+    errors, covariances = [], []
+
+    def note(step: Step, _: Witness | None) -> None:
+        if step.truth is None or step.estimate.covariance is None:  # the first step: nothing is estimated yet
+            return
+        true, estimate = step.truth.state, step.estimate
         turn = rotvec_from_quat(quat_multiply(quat_conjugate(estimate.X_WB.q), true.X_WB.q))
         errors.append(np.concatenate([true.X_WB.p_m - estimate.X_WB.p_m, turn, true.nu_B - estimate.nu_B]))
         covariances.append(estimate.covariance)
-    return np.array(errors), np.array(covariances), spent_s
+
+    timed = Timed(inner=parts.estimator)
+    one_more_s = 1.0 / parts.scenario.control.rate_hz
+    flown = parts.replace(estimator=timed)
+    fly(flown, duration_s=seconds + one_more_s, checked=False, water_every_s=np.inf, watch=note)
+    return np.array(errors), np.array(covariances), timed.spent_s
 
 
-def _loss(scenario: Scenario, mission: Mission, options: BenchOptions) -> dict[str, Any]:
+def _seeded(parts: Parts, scenario: Scenario) -> Parts:
+    """The parts with another scenario; the mission, which does not depend on the seed, is not planned anew."""
+    return parts.replace(scenario=scenario, target=parts.target, region=parts.region, route=parts.route)
+
+
+def _loss(parts: Parts, options: BenchOptions) -> dict[str, Any]:
     """What ten seconds without poses and tracking do, and whether the filter knows: NEES of the pose over all seeds.
 
     The water is clean and moves in steps of 0.1 s, which is cheaper and which neither vehicle nor sensors notice.
     """
+    scenario = parts.scenario
     blind = scenario.tank.model_copy(
         update={"pose_outages_s": (LOSS_S,), "tracking_rate_hz": 0.0, "silt": 0.0, "flow_step_s": 0.1}
     )
@@ -94,7 +124,7 @@ def _loss(scenario: Scenario, mission: Mission, options: BenchOptions) -> dict[s
     nees, worst_m, at_end, claimed, after = [], 0.0, [], [], []
     for k in range(SEEDS):
         lost = scenario.model_copy(update={"seed": 4000 + k, "tank": blind})
-        errors, covariances, _ = _flight(lost, mission, LOSS_S[1] + BACK_S)
+        errors, covariances, _ = _flight(_seeded(parts, lost), LOSS_S[1] + BACK_S)
         nees.append([_nees(errors[i, :6], covariances[i, :6, :6]) for i in (middle, end, -1)])
         worst_m = max(worst_m, float(np.linalg.norm(errors[begin:, :3], axis=1).max()))
         at_end.append(errors[end, :3])

@@ -18,7 +18,6 @@ import numpy as np
 
 from wakewise.benches import imaging
 from wakewise.operation import Scenario, load_scenario
-from wakewise.operation.build import build_target
 from wakewise.studies.photo_model import judge
 from wakewise.studies.photo_sets import planned_views, read_photo_set, write_photos
 from wakewise.targets import coral_kinds
@@ -58,7 +57,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
 
 def model_coral(scenario: Scenario, folder: Path, options: BenchOptions) -> dict[str, Any]:
     """Photograph a scenario's target from its planned orbits, then model and judge it in a process of its own."""
-    target = build_target(scenario.target, scenario.tank.size_m[2])
+    target = scenario.parts().target
     rng = np.random.default_rng(scenario.seed)
     views = planned_views(target, scenario.mission, scenario.imaging.exposure_s, rng)
     write_photos(folder, views, None, scenario.imaging, target, seed=scenario.seed, progress=options.progress)
@@ -67,7 +66,7 @@ def model_coral(scenario: Scenario, folder: Path, options: BenchOptions) -> dict
 
 
 def _model(scenario: Scenario, folder: Path) -> dict[str, Any]:
-    target = build_target(scenario.target, scenario.tank.size_m[2])
+    target = scenario.parts().target
     photos = read_photo_set(folder, scenario.imaging.camera().focal_px)
     return judge(photos, target, scenario.reconstruction, folder) | {"memory_MB": peak_memory_MB()}
 

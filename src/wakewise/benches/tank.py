@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.operation import Scenario, build_flight, build_mission, load_scenario
-from wakewise.operation.loop import Step, fly
+from wakewise.operation import Scenario, fly, load_scenario
+from wakewise.operation.worlds import tank_world
 from wakewise.tank import Tank
 from wakewise.trials.timing import BenchOptions
 
@@ -77,32 +77,19 @@ def run(options: BenchOptions) -> dict[str, Any]:
 
 def _flown(scenario: Scenario, duration_s: float, options: BenchOptions) -> Array:
     """Commands of the first part of the scenario's flight, shape (n, 8)."""
-    flight = build_flight(scenario, build_mission(scenario))
-    commands: list[Array] = []
-
-    def note(step: Step) -> None:
-        commands.append(step.command.thrusts_N)
-        if len(commands) % 50 == 0:
-            options.progress(len(commands), round(duration_s / _STEP_S), "flying")
-
-    fly(
-        pilot=flight.pilot,
-        controller=flight.controller,
-        estimator=flight.estimator,
-        plant=flight.tank,
-        witness=None,
-        start=flight.start,
-        thrusters=len(flight.true_vehicle.thrusters),
+    steps = round(duration_s / _STEP_S)
+    flight = fly(
+        scenario,
         duration_s=duration_s,
-        dt_s=_STEP_S,
-        record=note,
+        water_every_s=np.inf,
+        progress=lambda done, _, note="": options.progress(done, steps, note or "flying"),
     )
-    return np.array(commands)
+    return flight.steps.select(f"command_{i + 1}_N" for i in range(len(flight.parts.vehicle.thrusters))).to_numpy()
 
 
 def _tank(scenario: Scenario) -> Tank:
     """A tank as the flight had it at its start."""
-    return build_flight(scenario, build_mission(scenario)).tank
+    return tank_world(scenario.parts()).tank()
 
 
 def _points(tank: Tank) -> Array:

@@ -27,19 +27,20 @@ def trim(vehicle: Vehicle = "paper", scenario: ScenarioFile = None, json: Json =
 
     from wakewise.control import LeverSettings
     from wakewise.control.trim import net_buoyancy_N, trim_advice
-    from wakewise.operation import build_mission, load_scenario
+    from wakewise.operation import load_scenario
     from wakewise.wake import wake_model
 
     chosen = load_scenario(None, scenario, {"vehicle": vehicle})
-    mission = build_mission(chosen)
-    route, body = mission.route, mission.vehicle
+    parts = chosen.parts()
+    _ = parts.preflight
+    route, body = parts.route, parts.vehicle
     times = route.exposures_s[:: max(1, len(route.exposures_s) // 24)]
     poses = tuple(route.body(float(t), body.X_BC).X_WB for t in times)
     wake = wake_model(chosen.control.wake.model_copy(update={"floor": True}), chosen.tank.size_m[2])
     settings = chosen.control.model_copy(update={"levers": LeverSettings(bed=True)})
     tank = chosen.tank
     unknown_N = tank.trim_range_N if tank.trim_N is None else abs(tank.trim_N)
-    advice = trim_advice(body, poses, mission.region, wake, settings, unknown_N=unknown_N)
+    advice = trim_advice(body, poses, parts.region, wake, settings, unknown_N=unknown_N)
     if json:
         print_json(
             {

@@ -12,15 +12,17 @@ stick into goals, `trim.py` advises ballast.
 
 from wakewise.control.levers import LeverSettings
 from wakewise.control.loop import vehicle_layout
-from wakewise.control.methods import METHODS, make_controller
+from wakewise.control.methods import MAKERS, METHODS, ControlTask, make_controller
 from wakewise.control.receding import PlanningController, planning_controller
 from wakewise.control.settings import ControlSettings
 from wakewise.control.stability import Gains, vehicle_axes, wished_gains
 from wakewise.control.tracker import make_tracker
 
 __all__ = [
+    "MAKERS",
     "METHODS",
     "ControlSettings",
+    "ControlTask",
     "Gains",
     "LeverSettings",
     "PlanningController",

@@ -12,7 +12,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, cast
 
 from wakewise.control.dynamic_positioning import dynamic_positioning
 from wakewise.control.instant import instant
@@ -21,9 +22,9 @@ from wakewise.control.receding import PlanningController, planning_controller
 from wakewise.control.settings import ControlSettings
 from wakewise.control.unaware import smooth, unaware
 from wakewise.control.wake_aware import linear, planned
-from wakewise.errors import InputError
 from wakewise.interfaces import Controller, WakeModel
 from wakewise.planning import PaperPlanner, Surroundings
+from wakewise.plugins import find
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
 
@@ -42,9 +43,33 @@ def _paper_planner(
     )
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ControlTask:
+    """What a controller is made for; a method from outside is made by a callable that takes this alone.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        As it is believed to be.
+    region : Region
+        The water to spare.
+    wake : WakeModel
+        What is believed of the jets.
+    settings : ControlSettings
+    surroundings : Surroundings or None
+        What to keep clear of.
+    """
+
+    vehicle: Vehicle
+    region: Region
+    wake: WakeModel
+    settings: ControlSettings
+    surroundings: Surroundings | None = None
+
+
 Maker = Callable[[Vehicle, Region, WakeModel, ControlSettings, Surroundings | None], Controller[Any]]
 
-_MAKERS: dict[str, Maker] = {
+MAKERS: dict[str, Maker] = {
     "dp": dynamic_positioning,
     "pseudo-inverse": planned_pseudo_inverse,
     "unaware": unaware,
@@ -56,8 +81,8 @@ _MAKERS: dict[str, Maker] = {
     "planner-paper": _paper_planner,
 }
 
-METHODS: tuple[str, ...] = tuple(_MAKERS)
-"""Names that `make_controller` knows; the first is the baseline."""
+METHODS: tuple[str, ...] = tuple(MAKERS)
+"""Names of our own methods; the first is the baseline."""
 
 
 def make_controller(
@@ -70,6 +95,8 @@ def make_controller(
 ) -> Controller[Any]:
     """Controller of that name for a nominal vehicle, a region to spare and a wake model.
 
+    `method` is one of `METHODS`, a name that an installed package offers (entry points `wakewise.controllers`), or
+    ``package.module:make``; those from outside are made by a callable of one `ControlTask`.
     The methods that plan keep clear of `surroundings`; without them, of the sphere round the region's surface alone.
 
     Raises
@@ -77,6 +104,8 @@ def make_controller(
     InputError
         If there is no such method, or the gains have no stable bandwidth on this vehicle.
     """
-    if method not in _MAKERS:
-        raise InputError(f"method '{method}': unknown, allowed: {', '.join(METHODS)}")
-    return _MAKERS[method](vehicle, region, wake, settings or ControlSettings(), surroundings)
+    chosen = settings or ControlSettings()
+    if method in MAKERS:
+        return MAKERS[method](vehicle, region, wake, chosen, surroundings)
+    make = cast("Callable[[ControlTask], Controller[Any]]", find("method", method, MAKERS).maker)
+    return make(ControlTask(vehicle=vehicle, region=region, wake=wake, settings=chosen, surroundings=surroundings))

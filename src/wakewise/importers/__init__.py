@@ -11,10 +11,11 @@ helpers: `xacro*.py`, `expressions.py` and `scopes.py` expand macros, `xml.py` a
 a file states, to be held against its geometry.
 """
 
-from wakewise.importers.find import compare_with, find_vehicle
+from wakewise.importers.find import any_vehicle, compare_with, find_vehicle
 from wakewise.importers.read import import_vehicle, read_matrix
 
 __all__ = [
+    "any_vehicle",
     "compare_with",
     "find_vehicle",
     "import_vehicle",

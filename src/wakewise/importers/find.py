@@ -13,6 +13,7 @@ from wakewise.vehicles.check import AnyVehicle
 from wakewise.vehicles.draft import VehicleDraft
 from wakewise.vehicles.library import draft_names, load_draft
 from wakewise.vehicles.mixing import Comparison, compare_either_frame, compare_signs, compare_with_ardusub
+from wakewise.vehicles.vehicle import Vehicle
 
 _OURS = re.compile(r"^(does_not_claim|thruster_layout):", re.MULTILINE)
 
@@ -35,6 +36,33 @@ def find_vehicle(
     from wakewise.importers.read import import_vehicle
 
     return import_vehicle(path, packages=packages, skip_missing=skip_missing)
+
+
+def any_vehicle(name_or_path: str) -> Vehicle:
+    """A vehicle that can fly, from the library or any file that can be read as a vehicle.
+
+    Parameters
+    ----------
+    name_or_path : str
+        A name of the library, or the path of a vehicle file: ours (YAML), URDF, xacro, SDF, Stonefish, a matrix, or a
+        format that an installed package offers.
+
+    Raises
+    ------
+    InputError
+        If there is no such vehicle or file, it cannot be read as a vehicle, or lacks something that flying needs (the
+        message lists it).
+
+    Examples
+    --------
+    >>> import wakewise as ww
+    >>> len(ww.load_vehicle("bluerov2-heavy").thrusters)
+    8
+    """
+    draft = find_vehicle(name_or_path)
+    if draft.missing:
+        raise InputError(f"vehicle {name_or_path}: cannot fly, its file does not hold {', '.join(draft.missing)}")
+    return draft.vehicle()
 
 
 def compare_with(vehicle: AnyVehicle, matrix: str) -> Comparison:

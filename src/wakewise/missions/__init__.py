@@ -2,7 +2,7 @@
 
 from wakewise.missions.clearance import TankBounds, check_clearance
 from wakewise.missions.orbit import Orbit, layered_orbits
-from wakewise.missions.route import SETTLING, Leg, Route, RoutePilot, plan_route
+from wakewise.missions.route import SETTLING, Leg, Route, RoutePilot, open_route, plan_route
 from wakewise.missions.settings import MissionSettings
 
 __all__ = [
@@ -15,5 +15,6 @@ __all__ = [
     "TankBounds",
     "check_clearance",
     "layered_orbits",
+    "open_route",
     "plan_route",
 ]

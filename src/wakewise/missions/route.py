@@ -168,6 +168,29 @@ def plan_route(centre_W_m: Array, settings: MissionSettings) -> Route:
     )
 
 
+def open_route(centre_W_m: Array, duration_s: float, name: str = "free") -> Route:
+    """A stretch of time without legs or photographs, for pilots that need no route."""
+    still = np.array([0.0, 0.0, 1.0])
+    leg = Leg(
+        name=name,
+        start=still,
+        end=still,
+        length_m=0.0,
+        duration_s=duration_s,
+        speed_m_s=0.1,
+        acceleration_m_s2=0.1,
+    )
+    return Route(
+        centre_W_m=centre_W_m,
+        legs=(leg,),
+        starts_s=np.zeros(1),
+        exposures_s=np.zeros(0),
+        exposure_names=(),
+        X_WC_planned=(),
+        duration_s=duration_s,
+    )
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RoutePilot:
     """A `Pilot` that follows a route by the clock and announces the shutter."""

@@ -1,8 +1,14 @@
-"""One vehicle doing one mission: scenario, the fixed-rate loop, the recorder; the same code for tank and sea."""
+"""One vehicle doing one mission: scenario, parts, the fixed-rate loop, the recorder; the same code for tank and sea.
 
-from wakewise.operation.build import Mission, build_camera, build_flight, build_mission, build_scene
-from wakewise.operation.flying import fly_mission
-from wakewise.operation.loop import Step, Truth, WaterTruth, Witness, fly
+Start reading in `parts.py` (what a flight is built from, and the one place where the controller's world and the true
+one meet) and `loop.py` (the loop itself). `scenario.py` is a maker of parts, read from YAML; `worlds.py` and
+`pilots.py` are worlds and pilots by name, `instant_water.py` the worlds whose water answers at once; `preflight.py`
+refuses what does not fit, `foreign.py` guards what comes from outside; `flying.py` flies, `recorder.py` and
+`telemetry.py` keep what was, `photography.py` renders what the camera saw.
+"""
+
+from wakewise.operation.flying import Flight, fly, fly_trial
+from wakewise.operation.parts import PARTS, Parts
 from wakewise.operation.photography import photo_name, photograph_flight
 from wakewise.operation.recorder import FlightRecorder, read_exposures, step_columns
 from wakewise.operation.scenario import (
@@ -16,21 +22,15 @@ from wakewise.operation.scenario import (
 )
 
 __all__ = [
+    "PARTS",
     "PRESETS",
+    "Flight",
     "FlightRecorder",
-    "Mission",
+    "Parts",
     "Scenario",
-    "Step",
-    "Truth",
-    "WaterTruth",
-    "Witness",
-    "build_camera",
-    "build_flight",
-    "build_mission",
-    "build_scene",
     "differences",
     "fly",
-    "fly_mission",
+    "fly_trial",
     "load_scenario",
     "parse_overrides",
     "photo_name",

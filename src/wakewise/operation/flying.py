@@ -1,55 +1,160 @@
-"""Flies a scenario in the tank and leaves steps.parquet, exposures.npz, timings.parquet and log.mcap."""
+"""Flies the parts of a flight: one loop for scan, compare, benches, films and own scripts."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
-from wakewise.errors import StageError
-from wakewise.interfaces import no_progress
-from wakewise.operation.build import Mission, build_flight
-from wakewise.operation.loop import fly
+import polars as pl
+
+from wakewise.errors import StageError, WakewiseError
+from wakewise.evaluation import flight_figures
+from wakewise.interfaces import Witness, no_progress
+from wakewise.missions import SETTLING
+from wakewise.operation.loop import Step, run_loop
+from wakewise.operation.parts import Parts
 from wakewise.operation.recorder import FlightRecorder
 from wakewise.operation.scenario import Scenario
 from wakewise.operation.telemetry import write_mcap
 
+WATER_EVERY_S = 0.1
+"""How often the water is asked about; in between the last answer stands."""
 
-def fly_mission(
-    scenario: Scenario, mission: Mission, folder: Path, progress: Callable[..., None] = no_progress
-) -> None:
-    """Fly the mission once. steps.parquet is written last: where it is, the flight is whole.
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """What a flight was: its parts and its record.
+
+    `steps` has one row per control step, columns with units as in docs/conventions.md; `figures` are means over it
+    from the first leg on, with the names of a trial's metrics.
+    """
+
+    parts: Parts
+    recorder: FlightRecorder
+
+    @cached_property
+    def steps(self) -> pl.DataFrame:
+        """One row per control step."""
+        return self.recorder.frame()
+
+    @cached_property
+    def figures(self) -> dict[str, Any]:
+        """What the flight is judged by, from the first leg on: wash at the target, errors, energy."""
+        frame = self.steps.filter(pl.col("leg") != SETTLING)
+        return {"method": self.parts.method, "seed": self.parts.scenario.seed, **flight_figures(frame)}
+
+    def write(self, folder: Path) -> None:
+        """Write log.mcap, exposures.npz and timings.parquet; last steps.parquet, which says that the flight is whole."""
+        write_mcap(self.steps, folder / "log.mcap")
+        self.recorder.write(folder)
+
+
+def fly(
+    flight: Parts | Scenario,
+    *,
+    duration_s: float | None = None,
+    progress: Callable[..., None] = no_progress,
+    checked: bool = True,
+    water_every_s: float = WATER_EVERY_S,
+    watch: Callable[[Step, Witness | None], None] | None = None,
+) -> Flight:
+    """Fly the parts once, from the beginning of their world; flown again they give the same flight.
+
+    Parameters
+    ----------
+    flight : Parts or Scenario
+    duration_s : float, optional
+        Only the first part of the mission.
+    progress : callable
+        Called as `(done, total, note)`.
+    checked : bool
+        Hold the parts against each other first (see `Parts.preflight`).
+    water_every_s : float
+        How often the water at the target is measured.
+    watch : callable, optional
+        Called as `(step, witness)` at each step, after the record.
+
+    Returns
+    -------
+    Flight
+
+    Raises
+    ------
+    InputError
+        If the parts do not fit each other.
+    StageError
+        If a part from outside, other than the controller, ends the flight.
+
+    Examples
+    --------
+    >>> import wakewise as ww
+    >>> flight = ww.fly(ww.Scenario.preset("quick", method="dp"), duration_s=1.0)
+    >>> flight.steps.height, flight.parts.method
+    (50, 'dp')
+    """
+    parts = flight if isinstance(flight, Parts) else flight.parts()
+    scenario, vehicle, route = parts.scenario, parts.vehicle, parts.route
+    if checked:
+        _ = parts.preflight
+    progress(0, 1, "compiling, about a minute the first time")
+    plant, witness = parts.world.begin()
+    dt_s, thrusters = 1.0 / scenario.control.rate_hz, len(vehicle.thrusters)
+    recorder = FlightRecorder(
+        route=route,
+        X_BC=vehicle.X_BC,
+        exposure_s=scenario.imaging.exposure_s,
+        instants=scenario.imaging.instants,
+        thrusters=thrusters,
+        dt_s=dt_s,
+        witness=witness,
+        water_every_s=water_every_s,
+    )
+
+    def record(step: Step) -> None:
+        recorder(step)
+        if watch is not None:
+            watch(step, witness)
+
+    try:
+        run_loop(
+            pilot=parts.pilot,
+            controller=parts.flying,
+            estimator=parts.estimator,
+            plant=plant,
+            witness=witness,
+            start=parts.start,
+            thrusters=thrusters,
+            duration_s=route.duration_s if duration_s is None else duration_s,
+            dt_s=dt_s,
+            record=record,
+            progress=progress,
+        )
+    except WakewiseError:
+        raise
+    except Exception as fault:
+        foreign = parts.from_outside
+        if not foreign:
+            raise
+        words = ", ".join(f"{name} {what}" for name, what in foreign.items())
+        raise StageError(
+            f"fly: ended after {recorder.duration_s:.1f} s by {type(fault).__name__}: {fault}; from outside: {words}"
+        ) from fault
+    return Flight(parts, recorder)
+
+
+def fly_trial(parts: Parts, folder: Path, progress: Callable[..., None] = no_progress) -> None:
+    """Fly the mission once and leave its record. steps.parquet is written last: where it is, the flight is whole.
 
     Raises
     ------
     StageError
         If the flight ended with no exposure.
     """
-    progress(0, 1, "compiling, about a minute the first time")
-    flight = build_flight(scenario, mission)
-    dt_s = 1.0 / scenario.control.rate_hz
-    recorder = FlightRecorder(
-        route=mission.route,
-        X_BC=mission.vehicle.X_BC,
-        exposure_s=scenario.imaging.exposure_s,
-        instants=scenario.imaging.instants,
-        thrusters=len(mission.vehicle.thrusters),
-        dt_s=dt_s,
-        witness=flight.witness,
-    )
-    fly(
-        pilot=flight.pilot,
-        controller=flight.controller,
-        estimator=flight.estimator,
-        plant=flight.tank,
-        witness=flight.witness,
-        start=flight.start,
-        thrusters=len(mission.vehicle.thrusters),
-        duration_s=mission.route.duration_s,
-        dt_s=dt_s,
-        record=recorder,
-        progress=progress,
-    )
-    if len(recorder.exposures) != len(mission.route.exposures_s):
-        raise StageError(f"{len(recorder.exposures)} of {len(mission.route.exposures_s)} exposures were made")
-    write_mcap(recorder.frame(), folder / "log.mcap")
-    recorder.write(folder)
+    flight = fly(parts, progress=progress)
+    made, planned = len(flight.recorder.exposures), len(parts.route.exposures_s)
+    if made != planned:
+        raise StageError(f"{made} of {planned} exposures were made")
+    flight.write(folder)

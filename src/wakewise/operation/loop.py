@@ -2,60 +2,25 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.interfaces import BodyState, Command, Controller, Estimator, Goal, Pilot, Plant, ScalarGrid, no_progress
-
-
-@dataclass(frozen=True, kw_only=True)
-class WaterTruth:
-    """What the water did, in the figures that a trial is judged by; speeds are the excess over the unthrusted flow.
-
-    Pressures, shear and the speed of tracers are of the whole water; NaN where a witness does not know them.
-    """
-
-    target_speed_mean_m_s: float
-    target_speed_p95_m_s: float
-    bed_speed_p95_m_s: float
-    turbidity_per_m: float
-    target_pressure_mean_Pa: float = math.nan
-    target_pressure_p95_Pa: float = math.nan
-    bed_shear_p95_Pa: float = math.nan
-    tracer_speed_mean_m_s: float = math.nan
-    ray_optical_depth: float = math.nan
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Truth:
-    """What really was at one instant, for the record only: no controller sees it."""
-
-    state: BodyState
-    thrusts_N: Array
-    power_W: float
-    collision: bool
-
-
-class Witness(Protocol):
-    """Knows the truth of a simulated world; there is none at sea."""
-
-    def observe(self) -> Truth:
-        """Vehicle, thrusters and collisions now."""
-        ...
-
-    def water(self) -> WaterTruth:
-        """Water at the target now; dearer than `observe`, so asked less often."""
-        ...
-
-    def silt(self) -> ScalarGrid:
-        """Silt concentration around the target now, kg/m3."""
-        ...
+from wakewise.interfaces import (
+    BodyState,
+    Command,
+    Controller,
+    Estimator,
+    Goal,
+    Pilot,
+    Plant,
+    Truth,
+    Witness,
+    no_progress,
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,7 +38,7 @@ class Step:
 Recorder = Callable[[Step], None]
 
 
-def fly(
+def run_loop(
     *,
     pilot: Pilot,
     controller: Controller[Any],

@@ -16,7 +16,7 @@ from wakewise.files import whole_file, write_text
 from wakewise.geometry import Pose
 from wakewise.imaging import SiltOptics, calibrate, photograph
 from wakewise.interfaces import ScalarGrid, no_progress
-from wakewise.operation.build import Mission, Seeds, build_camera, build_scene
+from wakewise.operation.parts import Parts
 from wakewise.operation.recorder import ExposureRecord, read_exposures
 from wakewise.operation.scenario import Scenario
 
@@ -29,23 +29,22 @@ IMAGE_COLUMNS = (
 )
 
 
-def photograph_flight(
-    scenario: Scenario, mission: Mission, folder: Path, progress: Callable[..., None] = no_progress
-) -> None:
+def photograph_flight(parts: Parts, folder: Path, progress: Callable[..., None] = no_progress) -> None:
     """Render the photographs that are not there yet; images.csv, written last, says that all are.
 
     cameras.txt (COLMAP) and camera.json hold the camera model; the poses of images.csv are those of its projection
     centre, which lies off the lens's pupil where a flat port bends the rays. Each photograph draws its noise from its
     own child of the seed, so a resumed run gives the same pictures.
     """
+    scenario = parts.scenario
     exposures = read_exposures(folder / "exposures.npz")
-    names = mission.route.exposure_names
-    camera = build_camera(scenario)
+    names = parts.route.exposure_names
+    camera = parts.camera
     calibration = calibrate(camera)
     calibration.write(folder)
     progress(0, len(exposures), "building the scene")
-    scene = build_scene(scenario, mission.target)
-    streams = Seeds.of(scenario.seed).imaging.spawn(len(exposures))
+    scene = parts.scene
+    streams = parts.seeds.imaging().spawn(len(exposures))
     grains = SiltOptics(diameter_m=scenario.tank.grain_m, density_kg_m3=scenario.tank.grain_density_kg_m3)
     images = folder / "images"
     rows = []

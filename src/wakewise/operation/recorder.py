@@ -15,9 +15,9 @@ import polars as pl
 from wakewise.arrays import Array
 from wakewise.files import whole_file
 from wakewise.geometry import Pose, quat_integrate
-from wakewise.interfaces import BodyState, ScalarGrid
+from wakewise.interfaces import BodyState, ScalarGrid, WaterTruth, Witness
 from wakewise.missions import Route
-from wakewise.operation.loop import Step, WaterTruth, Witness
+from wakewise.operation.loop import Step
 
 _STATE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "u_m_s", "v_m_s", "w_m_s", "p_rad_s", "q_rad_s", "r_rad_s")
 _WRENCH = ("wrench_X_N", "wrench_Y_N", "wrench_Z_N", "wrench_K_Nm", "wrench_M_Nm", "wrench_N_Nm")
@@ -126,6 +126,11 @@ class FlightRecorder:
                     silt=self.witness.silt(),
                 )
             )
+
+    @property
+    def duration_s(self) -> float:
+        """How long the flight has taken so far."""
+        return len(self._rows) * self.dt_s
 
     def frame(self) -> pl.DataFrame:
         """The steps as a table."""

@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import yaml
-from pydantic import BaseModel, Field, ValidationError, field_validator
+from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
 
-from wakewise.control import METHODS, ControlSettings
+from wakewise.control import MAKERS, ControlSettings
 from wakewise.errors import InputError
 from wakewise.estimation import FilterSettings
 from wakewise.files import write_text
 from wakewise.imaging import ImagingSettings
 from wakewise.missions import MissionSettings
+from wakewise.operation.pilots import PILOTS
+from wakewise.operation.worlds import WORLDS
+from wakewise.plugins import names
 from wakewise.reconstruction import ReconstructionSettings
 from wakewise.settings import Settings
 from wakewise.tank import TankSettings
 from wakewise.tank.settings import WATERS
 from wakewise.targets import coral_kinds
+
+if TYPE_CHECKING:
+    from wakewise.operation.parts import Parts
+
+_OWN: dict[str, Mapping[str, Any]] = {"method": MAKERS, "world": WORLDS, "pilot": PILOTS}
 
 PRESETS = ("quick", "standard")
 
@@ -42,8 +51,10 @@ class Scenario(Settings):
 
     name: str = Field("scan", min_length=1, max_length=80, description="what the trial is called in its report")
     seed: int = Field(1, ge=0, description="every random draw of the trial follows from it")
-    method: Literal[METHODS] = Field("wake-aware", description="how thrusts are chosen")  # type: ignore[valid-type]
+    method: str = Field("wake-aware", description="how thrusts are chosen: a method's name, or package.module:make")
     vehicle: str = Field("paper", description="library name or path of a vehicle file")
+    world: str = Field("tank", description="where it is flown: tank, paper (circular), lattice, or package.module:make")
+    pilot: str = Field("route", description="where goals come from: route, or package.module:make")
     target: TargetSettings = TargetSettings()
     mission: MissionSettings = MissionSettings()
     control: ControlSettings = ControlSettings()
@@ -51,6 +62,21 @@ class Scenario(Settings):
     tank: TankSettings = TankSettings()
     imaging: ImagingSettings = ImagingSettings()
     reconstruction: ReconstructionSettings = ReconstructionSettings()
+    replaced: dict[str, str] = Field(
+        default={},
+        description="parts that were given in Python in place of the scenario's own, in words; not to be set",
+    )
+
+    @field_validator("method", "world", "pilot")
+    @classmethod
+    def _known(cls, value: str, info: ValidationInfo) -> str:
+        kind = str(info.field_name)
+        known = names(kind, _OWN[kind])
+        if value not in known and ":" not in value:
+            close = difflib.get_close_matches(value, known, 1)
+            hint = f"did you mean {close[0]}? " if close else ""
+            raise ValueError(f"{hint}allowed are {', '.join(known)}, or package.module:make")
+        return value
 
     @field_validator("vehicle")
     @classmethod
@@ -58,6 +84,55 @@ class Scenario(Settings):
         if not value.strip():
             raise ValueError("empty: give a library name or the path of a vehicle file")
         return value
+
+    @classmethod
+    def preset(cls, which: str = "quick", /, **changes: Any) -> Scenario:
+        """A preset, with some fields changed.
+
+        Parameters
+        ----------
+        which : str
+            One of `PRESETS`.
+        **changes
+            Fields by their dotted names, such as ``method="dp"`` or ``**{"mission.standoff_m": 0.6}``.
+
+        Raises
+        ------
+        InputError
+            Naming the preset or field, what was found and what is allowed.
+
+        Examples
+        --------
+        >>> import wakewise as ww
+        >>> ww.Scenario.preset("quick", seed=3).mission.standoff_m
+        0.5
+        """
+        return load_scenario(which, None, changes)
+
+    @classmethod
+    def load(cls, path: str | Path, which: str | None = None, /, **changes: Any) -> Scenario:
+        """A scenario file, laid over a preset if one is named, with some fields changed; as for `preset`."""
+        return load_scenario(which, Path(path), changes)
+
+    def replace(self, **changes: Any) -> Scenario:
+        """The same scenario with some fields changed, by their dotted names; checked as a file is.
+
+        Raises
+        ------
+        InputError
+            Naming the field, what was found and what is allowed.
+        """
+        tree = self.model_dump()
+        for name, value in changes.items():
+            new = value.model_dump() if isinstance(value, BaseModel) else value
+            tree = _merged(tree, _with_water(_nested(name, new)))
+        return check_scenario(tree, "scenario")
+
+    def parts(self) -> Parts:
+        """What the scenario's flight is built from, each part made when asked for."""
+        from wakewise.operation.parts import Parts
+
+        return Parts(self)
 
 
 def load_scenario(preset: str | None, path: Path | None, overrides: dict[str, Any]) -> Scenario:

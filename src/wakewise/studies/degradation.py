@@ -23,7 +23,6 @@ from wakewise.files import write_json, write_text
 from wakewise.imaging import Render
 from wakewise.interfaces import ScalarGrid
 from wakewise.operation import Scenario
-from wakewise.operation.build import build_target
 from wakewise.studies.photo_model import judge
 from wakewise.studies.photo_sets import planned_views, render_clean, write_photos
 from wakewise.targets import Target
@@ -111,7 +110,7 @@ def degrade(
     watch = watch or Quiet()
     wanted = _checked({name: factor.levels for name, factor in FACTORS.items()} if levels is None else levels)
     _claim(folder, scenario)
-    target = build_target(scenario.target, scenario.tank.size_m[2])
+    target = scenario.parts().target
     clean: list[Render] = []
     rows = []
     for name, steps in wanted.items():

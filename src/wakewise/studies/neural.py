@@ -11,7 +11,7 @@ from wakewise.errors import StageError
 from wakewise.evaluation import Crop, evaluate_surface
 from wakewise.files import write_json
 from wakewise.interfaces import Progress
-from wakewise.operation import build_mission, read_scenario
+from wakewise.operation import read_scenario
 from wakewise.reconstruction import read_cloud
 from wakewise.reconstruction.nerf import FieldSettings, build_field
 from wakewise.trials.trial import REGION_SHARE
@@ -68,8 +68,8 @@ def field_of_trial(
 
     Nothing true goes into the field: poses are the model's, the region is the plan's. Writes metrics.json in `out`.
     """
-    mission = build_mission(read_scenario(folder / "scenario.yaml"))
-    planned = (mission.target.centre_W_m, REGION_SHARE * mission.target.radius_m)
+    parts = read_scenario(folder / "scenario.yaml").parts()
+    planned = (parts.target.centre_W_m, REGION_SHARE * parts.target.radius_m)
     figures = build_field(
         folder, photos, out, settings, region=region or planned, device=device, mesh=mesh, progress=progress
     )
@@ -81,8 +81,8 @@ def field_of_trial(
                 raise StageError(f"the trial left no {cloud.name}")
             score = evaluate_surface(
                 read_cloud(cloud).points_m,
-                mission.target.mesh,
-                crop=Crop(bed_z_m=mission.target.bed_z_m),
+                parts.target.mesh,
+                crop=Crop(bed_z_m=parts.target.bed_z_m),
                 camera_centres_W_m=centres,
             )
             figures |= {prefix + key: getattr(score, key) for key in _FIGURES}

@@ -1,10 +1,10 @@
 """An operator flies by hand past a coral: how closely the vehicle obeys, and what that costs the water.
 
-For each w_track of the paper's scale, `wake-aware` against `unaware` at the same weight, same commands, same seeds, in
-the paper's own world (circular, see `paper_world`). The operator asks for 0.1 m/s, reached at 0.1 m/s2. Deviation is
-the rms of true less commanded velocity over the rms of the commanded one. Its parts are told, too: what the plan itself
-deviates (all that w_track can set), what the vehicle deviates from its plan, and the floor, which is what the same
-vehicle, estimator and tracker reach with `dp`, that obeys at once and spares nothing.
+For each w_track of the paper's scale, `wake-aware` against `unaware` at the same weight, same commands, same seeds,
+in the paper's own world (circular, see `wakewise.operation.instant_water`). The operator asks for 0.1 m/s, reached at
+0.1 m/s2. Deviation is the rms of true less commanded velocity over the rms of the commanded one. Its parts are told,
+too: what the plan itself deviates (all that w_track can set), what the vehicle deviates from its plan, and the floor,
+which is what the same vehicle, estimator and tracker reach with `dp`, that obeys at once and spares nothing.
 
 Two courses. `front`, the one of the figures on top: sideways, up, back and down in front of the target, camera on it,
 where spare thrusters alone can keep every jet off it. `over`: to and fro above the target in a vehicle that sinks by
@@ -21,11 +21,12 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.control import ControlSettings, PlanningController, make_controller
 from wakewise.control.intent import Intent, goal_of, moved_on, obeying, slewed
-from wakewise.estimation import ErrorStateFilter
-from wakewise.interfaces import BodyState, Command, Controller, Goal
-from wakewise.operation.loop import Step, fly
+from wakewise.interfaces import BodyState, Command, Controller, Goal, Witness
+from wakewise.missions import open_route
+from wakewise.operation import Scenario, fly
+from wakewise.operation.instant_water import InstantWorld, paper_jets
+from wakewise.operation.loop import Step
 from wakewise.studies.gentle.flight import WAKE_OF, paper_place
-from wakewise.studies.paper_world import PaperWorld
 from wakewise.tank import TankSettings
 from wakewise.trials.timing import BenchOptions
 from wakewise.vehicles import load_vehicle, perturbed
@@ -174,7 +175,7 @@ def fly_course(course: Course, method: str, w_track: float, seed: int) -> Flown:
     target, region = paper_place(tank.size_m[2])
     base = ControlSettings(wake=WakeSettings(**WAKE_OF["paper"]))
     control = base.model_copy(update={"plan": obeying(base.plan, w_track)})
-    plant_rng, tank_rng = np.random.default_rng([seed, 13]).spawn(2)
+    plant_rng, _ = np.random.default_rng([seed, 13]).spawn(2)
     trim_N = float(plant_rng.uniform(-tank.trim_range_N, tank.trim_range_N))
     true = perturbed(
         vehicle,
@@ -189,16 +190,23 @@ def fly_course(course: Course, method: str, w_track: float, seed: int) -> Flown:
     rest = Intent(velocity_W_m_s=np.zeros(3), watch_W_m=watch)
     here = goal_of(rest, target.centre_W_m + np.array(course.from_target_m))
     start = BodyState(X_WB=here.X_WB)
-    world = PaperWorld(true, target, tank, start, tank_rng)
-    dt_s = 1.0 / control.rate_hz
-    pilot = ScriptedOperator(course, watch, here, dt_s)
+    world = InstantWorld(
+        name="paper",
+        jets=paper_jets(),
+        vehicle=true,
+        target=target,
+        settings=tank,
+        start=start,
+        draw=lambda: np.random.default_rng([seed, 13]).spawn(2)[1],
+    )
+    pilot = ScriptedOperator(course, watch, here, 1.0 / control.rate_hz)
     controller = Overheard(make_controller(method, vehicle, region, wake_model(control.wake), control))
     view = WakeView.of(vehicle, region, wake_model(WakeSettings(**WAKE_OF["paper"])))
     asked, done, planned, D, speed, solve_ms = [], [], [], [], [], []
 
-    def record(step: Step) -> None:
+    def record(step: Step, witness: Witness | None) -> None:
         solve_ms.append(1e3 * step.solve_s)
-        if step.time_s < HOLD_S or step.truth is None:
+        if step.time_s < HOLD_S or step.truth is None or witness is None:
             return
         state = step.truth.state
         asked.append(pilot.velocity_W)
@@ -206,20 +214,20 @@ def fly_course(course: Course, method: str, w_track: float, seed: int) -> Flown:
         planned.append(asked[-1] if controller.planned_W is None else controller.planned_W)
         if len(asked) % 5 == 0:
             D.append(disturbance(view.gram(state.X_WB), step.truth.thrusts_N))
-            speed.append(world.water().target_speed_mean_m_s)
+            speed.append(witness.water().target_speed_mean_m_s)
 
-    fly(
+    parts = Scenario(method=method, seed=seed, control=control, tank=tank).parts()
+    flown = parts.replace(
+        vehicle=vehicle,
+        target=target,
+        region=region,
+        route=open_route(target.centre_W_m, HOLD_S + course.leg_s * len(course.legs_W)),
+        start=start,
         pilot=pilot,
         controller=controller,
-        estimator=ErrorStateFilter(vehicle),
-        plant=world,
-        witness=world,
-        start=start,
-        thrusters=len(vehicle.thrusters),
-        duration_s=HOLD_S + course.leg_s * len(course.legs_W),
-        dt_s=dt_s,
-        record=record,
+        world=world,
     )
+    fly(flown, checked=False, watch=record)
     wished, true_W, plan_W = np.array(asked), np.array(done), np.array(planned)
 
     def percent(off: Array) -> float:

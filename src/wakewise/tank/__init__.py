@@ -12,22 +12,22 @@ its laws; `measuring.py` and `probes.py` what a flight is judged by; `preflight.
 from wakewise.tank.ambient import build_ambient
 from wakewise.tank.grains import beam_attenuation_per_m
 from wakewise.tank.holding import Holding, holding
-from wakewise.tank.measuring import WaterMeasure
 from wakewise.tank.plant import VehiclePlant
 from wakewise.tank.sensors import Sensors
 from wakewise.tank.settings import TankSettings, ThrusterFailure
 from wakewise.tank.tank import Tank
 from wakewise.tank.tether import Tether
+from wakewise.tank.world import TankWorld
 
 __all__ = [
     "Holding",
     "Sensors",
     "Tank",
     "TankSettings",
+    "TankWorld",
     "Tether",
     "ThrusterFailure",
     "VehiclePlant",
-    "WaterMeasure",
     "beam_attenuation_per_m",
     "build_ambient",
     "holding",

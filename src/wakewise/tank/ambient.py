@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.errors import InputError
+from wakewise.interfaces import Current
 from wakewise.tank.settings import TankSettings
 from wakewise.water import AiryWave, AmbientSum, BackgroundTurbulence, PumpJet, SteadyCurrent, read_current_series
-from wakewise.water.instant import Ambient
 
 
 def build_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSum:
@@ -22,7 +22,7 @@ def build_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSu
         If the series' file is not usable, or the pump's outlet is outside the water.
     """
     length, width, depth = settings.size_m
-    parts: list[Ambient] = []
+    parts: list[Current] = []
     if settings.current_file is not None:
         parts.append(
             read_current_series(

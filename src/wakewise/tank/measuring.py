@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.interfaces import Flow, ScalarGrid
+from wakewise.interfaces import Flow, ScalarGrid, WaterTruth
 from wakewise.tank.grains import beam_attenuation_per_m, friction_velocity_m_s
 from wakewise.tank.probes import bed_points, surface_points, water_points
 from wakewise.tank.sediment import SHEAR_HEIGHT_M, SiltLaws
@@ -24,30 +23,6 @@ _PROBES = 300
 _TRACERS = 60
 _RAYS = 60
 _RAY_STEPS = 24
-
-
-@dataclass(frozen=True, kw_only=True)
-class WaterMeasure:
-    """What the water does at the target at one instant.
-
-    Speeds of `target_*` and `bed_*` are in excess of the same water without thrusters: on points spread evenly over the
-    target's surface, and 1 to 2 cm above the bed within 0.3 m of its foot. What follows is of the whole water, currents
-    included: `target_pressure_*` is 1/2 rho u^2 on the surface, `bed_shear_p95_Pa` the stress on the bed within the
-    0.3 m, and `tracer_speed_mean_m_s` what PIV would call the speed there, the straight way of tracers over the time
-    of one picture. `turbidity_per_m` is the mean beam attenuation by silt in the water within 0.3 m of the target's
-    centre, and `ray_optical_depth` that attenuation along the rays from the camera to the side of the target that it
-    faces, from end to end, a mean without unit.
-    """
-
-    target_speed_mean_m_s: float
-    target_speed_p95_m_s: float
-    bed_speed_p95_m_s: float
-    turbidity_per_m: float
-    target_pressure_mean_Pa: float
-    target_pressure_p95_Pa: float
-    bed_shear_p95_Pa: float
-    tracer_speed_mean_m_s: float
-    ray_optical_depth: float
 
 
 class ExcessFlow(Flow, Protocol):
@@ -80,7 +55,7 @@ class TargetProbes:
         silt: ScalarGrid | None,
         camera_W_m: Array,
         density_kg_m3: float,
-    ) -> WaterMeasure:
+    ) -> WaterTruth:
         """Look at all of them.
 
         Parameters
@@ -100,7 +75,7 @@ class TargetProbes:
         pressure = 0.5 * density_kg_m3 * np.einsum("ij,ij->i", whole[:n], whole[:n])
         star = friction_velocity_m_s(np.linalg.norm(whole[m:, :2], axis=1), SHEAR_HEIGHT_M, laws.grain_m)
         every = max(n // _TRACERS, 1)
-        return WaterMeasure(
+        return WaterTruth(
             target_speed_mean_m_s=float(at_target.mean()),
             target_speed_p95_m_s=_p95(at_target),
             bed_speed_p95_m_s=_p95(at_bed),

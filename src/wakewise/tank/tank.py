@@ -9,10 +9,10 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
-from wakewise.interfaces import BodyState, Measurement, ScalarGrid
+from wakewise.interfaces import BodyState, Measurement, ScalarGrid, WaterTruth
 from wakewise.tank.ambient import build_ambient
 from wakewise.tank.grains import speed_at_stress_m_s
-from wakewise.tank.measuring import TargetProbes, WaterMeasure
+from wakewise.tank.measuring import TargetProbes
 from wakewise.tank.plant import VehiclePlant
 from wakewise.tank.probes import surface_points
 from wakewise.tank.sediment import SHEAR_HEIGHT_M, Silt, SiltLaws
@@ -121,8 +121,13 @@ class Tank:
         self._inflow = self.ambient.velocity(self._disks_before_m, 0.0) if settings.inflow_loss else None
         self._muddy = self.silt.total_kg > 0.0
         self._touching = ""
-        self._measured: WaterMeasure | None = None
+        self._measured: WaterTruth | None = None
         self._turbidity_per_m = self._probes.turbidity_per_m(laws, self._silt_grid())
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """The vehicle as it truly is."""
+        return self._plant.vehicle
 
     @property
     def time_s(self) -> float:
@@ -201,7 +206,7 @@ class Tank:
         origin = np.array([centre[0] - _GRID_HALF_M, centre[1] - _GRID_HALF_M, depth - (layers - 1) * GRID_SPACING_M])
         return self.silt.concentration(origin, GRID_SPACING_M, (across, across, layers))
 
-    def measure(self) -> WaterMeasure:
+    def measure(self) -> WaterTruth:
         """Speeds and turbidity at the target now; the water moves in steps, so it is computed once for each."""
         if self._measured is None:
             X_WC = self._plant.state.X_WB @ self._plant.vehicle.X_BC

@@ -9,7 +9,7 @@ import numpy as np
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
-from wakewise.water.instant import Ambient
+from wakewise.interfaces import Current
 
 DRAG_COEFFICIENT = 1.1
 """Of a smooth circular cylinder across the flow, Reynolds numbers 1e3 to 2e5 (S. F. Hoerner, Fluid-Dynamic Drag, 1965,
@@ -61,7 +61,7 @@ class Tether:
         if away > self.length_m:
             raise InputError(f"tank.tether_length_m: {self.length_m:g}, the vehicle starts {away:.2f} m from its winch")
 
-    def force_W_N(self, X_WB: Pose, nu_B: Array, water: Ambient, time_s: float) -> Array:
+    def force_W_N(self, X_WB: Pose, nu_B: Array, water: Current, time_s: float) -> Array:
         """Force of the cable on the vehicle, shape (3,), in the world."""
         end = X_WB.apply(self.p_BT_m)
         span = end - self.winch_W_m
@@ -78,7 +78,7 @@ class Tether:
         force: Array = (per_speed / _SEGMENTS) * (share * speed) @ across
         return force - STIFFNESS_N_M * max(distance - self.length_m, 0.0) * along
 
-    def wrench_B(self, X_WB: Pose, nu_B: Array, water: Ambient, time_s: float) -> Array:
+    def wrench_B(self, X_WB: Pose, nu_B: Array, water: Current, time_s: float) -> Array:
         """The same as a wrench about the body origin, in the body frame, shape (6,)."""
         force = self.force_W_N(X_WB, nu_B, water, time_s) @ X_WB.R
         return np.concatenate([force, np.cross(self.p_BT_m, force)])

@@ -6,6 +6,7 @@ Delicate features are found from the mesh or marked by a person, and may count m
 from wakewise.targets.corals import coral, coral_kinds
 from wakewise.targets.delicate import Delicacy, delicacy
 from wakewise.targets.distance import MeshDistance
+from wakewise.targets.find import find_target
 from wakewise.targets.marks import Marks, read_marks, read_vertex_scores
 from wakewise.targets.mesh import Mesh, load_mesh, read_mesh, write_mesh
 from wakewise.targets.region import Measure, Region, region_measure, sample_region
@@ -23,6 +24,7 @@ __all__ = [
     "coral",
     "coral_kinds",
     "delicacy",
+    "find_target",
     "load_mesh",
     "place_on_bed",
     "read_marks",

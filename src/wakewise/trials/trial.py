@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
@@ -23,11 +23,10 @@ from wakewise.geometry import matrix_from_quat
 from wakewise.likeness.textured import write_textured
 from wakewise.missions import SETTLING
 from wakewise.operation import (
-    Mission,
+    Parts,
     Scenario,
-    build_mission,
     differences,
-    fly_mission,
+    fly_trial,
     photo_name,
     photograph_flight,
     read_scenario,
@@ -60,7 +59,7 @@ _MODEL_FIGURES = ("reprojection_px", "cameras_rmse_mm", "features_per_image", "i
 REGION_SHARE = 1.25
 
 
-def run_trial(scenario: Scenario, folder: Path, watch: Watch | None = None) -> Figures:
+def run_trial(flight: Parts | Scenario, folder: Path, watch: Watch | None = None) -> Figures:
     """Run what is left of a trial and return its figures, which are the content of metrics.json.
 
     Raises
@@ -69,7 +68,9 @@ def run_trial(scenario: Scenario, folder: Path, watch: Watch | None = None) -> F
         If the scenario cannot be flown, or the folder holds another trial.
     """
     watch = watch or Quiet()
-    mission = build_mission(scenario)
+    parts = flight if isinstance(flight, Parts) else flight.parts()
+    scenario = as_flown(parts)
+    _ = parts.preflight
     claim(folder, scenario)
     ledger = Ledger(folder / "stages.json")
 
@@ -80,14 +81,15 @@ def run_trial(scenario: Scenario, folder: Path, watch: Watch | None = None) -> F
         with watch.stage(name) as progress, ledger.account(name):
             work(progress)
 
-    stage("plan", "planned.csv", lambda _: write_plan(scenario, mission, folder))
-    stage("fly", "steps.parquet", lambda progress: fly_mission(scenario, mission, folder, progress))
-    stage("photograph", "images.csv", lambda progress: photograph_flight(scenario, mission, folder, progress))
-    stage("reconstruct", "model.json", lambda progress: reconstruct_trial(scenario, mission, folder, progress))
-    stage("evaluate", "score.json", lambda _: write_json(folder / "score.json", evaluate_trial(mission, folder)))
+    stage("plan", "planned.csv", lambda _: write_plan(parts, folder))
+    stage("fly", "steps.parquet", lambda progress: fly_trial(parts, folder, progress))
+    stage("photograph", "images.csv", lambda progress: photograph_flight(parts, folder, progress))
+    stage("reconstruct", "model.json", lambda progress: reconstruct_trial(parts, folder, progress))
+    stage("evaluate", "score.json", lambda _: write_json(folder / "score.json", evaluate_trial(parts, folder)))
     figures = json.loads((folder / "score.json").read_text(encoding="utf-8"))
     gathering = Gathering(figures=figures["figures"], reasons=figures["reasons"])
     gathering.add({"method": scenario.method, "seed": scenario.seed})
+    gathering.add({"from_outside": parts.from_outside})
     gathering.add({"wall_s": ledger.total("wall_s"), "cpu_s": ledger.total("cpu_s")})
     result = gathering.finish()
     write_json(folder / "metrics.json", result)
@@ -97,15 +99,24 @@ def run_trial(scenario: Scenario, folder: Path, watch: Watch | None = None) -> F
         watch.skipped("colours")
     elif mesh.exists():
         with watch.stage("colours") as progress:
-            texture_trial(mission, folder, progress)
+            texture_trial(parts, folder, progress)
     return result
 
 
-def compare_methods(scenarios: dict[str, Scenario], folder: Path, watch: Watch | None = None) -> Figures:
+def compare_methods(flights: Mapping[str, Parts | Scenario], folder: Path, watch: Watch | None = None) -> Figures:
     """Run one trial per method, each in its own folder, and set their figures side by side (comparison.json)."""
-    result = comparison({name: run_trial(scenario, folder / name, watch) for name, scenario in scenarios.items()})
+    for flight in flights.values():  # what does not fit is refused before the first of them flies
+        _ = (flight if isinstance(flight, Parts) else flight.parts()).preflight
+    result = comparison({name: run_trial(flight, folder / name, watch) for name, flight in flights.items()})
     write_json(folder / "comparison.json", result)
     return result
+
+
+def as_flown(parts: Parts) -> Scenario:
+    """The scenario that a trial leaves behind: what was given in Python in place of its own parts is named in it."""
+    if not parts.given:
+        return parts.scenario
+    return parts.scenario.model_copy(update={"method": parts.method, "replaced": parts.replaced})
 
 
 def claim(folder: Path, scenario: Scenario) -> None:
@@ -131,21 +142,21 @@ def claim(folder: Path, scenario: Scenario) -> None:
     write_scenario(path, scenario, versions)
 
 
-def write_plan(scenario: Scenario, mission: Mission, folder: Path) -> None:
+def write_plan(parts: Parts, folder: Path) -> None:
     """Write the truth (truth.ply) and where the photographs are to be taken from (planned.csv)."""
-    write_mesh(folder / "truth.ply", mission.target.mesh)
+    write_mesh(folder / "truth.ply", parts.target.mesh)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("name", "time_s", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"))
-    route = mission.route
+    route = parts.route
     for name, time_s, X_WC in zip(route.exposure_names, route.exposures_s, route.X_WC_planned, strict=True):
         writer.writerow(
-            (photo_name(name, scenario), f"{time_s:.6f}", *(f"{value:.9f}" for value in (*X_WC.p_m, *X_WC.q)))
+            (photo_name(name, parts.scenario), f"{time_s:.6f}", *(f"{value:.9f}" for value in (*X_WC.p_m, *X_WC.q)))
         )
     write_text(folder / "planned.csv", text.getvalue())
 
 
-def reconstruct_trial(scenario: Scenario, mission: Mission, folder: Path, progress: Callable[..., None]) -> None:
+def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None]) -> None:
     """Reconstruct from the photographs and the vehicle's own estimates; model.json says how it went.
 
     Nothing true goes in: pairs, scale and place come from the estimated camera poses, the region from the plan. A model
@@ -159,11 +170,11 @@ def reconstruct_trial(scenario: Scenario, mission: Mission, folder: Path, progre
         model = reconstruct(
             folder / "images",
             folder,
-            scenario.reconstruction,
+            parts.scenario.reconstruction,
             lens=read_lens(folder),
             reference_positions=dict(zip(names, centres, strict=True)),
             reference_axes=dict(zip(names, axes, strict=True)),
-            region=(mission.target.centre_W_m, REGION_SHARE * mission.target.radius_m),
+            region=(parts.target.centre_W_m, REGION_SHARE * parts.target.radius_m),
             progress=progress,
         )
         summary: dict[str, Any] = model.summary()
@@ -172,14 +183,14 @@ def reconstruct_trial(scenario: Scenario, mission: Mission, folder: Path, progre
         write_json(folder / "model.json", {"figures": {}, "failure": str(fault)})
 
 
-def texture_trial(mission: Mission, folder: Path, progress: Callable[..., None]) -> None:
+def texture_trial(parts: Parts, folder: Path, progress: Callable[..., None]) -> None:
     """Write the model in the photographs' colours (mesh.glb), for people; a mesh that no photograph sees gets none."""
-    bed_z_m = mission.target.bed_z_m
+    bed_z_m = parts.target.bed_z_m
     with suppress(StageError):
         write_textured(folder, folder / "images", folder / "mesh.glb", bed_z_m=bed_z_m, progress=progress)
 
 
-def evaluate_trial(mission: Mission, folder: Path) -> dict[str, Any]:
+def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
     """Judge flight and model against the truth; what could not be computed gets a reason."""
     gathering = Gathering()
     steps = pl.read_parquet(folder / "steps.parquet")
@@ -196,8 +207,8 @@ def evaluate_trial(mission: Mission, folder: Path) -> dict[str, Any]:
         try:
             score = evaluate_surface(
                 read_cloud(folder / "dense.ply").points_m,
-                mission.target.mesh,
-                crop=Crop(bed_z_m=mission.target.bed_z_m),
+                parts.target.mesh,
+                crop=Crop(bed_z_m=parts.target.bed_z_m),
                 camera_centres_W_m=photos.select("true_x_m", "true_y_m", "true_z_m").to_numpy(),
             )
             gathering.add({key: getattr(score, key) for key in (*_SURFACE_FIGURES, "success")})

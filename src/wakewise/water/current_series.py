@@ -7,6 +7,7 @@ import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -34,6 +35,7 @@ class CurrentSeries:
     name: str
     times_s: Array
     velocities_W_m_s: Array
+    uniform: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         freeze(self, times_s=(None,), velocities_W_m_s=(len(self.times_s), 3))

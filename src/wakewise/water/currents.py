@@ -9,16 +9,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
+from wakewise.interfaces import Current
 from wakewise.water.closure import PLAIN
-from wakewise.water.current_series import CurrentSeries
 from wakewise.water.faces import Room
 from wakewise.water.induction import impulse_velocity
-from wakewise.water.instant import Ambient
 
 _GRAVITY_M_S2 = 9.80665
 _ROW_SPACING = 0.6  # of sigma: a row of Gaussians this dense is smooth to 1e-6
@@ -30,6 +30,8 @@ class SteadyCurrent:
     """The same velocity, shape (3,), everywhere and always."""
 
     velocity_W_m_s: Array
+    steady: ClassVar[bool] = True
+    uniform: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         freeze(self, velocity_W_m_s=(3,))
@@ -95,6 +97,7 @@ class PumpJet:
     diameter_m: float
     bed_z_m: float
     reach_m: float
+    steady: ClassVar[bool] = True
     _row: tuple[Array, Array] = field(init=False, repr=False)
     _sources: tuple[Array, Array, Array] = field(init=False, repr=False)
 
@@ -193,22 +196,22 @@ class BackgroundTurbulence:
 class AmbientSum:
     """Several motions at once; none at all is still water."""
 
-    parts: tuple[Ambient, ...] = ()
+    parts: tuple[Current, ...] = ()
 
     @property
     def steady(self) -> bool:
         """Whether nothing in it changes with time."""
-        return all(isinstance(part, (SteadyCurrent, PumpJet)) for part in self.parts)
+        return all(getattr(part, "steady", False) for part in self.parts)
 
     @property
     def uniform(self) -> bool:
         """Whether it is the same everywhere."""
-        return all(isinstance(part, (SteadyCurrent, CurrentSeries)) for part in self.parts)
+        return all(getattr(part, "uniform", False) for part in self.parts)
 
     @property
     def end_s(self) -> float:
         """Last instant that it is known for; infinite without a series."""
-        return min((part.end_s for part in self.parts if isinstance(part, CurrentSeries)), default=math.inf)
+        return min((float(getattr(part, "end_s", math.inf)) for part in self.parts), default=math.inf)
 
     def velocity(self, points_W_m: Array, time_s: float) -> Array:
         """Velocity of the water, shape (n, 3)."""
@@ -219,5 +222,5 @@ class AmbientSum:
 
     def stirred_bed(self) -> Array:
         """Circles (x, y, radius), shape (n, 3), in which it sweeps the bed faster than it does elsewhere."""
-        circles = [part.stirred_bed() for part in self.parts if isinstance(part, PumpJet)]
+        circles = [part.stirred_bed() for part in self.parts if hasattr(part, "stirred_bed")]
         return np.concatenate([np.zeros((0, 3)), *circles])

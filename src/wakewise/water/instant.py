@@ -7,12 +7,12 @@ look at it at once. What takes long to prepare is prepared when first asked for.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from scipy.special import i0
 
 from wakewise.arrays import Array
+from wakewise.interfaces import Current
 from wakewise.water.bedjets import Rings, layer_speed
 from wakewise.water.bedjets_sums import LOG_WIDTH, REACH
 from wakewise.water.blockage import Blockage
@@ -21,14 +21,6 @@ from wakewise.water.clusters import ImpulseField, in_space
 from wakewise.water.faces import Room
 from wakewise.water.parcels import CENTRE_SPEED, Parcels, gusty_impulse_m4_s
 from wakewise.water.walljets import WallRows
-
-
-class Ambient(Protocol):
-    """The water's own motion, which no thruster made."""
-
-    def velocity(self, points_W_m: Array, time_s: float) -> Array:
-        """Velocity in m/s, shape (n, 3), at points, shape (n, 3), and a time after the start."""
-        ...
 
 
 class Instant:
@@ -46,7 +38,7 @@ class Instant:
     room : Room
     bed_z_m : float
         Infinite for none.
-    ambient : Ambient
+    ambient : Current
     body : Blockage or None
     gust_scale : float
         Of the parcels' turbulence; 0 for the mean flow.
@@ -61,7 +53,7 @@ class Instant:
         rows: WallRows,
         room: Room,
         bed_z_m: float,
-        ambient: Ambient,
+        ambient: Current,
         body: Blockage | None,
         gust_scale: float,
     ) -> None:

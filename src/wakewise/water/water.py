@@ -23,12 +23,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wakewise.arrays import Array
+from wakewise.interfaces import Current
 from wakewise.water.bedjets import STRIKE_HEIGHT, Rings, rings_from_strikes
 from wakewise.water.blockage import Blockage
 from wakewise.water.closure import PLAIN, Spreading, disk_share, first_sigma_m, travel
 from wakewise.water.drift import EMISSION_SPACING, drifted, due, gust_memory, slugs
 from wakewise.water.faces import Face, Room
-from wakewise.water.instant import Ambient, Instant
+from wakewise.water.instant import Instant
 from wakewise.water.meeting import Meetings
 from wakewise.water.parcels import GUST_PER_TURBULENCE, MERGE_SPACING, Parcels, merged, merged_across
 from wakewise.water.walljets import WallJets
@@ -75,7 +76,7 @@ class Water:
         Source of the turbulence.
     current_W_m_s : ndarray, shape (3,), or None
         Steady and uniform; instead of `ambient`.
-    ambient : Ambient or None
+    ambient : Current or None
         The water's own motion.
     half_size_m : tuple of two floats
         Walls at |x| and |y| of this; infinite for none.
@@ -99,7 +100,7 @@ class Water:
         bed_z_m: float,
         rng: np.random.Generator,
         current_W_m_s: Array | None = None,
-        ambient: Ambient | None = None,
+        ambient: Current | None = None,
         half_size_m: tuple[float, float] = (math.inf, math.inf),
         turbulence: float = 0.0,
         rest_speed_m_s: float = 1e-3,

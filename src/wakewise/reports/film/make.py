@@ -19,7 +19,7 @@ from wakewise.files import whole_file
 from wakewise.geometry import Pose
 from wakewise.imaging import PinholeCamera, SiltOptics
 from wakewise.interfaces import ScalarGrid, no_progress
-from wakewise.operation import Scenario, build_mission, build_scene, read_exposures, read_scenario
+from wakewise.operation import Scenario, read_exposures, read_scenario
 from wakewise.operation.recorder import ExposureRecord
 from wakewise.reports import figures
 from wakewise.reports.film.encode import check_film_name, film_writer
@@ -132,16 +132,16 @@ class _Film:
             return
         scenario = self.scenario
         progress(0, 1, "building the scene")
-        mission = build_mission(scenario)
+        parts = scenario.parts()
         exposures = self.folder / "exposures.npz"
         self._exposures = read_exposures(exposures) if exposures.is_file() else []
         camera = PinholeCamera(*self.page.main_size, FOV_RAD * self.page.main_size[0] / 852.0)
         first = min((shot.time_s for shot in self.trial.photographs), default=0.0)
         flown = self.motion.p_W_m[self.motion.row(first) :]
-        X_WC = vantage(camera, mission.target.centre_W_m, flown, 0.5 * float(np.linalg.norm(mission.vehicle.size_m)))
+        X_WC = vantage(camera, parts.target.centre_W_m, flown, 0.5 * float(np.linalg.norm(parts.vehicle.size_m)))
         grains = SiltOptics(diameter_m=scenario.tank.grain_m, density_kg_m3=scenario.tank.grain_density_kg_m3)
-        scene = build_scene(scenario, mission.target)
-        self._outside = Outside.build(scene, camera, X_WC, hull_of(mission.vehicle), scenario.imaging.lights(), grains)
+        scene = parts.scene
+        self._outside = Outside.build(scene, camera, X_WC, hull_of(parts.vehicle), scenario.imaging.lights(), grains)
         self._tracers = wash_of(scenario, self.folder / "steps.parquet", self.times_s, wash, progress)
 
     def frame(self, k: int) -> NDArray[np.uint8]:

@@ -22,7 +22,7 @@ from wakewise.files import whole_file
 from wakewise.geometry import Pose
 from wakewise.imaging import PinholeCamera, SiltOptics, photograph
 from wakewise.interfaces import no_progress
-from wakewise.operation import Scenario, build_mission, build_scene, read_exposures, read_scenario
+from wakewise.operation import Scenario, read_exposures, read_scenario
 from wakewise.reports.film.hull import hull_of
 from wakewise.reports.film.layout import cover
 from wakewise.reports.film.make import silt_at
@@ -112,8 +112,8 @@ def cells_of(folder: Path, times_s: Sequence[float]) -> list[Cell]:
     if instants.max() > motion.time_s[-1]:
         left = motion.time_s[-1] - first_s
         raise InputError(f"--at: {max(times_s):g} s, {folder.name} flew for {left:.0f} s after its first photograph")
-    mission = build_mission(scenario)
-    scene = build_scene(scenario, mission.target)
+    parts = scenario.parts()
+    scene = parts.scene
     exposures = read_exposures(folder / "exposures.npz")
     grains = SiltOptics(diameter_m=scenario.tank.grain_m, density_kg_m3=scenario.tank.grain_density_kg_m3)
     order = np.argsort(instants, kind="stable")
@@ -123,8 +123,8 @@ def cells_of(folder: Path, times_s: Sequence[float]) -> list[Cell]:
     wash = {int(k): one for k, one in zip(order, tracers, strict=True)}
     flown = motion.p_W_m[motion.row(first_s) : motion.row(float(instants.max()) + 5.0)]
     far = PinholeCamera(*CELL, FOV_RAD)
-    X_WO = vantage(far, mission.target.centre_W_m, flown, 0.5 * float(np.linalg.norm(mission.vehicle.size_m)))
-    outside = Outside.build(scene, far, X_WO, hull_of(mission.vehicle), scenario.imaging.lights(), grains)
+    X_WO = vantage(far, parts.target.centre_W_m, flown, 0.5 * float(np.linalg.norm(parts.vehicle.size_m)))
+    outside = Outside.build(scene, far, X_WO, hull_of(parts.vehicle), scenario.imaging.lights(), grains)
     speed, turbidity = trial.column("target_speed_mean_m_s"), trial.column("turbidity_per_m")
     out = []
     for k, time_s in enumerate(instants):
@@ -132,7 +132,7 @@ def cells_of(folder: Path, times_s: Sequence[float]) -> list[Cell]:
         X_WB, silt = Pose(motion.p_W_m[row], motion.q_WB[row]), silt_at(exposures, float(time_s))
         rng = np.random.default_rng([scenario.seed, k])
         photo = photograph(
-            scene, scenario.imaging.camera(), [X_WB @ mission.vehicle.X_BC], silt, scenario.imaging, rng, grains
+            scene, scenario.imaging.camera(), [X_WB @ parts.vehicle.X_BC], silt, scenario.imaging, rng, grains
         )
         facts = [] if photo.sharpness is None else [f"sharpness {number(photo.sharpness)}"]
         facts += [] if turbidity is None else [f"silt {number(float(turbidity[row]), 2)} /m"]

@@ -20,7 +20,8 @@ from wakewise.errors import InputError
 from wakewise.files import whole_file
 from wakewise.geometry import matrix_from_quat
 from wakewise.interfaces import no_progress
-from wakewise.operation import Scenario, build_flight, build_mission
+from wakewise.operation import Scenario
+from wakewise.operation.worlds import tank_world
 from wakewise.water import Water
 
 STEP_S = 0.04
@@ -103,10 +104,10 @@ def wash_of(
     if found is not None:
         return found
     motion = Motion.of(pl.read_parquet(steps_path))
-    flight = build_flight(scenario, build_mission(scenario))
-    mounts = flight.true_vehicle.thruster_positions_B_m, flight.true_vehicle.thruster_axes_B
-    disks = np.sqrt(flight.true_vehicle.disk_areas_m2 / np.pi)
-    out = replay(flight.tank.water, motion, mounts, disks, np.asarray(times_s, np.float64), progress)
+    tank = tank_world(scenario.parts()).tank()
+    mounts = tank.vehicle.thruster_positions_B_m, tank.vehicle.thruster_axes_B
+    disks = np.sqrt(tank.vehicle.disk_areas_m2 / np.pi)
+    out = replay(tank.water, motion, mounts, disks, np.asarray(times_s, np.float64), progress)
     _write(kept, key, out)
     return out
 

@@ -1,10 +1,10 @@
 """What each method does to the target's water, in the tank and in the paper's own world, and what each lever is worth.
 
 Every method flies the same vehicle, the same unknown trim (drawn per seed, +-1 N), sensors, estimator and mission: a
-hover on an orbit of 40 deg and an arc of one of 20 deg, both legs and the way between them in one figure, over a silty
-bed in the default current. Seed k is the same draw for all methods, so flights are compared in pairs; intervals are
-95 % of a bootstrap over pairs. Flow `parcels` is the tank's own water; flow `paper` is circular (`paper_world`) and
-says so.
+hover on an orbit of 40 deg and an arc of one of 20 deg, both legs and the way between them in one figure, over a
+silty bed in the default current. Seed k is the same draw for all methods, so flights are compared in pairs; intervals
+are 95 % of a bootstrap over pairs. Flow `parcels` is the tank's own water; flow `paper` is circular
+(`wakewise.operation.instant_water`) and says so.
 
 How long, and how many. A jet of 0.1 N needs 5 s to a target 0.7 m away, and its remains drift there with 3 cm/s in 15
 to 20 s, so a flight needs settling and hover of 23 s and an arc of 15 s to show what a method does; 43 s it is. Methods

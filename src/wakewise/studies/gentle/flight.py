@@ -15,11 +15,10 @@ from wakewise.evaluation import flight_figures
 from wakewise.geometry import Pose, matrix_from_quat
 from wakewise.missions import SETTLING, Leg, Route
 from wakewise.missions.route import rest_to_rest
-from wakewise.operation import FlightRecorder, Mission, fly
-from wakewise.operation.build import Seeds, build_flight, build_target
+from wakewise.operation import Parts, fly
 from wakewise.operation.scenario import Scenario, check_scenario
-from wakewise.studies.paper_world import PaperWorld
-from wakewise.targets import sample_region
+from wakewise.operation.seeds import Seeds
+from wakewise.targets import find_target, sample_region
 from wakewise.vehicles import load_vehicle
 from wakewise.wake import WakeSettings, WakeView, disturbance, wake_model
 
@@ -98,7 +97,9 @@ def scenario_of(trial: Trial) -> Scenario:
         for parent in parents:
             branch = branch.setdefault(parent, {})
         branch[leaf] = value
-    return check_scenario({"method": trial.method, "seed": trial.seed, "control": control}, "gentle bench")
+    world = "tank" if trial.world == "parcels" else trial.world
+    told = {"method": trial.method, "seed": trial.seed, "world": world, "control": control}
+    return check_scenario(told, "gentle bench")
 
 
 def gentle_route(centre_W_m: Any, standoff_m: float, azimuth_rad: float, direction: float = 1.0) -> Route:
@@ -140,21 +141,21 @@ def gentle_route(centre_W_m: Any, standoff_m: float, azimuth_rad: float, directi
 def paper_place(bed_z_m: float) -> tuple[Any, Any]:
     """Target and region; the same for all seeds, since the region is the controller's own choice of points."""
     scenario = Scenario()
-    target = build_target(scenario.target, bed_z_m)
-    return target, sample_region(target, scenario.target.points, Seeds.of(0).region)
+    target = find_target(scenario.target.kind, bed_z_m)
+    return target, sample_region(target, scenario.target.points, Seeds(0).region())
 
 
-def true_disturbance(frame: pl.DataFrame, mission: Mission, world: World, rate_hz: float) -> float:
+def true_disturbance(frame: pl.DataFrame, parts: Parts, world: World, rate_hz: float) -> float:
     """Mean of D in (m/s)^2 of the true thrusts at the true poses, by the model believed in that world.
 
     The same yardstick for all methods, whatever each of them weighs itself; looked at five times a second.
     """
     wake = wake_model(WakeSettings(**WAKE_OF[world]))
-    view = WakeView.of(mission.vehicle, mission.region, wake)
+    view = WakeView.of(parts.vehicle, parts.region, wake)
     rows = frame.gather_every(round(0.2 * rate_hz))
     places = rows.select("true_x_m", "true_y_m", "true_z_m").to_numpy()
     turns = rows.select("true_qw", "true_qx", "true_qy", "true_qz").to_numpy()
-    thrusts = rows.select(f"thrust_{i + 1}_N" for i in range(len(mission.vehicle.thrusters))).to_numpy()
+    thrusts = rows.select(f"thrust_{i + 1}_N" for i in range(len(parts.vehicle.thrusters))).to_numpy()
     steps = zip(places, turns, thrusts, strict=True)
     return float(np.mean([disturbance(view.gram(Pose(p, q)), T) for p, q, T in steps]))
 
@@ -183,50 +184,20 @@ def fly_trial(trial: Trial) -> dict[str, float | None]:
     # The wind rose of the current is not round: each seed hovers at its own azimuth.
     azimuth = float(np.random.default_rng([trial.seed, 7]).uniform(-np.pi, np.pi))
     direction = helped_by(scenario.tank.current_m_s, azimuth) if trial.with_current else 1.0
-    mission = Mission(
+    parts = scenario.parts().replace(
         vehicle=ballasted(load_vehicle(scenario.vehicle), trial.float_N, trial.shift_mm),
         target=target,
         region=region,
         route=gentle_route(target.centre_W_m, trial.standoff_m, azimuth, direction),
-        clearance_m=0.0,
     )
-    flight = build_flight(scenario, mission)
-    plant: Any = flight.tank
-    witness: Any = flight.witness
-    if trial.world == "paper":
-        plant = witness = PaperWorld(
-            flight.true_vehicle, target, scenario.tank, flight.tank.state, np.random.default_rng([trial.seed, 11])
-        )
-    dt_s, n = 1.0 / scenario.control.rate_hz, len(mission.vehicle.thrusters)
-    recorder = FlightRecorder(
-        route=mission.route,
-        X_BC=mission.vehicle.X_BC,
-        exposure_s=scenario.imaging.exposure_s,
-        instants=1,
-        thrusters=n,
-        dt_s=dt_s,
-        witness=witness,
-        water_every_s=WATER_EVERY_S,
-    )
-    fly(
-        pilot=flight.pilot,
-        controller=flight.controller,
-        estimator=flight.estimator,
-        plant=plant,
-        witness=witness,
-        start=flight.start,
-        thrusters=n,
-        duration_s=mission.route.duration_s,
-        dt_s=dt_s,
-        record=recorder,
-    )
-    frame = recorder.frame().filter(pl.col("leg") != SETTLING)
+    # The arc passes the target at the mission's own standoff, which the mission's check has seen.
+    frame = fly(parts, checked=False, water_every_s=WATER_EVERY_S).steps.filter(pl.col("leg") != SETTLING)
     figures: dict[str, Any] = flight_figures(frame)
     out = {key: figures.get(key) for key in FIGURES}
-    out["disturbance"] = true_disturbance(frame, mission, trial.world, scenario.control.rate_hz)
+    out["disturbance"] = true_disturbance(frame, parts, trial.world, scenario.control.rate_hz)
     for leg in ("hover", "orbit"):
         speed = frame.filter(pl.col("leg") == leg)["target_speed_mean_m_s"].mean()
         out[f"{leg}_speed_mean_m_s"] = float(speed)  # type: ignore[arg-type]
-    out["camera_rmse_mm"] = camera_rmse_mm(frame, mission.vehicle.X_BC)
+    out["camera_rmse_mm"] = camera_rmse_mm(frame, parts.vehicle.X_BC)
     out["cpu_s"] = time.process_time() - began
     return out

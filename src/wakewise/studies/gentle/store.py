@@ -29,7 +29,6 @@ FLIES = (
     "operation",
     "planning",
     "studies/gentle",
-    "studies/paper_world.py",
     "tank",
     "targets",
     "thrusters",

@@ -1,0 +1,209 @@
+"""What a flight is built from: parts, each made from the scenario when first asked for, each replaceable.
+
+Here, and nowhere below, the controller's world and the true one are made side by side: the world gets its own,
+perturbed vehicle parameters and its own water; the controller gets the nominal vehicle and a wake model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from wakewise.control import make_controller
+from wakewise.estimation import ErrorStateFilter
+from wakewise.importers import any_vehicle
+from wakewise.interfaces import BodyState, Controller, Estimator, Pilot, WakeModel, World
+from wakewise.missions import Route, TankBounds, plan_route
+from wakewise.operation.foreign import described, from_outside, guarded
+from wakewise.operation.pilots import make_pilot
+from wakewise.operation.preflight import Preflight, preflight
+from wakewise.operation.seeds import Seeds
+from wakewise.operation.surroundings import surroundings_of, tank_bounds
+from wakewise.operation.worlds import make_world
+from wakewise.planning import Surroundings
+from wakewise.targets import Region, Target, delicacy, find_target, sample_region
+from wakewise.vehicles import Vehicle
+from wakewise.wake import wake_model
+
+if TYPE_CHECKING:
+    from wakewise.imaging import LensCamera, PinholeCamera, Scene
+    from wakewise.operation.scenario import Scenario
+
+T = TypeVar("T")
+
+
+class part(cached_property[T]):  # noqa: N801  (a decorator, like cached_property)
+    """A part that is made when first asked for, unless another one was given in its place."""
+
+    def __get__(self, instance: Any, owner: type | None = None) -> Any:
+        """The part that was given, or the scenario's own, made once."""
+        if instance is None or self.attrname not in instance.given:
+            return super().__get__(instance, owner)
+        return instance.given[self.attrname]
+
+
+class Parts:
+    """The parts of one flight: what its scenario says, with what was put in its place.
+
+    Parts are made when they are first asked for (no planner is compiled to look at the water), from the scenario and
+    from each other: another vehicle is also what the controller is made for and what the tank perturbs.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    given : mapping
+        Names of parts and what stands in their place; see `replace`.
+
+    Examples
+    --------
+    >>> import wakewise as ww
+    >>> parts = ww.Scenario.preset("quick").parts()
+    >>> parts.vehicle.name, parts.target.name, round(parts.route.duration_s)
+    ('paper', 'branching', 123)
+    >>> parts.replace(vehicle=ww.load_vehicle("bluerov2-heavy")).controller.name
+    'wake-aware'
+    """
+
+    def __init__(self, scenario: Scenario, given: Mapping[str, Any] | None = None) -> None:
+        self.scenario = scenario
+        self.given: Mapping[str, Any] = MappingProxyType(dict(given or {}))
+
+    def replace(self, **given: Any) -> Parts:
+        """The same parts with others in place of some; what depends on them is made anew.
+
+        Parameters
+        ----------
+        **given
+            `vehicle`, `target`, `region`, `route`, `start`, `pilot`, `wake`, `controller`, `estimator`, `world`,
+            `surroundings`; or `scenario`, and fields of the scenario by their first name such as `method="dp"` or
+            `seed=3`.
+
+        Raises
+        ------
+        InputError
+            If there is no such part or field.
+        """
+        scenario = given.pop("scenario", self.scenario)
+        fields = {name: given.pop(name) for name in list(given) if name not in PARTS}
+        if fields:
+            scenario = scenario.replace(**fields)
+        kept = {name: value for name, value in self.given.items() if name not in _MADE_BY.get("method", ())}
+        return Parts(scenario, {**(kept if "method" in fields else self.given), **given})
+
+    @property
+    def replaced(self) -> dict[str, str]:
+        """What was put in place of the scenario's own parts, in words, by name."""
+        return {name: described(value) for name, value in self.given.items()}
+
+    @cached_property
+    def from_outside(self) -> dict[str, str]:
+        """Parts that are not this package's own, by name, in words; scenario, report and comparison name them."""
+        return from_outside(self)
+
+    @property
+    def method(self) -> str:
+        """What the flight is called in tables: the scenario's method, or the name of the controller given."""
+        return str(self.controller.name) if "controller" in self.given else self.scenario.method
+
+    @cached_property
+    def seeds(self) -> Seeds:
+        """Random streams of the trial, one for each use."""
+        return Seeds(self.scenario.seed)
+
+    @part
+    def vehicle(self) -> Vehicle:
+        """The vehicle as it is believed to be."""
+        return any_vehicle(self.scenario.vehicle)
+
+    @part
+    def target(self) -> Target:
+        """What is looked at, standing on the bed."""
+        settings = self.scenario.target
+        return find_target(settings.kind, self.scenario.tank.size_m[2], settings.seed, settings.size_m)
+
+    @part
+    def region(self) -> Region:
+        """Points that stand for the water round the target."""
+        settings = self.scenario.target
+        gain = settings.delicate_gain
+        marks = delicacy(self.target.mesh) if gain > 0.0 else None
+        return sample_region(self.target, settings.points, self.seeds.region(), marks, gain)
+
+    @part
+    def route(self) -> Route:
+        """Where the camera is wished to be, when, and when the shutter opens."""
+        return plan_route(self.target.centre_W_m, self.scenario.mission)
+
+    @part
+    def pilot(self) -> Pilot:
+        """Where goals come from: by default the route, by the clock."""
+        return make_pilot(self)
+
+    @part
+    def wake(self) -> WakeModel:
+        """What the controller believes its jets do."""
+        return wake_model(self.scenario.control.wake, self.scenario.tank.size_m[2])
+
+    @part
+    def surroundings(self) -> Surroundings:
+        """What a planner keeps clear of."""
+        return surroundings_of(self.scenario, self.target)
+
+    @part
+    def controller(self) -> Controller[Any]:
+        """From an estimate and a goal to thrusts."""
+        return make_controller(
+            self.scenario.method, self.vehicle, self.region, self.wake, self.scenario.control, self.surroundings
+        )
+
+    @part
+    def estimator(self) -> Estimator[Any]:
+        """From measurements to an estimate."""
+        return ErrorStateFilter(self.vehicle, self.scenario.estimation)
+
+    @part
+    def world(self) -> World:
+        """Plant and witness: where the vehicle really flies."""
+        return make_world(self)
+
+    @property
+    def bounds(self) -> TankBounds:
+        """The water that the vehicle may be in."""
+        return tank_bounds(self.scenario)
+
+    @part
+    def start(self) -> BodyState:
+        """Where the mission begins, which is all that the estimator is told."""
+        return self.route.body(0.0, self.vehicle.X_BC)
+
+    @cached_property
+    def preflight(self) -> Preflight:
+        """What was found when the parts were held against each other; raises InputError where they do not fit."""
+        return preflight(self)
+
+    @cached_property
+    def flying(self) -> Controller[Any]:
+        """The controller as it is flown: one from outside has a guard round it."""
+        return guarded(self)
+
+    @cached_property
+    def camera(self) -> PinholeCamera | LensCamera:
+        """The camera of the scenario."""
+        return self.scenario.imaging.camera()
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The target on its bed, textured, as the camera finds it."""
+        from wakewise.imaging import Panels, Scene
+
+        length, width, _ = self.scenario.tank.size_m
+        return Scene.build(self.target, self.scenario.target.seed, panels=Panels.over_tank(length, width))
+
+
+PARTS: tuple[str, ...] = tuple(name for name, value in vars(Parts).items() if isinstance(value, part))
+"""Names of the parts that can be replaced."""
+
+_MADE_BY = {"method": ("controller",)}
+"""Parts that give way when this field of the scenario is replaced."""

@@ -1,0 +1,95 @@
+"""What is checked before a flight: parts that do not fit each other, the water, or the mission are refused here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from wakewise.errors import InputError
+from wakewise.missions import check_clearance
+from wakewise.operation.surroundings import surroundings_of
+from wakewise.planning import check_start, state_of
+from wakewise.tank import Holding, build_ambient, holding
+from wakewise.tank.fitting import check_fit
+
+if TYPE_CHECKING:
+    from wakewise.operation.parts import Parts
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Preflight:
+    """What was found: the least clearance of the hull along the route, and the current that must be held."""
+
+    clearance_m: float
+    holding: Holding | None
+
+
+def preflight(parts: Parts) -> Preflight:
+    """Hold vehicle, route, target and water of a flight against each other.
+
+    Raises
+    ------
+    InputError
+        An orbit that would touch something, a start from which no plan can be good, a current faster than the vehicle
+        can hold, failures or a cable that do not fit; what and where is named.
+    """
+    scenario, vehicle, route = parts.scenario, parts.vehicle, parts.route
+    clearance_m = check_clearance(
+        route,
+        vehicle.X_BC,
+        vehicle.size_m,
+        parts.bounds,
+        parts.target.mesh.vertices_m,
+        scenario.mission.clearance_m,
+    )
+    check_way(parts)
+    times_s = np.linspace(0.0, route.duration_s, 400)
+    check_fit(scenario.tank, vehicle, [(float(t), route.body(float(t), vehicle.X_BC).X_WB) for t in times_s])
+    return Preflight(clearance_m=clearance_m, holding=check_current(parts))
+
+
+def check_way(parts: Parts) -> None:
+    """Refuse a start from which no plan can be good, and a route through a stated obstacle.
+
+    How near the route comes to the target itself is for `wakewise.missions.check_clearance`, which knows its mesh.
+
+    Raises
+    ------
+    InputError
+        See `wakewise.planning.check_start`; what is touched, and when, is named.
+    """
+    around = surroundings_of(parts.scenario)
+    check_start(parts.vehicle, parts.region, state_of(parts.start), around)
+    if parts.scenario.control.obstacles:
+        for time_s in np.arange(0.0, parts.route.duration_s, 0.25):
+            state = state_of(parts.route.body(float(time_s), parts.vehicle.X_BC))
+            check_start(parts.vehicle, parts.region, state, around, what=f"mission at {time_s:.0f} s")
+
+
+def check_current(parts: Parts, looks: int = 200) -> Holding | None:
+    """Hold the water that passes the vehicle along its route against what its thrusters can give.
+
+    Raises
+    ------
+    InputError
+        If it cannot stay on the route, with the figures, or the current's series is shorter than the flight.
+    """
+    tank, vehicle, route = parts.scenario.tank, parts.vehicle, parts.route
+    # The draw of the tank's own current: the turbulence looked at is the one that is flown in.
+    ambient = build_ambient(tank, parts.seeds.tank().spawn(5)[4])
+    if ambient.end_s < route.duration_s:
+        raise InputError(
+            f"tank.current_file: {ambient.end_s:.0f} s of series are left, the flight takes {route.duration_s:.0f} s"
+        )
+    passing = []
+    for time_s in np.linspace(0.0, route.duration_s, looks):
+        wished = route.body(float(time_s), vehicle.X_BC)
+        current = ambient.velocity(wished.X_WB.p_m[None], float(time_s))[0]
+        passing.append(current @ wished.X_WB.R - wished.nu_B[:3])
+    trim_N = tank.trim_range_N if tank.trim_N is None else tank.trim_N
+    found = holding(vehicle, np.array(passing), tank.density_kg_m3, trim_N)
+    if found is not None and found.share < 1.0:
+        raise InputError(f"tank: {vehicle.name} cannot hold its route, {found.said()}")
+    return found

@@ -1,0 +1,40 @@
+"""The random streams of a trial."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Seeds:
+    """One random stream for each part of a trial, so that a change in one leaves the draws of the others alone.
+
+    Each call gives a fresh generator at the beginning of its stream.
+    """
+
+    seed: int
+
+    def plant(self) -> np.random.Generator:
+        """How the true vehicle differs from the believed one."""
+        return self._child(0)
+
+    def tank(self) -> np.random.Generator:
+        """Water, silt and sensors."""
+        return self._child(1)
+
+    def region(self) -> np.random.Generator:
+        """Points that stand for the target's water."""
+        return self._child(2)
+
+    def start(self) -> np.random.Generator:
+        """Where the vehicle really is when the mission begins."""
+        return self._child(3)
+
+    def imaging(self) -> np.random.Generator:
+        """Noise of the photographs."""
+        return self._child(4)
+
+    def _child(self, k: int) -> np.random.Generator:
+        return np.random.default_rng(self.seed).spawn(5)[k]

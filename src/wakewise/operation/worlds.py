@@ -1,0 +1,90 @@
+"""Worlds by name: where a flight really takes place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from wakewise.geometry import Pose, quat_from_rotvec, quat_multiply
+from wakewise.interfaces import BodyState, World
+from wakewise.operation.instant_water import InstantWorld, Jets, free_jet_field, lattice_jets, paper_jets
+from wakewise.plugins import find
+from wakewise.tank import TankWorld
+from wakewise.vehicles import Vehicle, perturbed
+
+if TYPE_CHECKING:
+    from wakewise.operation.parts import Parts
+
+START_SPREAD_M, START_SPREAD_RAD = 0.02, 0.03
+"""How far the vehicle is from where the mission begins, one sigma per axis."""
+
+
+def true_vehicle(parts: Parts) -> Vehicle:
+    """What the world flies: the believed vehicle with the mismatch that the seed draws."""
+    tank, rng = parts.scenario.tank, parts.seeds.plant()
+    trim_N = tank.trim_N
+    if trim_N is None:
+        trim_N = float(rng.uniform(-tank.trim_range_N, tank.trim_range_N))
+    return perturbed(
+        parts.vehicle,
+        rng,
+        mass_pct=tank.mass_pct,
+        damping_pct=tank.damping_pct,
+        added_mass_pct=tank.added_mass_pct,
+        thrust_pct=tank.thrust_pct,
+        trim_N=trim_N,
+        water_density_kg_m3=tank.density_kg_m3,
+    )
+
+
+def true_start(parts: Parts) -> BodyState:
+    """Where the vehicle really is when the mission begins: near the start, not on it."""
+    X_WB, rng = parts.start.X_WB, parts.seeds.start()
+    turn = quat_from_rotvec(rng.normal(0.0, START_SPREAD_RAD, 3))
+    return BodyState(X_WB=Pose(X_WB.p_m + rng.normal(0.0, START_SPREAD_M, 3), quat_multiply(X_WB.q, turn)))
+
+
+def tank_world(parts: Parts) -> TankWorld:
+    """`tank`: water of parcels, walls, silt."""
+    return TankWorld(
+        vehicle=true_vehicle(parts),
+        target=parts.target,
+        settings=parts.scenario.tank,
+        start=true_start(parts),
+        draw=parts.seeds.tank,
+    )
+
+
+def _instant(name: str, jets: Callable[[float], Jets], parts: Parts) -> InstantWorld:
+    seed = parts.scenario.seed
+    return InstantWorld(
+        name=name,
+        jets=jets(parts.scenario.tank.density_kg_m3),
+        vehicle=true_vehicle(parts),
+        target=parts.target,
+        settings=parts.scenario.tank,
+        start=true_start(parts),
+        draw=lambda: np.random.default_rng([seed, 11]),
+    )
+
+
+WORLDS: dict[str, Callable[[Parts], World]] = {
+    "tank": tank_world,
+    "paper": partial(_instant, "paper", lambda _: paper_jets()),
+    "lattice": partial(_instant, "lattice", lambda density_kg_m3: lattice_jets(free_jet_field(), density_kg_m3)),
+}
+"""Our own worlds: what makes each from the parts of a flight."""
+
+
+def make_world(parts: Parts) -> World:
+    """The world that the scenario names, ours or one from outside.
+
+    Raises
+    ------
+    InputError
+        If there is no such world.
+    """
+    return find("world", parts.scenario.world, WORLDS).maker(parts)

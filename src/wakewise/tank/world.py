@@ -1,0 +1,67 @@
+"""The tank as a world that a flight can begin in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from wakewise.interfaces import BodyState, Plant, ScalarGrid, Truth, WaterTruth, Witness
+from wakewise.tank.settings import TankSettings
+from wakewise.tank.tank import Tank
+from wakewise.targets import Target
+from wakewise.vehicles import Vehicle
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TankWitness:
+    """Reads the truth from the simulated tank, for the record."""
+
+    tank: Tank
+
+    def observe(self) -> Truth:
+        """Vehicle, thrusters and collisions now."""
+        tank = self.tank
+        return Truth(state=tank.state, thrusts_N=tank.thrusts_N, power_W=tank.power_W, collision=tank.collision)
+
+    def water(self) -> WaterTruth:
+        """Water at the target now."""
+        return self.tank.measure()
+
+    def silt(self) -> ScalarGrid:
+        """Silt around the target now."""
+        return self.tank.concentration_grid()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TankWorld:
+    """A tank that begins alike each time; implements `wakewise.interfaces.World`.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        True parameters, known to nobody else.
+    target : Target
+    settings : TankSettings
+    start : BodyState
+        Where the vehicle really is when the flight begins.
+    draw : callable
+        Gives the generator of all draws, a fresh one of the same seed at each call.
+    """
+
+    vehicle: Vehicle
+    target: Target
+    settings: TankSettings
+    start: BodyState
+    draw: Callable[[], np.random.Generator]
+    name: str = "tank"
+
+    def tank(self) -> Tank:
+        """A fresh tank at its start, with all that it knows."""
+        return Tank(self.vehicle, self.target, self.settings, self.start, self.draw())
+
+    def begin(self) -> tuple[Plant, Witness | None]:
+        """A fresh tank at its start, as plant and witness."""
+        tank = self.tank()
+        return tank, TankWitness(tank=tank)
