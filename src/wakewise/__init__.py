@@ -1,5 +1,88 @@
-"""Wakewise: fly over-actuated underwater vehicles so gently that the target's water stays still."""
+"""Wakewise: fly over-actuated underwater vehicles so gently that the target's water stays still.
 
+Scenario, Parts, fly
+    Take a scenario or preset apart into vehicle, target, region, route, world, estimator and controller; put others in
+    their place; fly.
+trial, compare
+    Whole trials: photographs, model, report.
+allocate, disturbance
+    Thruster allocation of one wrench, and the disturbance D of thrusts at a pose.
+reconstruct, evaluate
+    Photographs to a model; a model against the truth.
+load_vehicle, load_target, wake_model, methods
+    Things by name or file.
+Pose, BodyState, Goal, Command
+    What an own controller is told and what it answers.
+
+Rooms below this page are imported when they are first asked for. SI units and radians; the world is north, east, down.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
 from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from wakewise.api import (
+        allocate,
+        compare,
+        disturbance,
+        evaluate,
+        load_target,
+        load_vehicle,
+        methods,
+        reconstruct,
+        trial,
+        wake_model,
+    )
+    from wakewise.geometry import Pose
+    from wakewise.interfaces import BodyState, Command, Goal
+    from wakewise.operation import Parts, Scenario, fly
+
+__all__ = [
+    "BodyState",
+    "Command",
+    "Goal",
+    "Parts",
+    "Pose",
+    "Scenario",
+    "allocate",
+    "compare",
+    "disturbance",
+    "evaluate",
+    "fly",
+    "load_target",
+    "load_vehicle",
+    "methods",
+    "reconstruct",
+    "trial",
+    "wake_model",
+]
 
 __version__ = version("wakewise")
+
+_ROOMS = {
+    "BodyState": "interfaces",
+    "Command": "interfaces",
+    "Goal": "interfaces",
+    "Pose": "geometry",
+    "Parts": "operation",
+    "Scenario": "operation",
+    "fly": "operation",
+}
+"""Where a name lives that is not in `wakewise.api`."""
+
+
+def __getattr__(name: str) -> Any:
+    """Fetch a name of this page from its room, which is imported now (PEP 562)."""
+    if name not in __all__:
+        raise AttributeError(f"module 'wakewise' has no attribute '{name}'")
+    found = getattr(import_module(f"wakewise.{_ROOMS.get(name, 'api')}"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    """Names of this page."""
+    return sorted([*globals(), *__all__])

@@ -1,20 +1,16 @@
 """Said before the flight: a current too fast to hold, a series too short for the flight."""
 
-import numpy as np
 import pytest
 
 from wakewise.errors import InputError
-from wakewise.missions import plan_route
 from wakewise.operation import load_scenario
-from wakewise.operation.build import check_current
+from wakewise.operation.preflight import check_current
 from wakewise.vehicles import load_vehicle
-
-CENTRE_W_M = np.array([0.0, 0.0, 1.4])
 
 
 def _check(vehicle="bluerov2-heavy", **tank):
     scenario = load_scenario("quick", None, {f"tank.{name}": value for name, value in tank.items()})
-    return check_current(scenario, load_vehicle(vehicle), plan_route(CENTRE_W_M, scenario.mission))
+    return check_current(scenario.parts().replace(vehicle=load_vehicle(vehicle)))
 
 
 def test_a_current_too_fast_is_refused_with_its_margin():

@@ -7,8 +7,8 @@ import pytest
 
 from wakewise.cli.main import run
 from wakewise.errors import InputError
-from wakewise.operation import build_flight, build_mission, load_scenario
-from wakewise.operation.build import build_surroundings, build_target
+from wakewise.operation import fly, load_scenario
+from wakewise.operation.surroundings import surroundings_of
 from wakewise.planning import Surroundings, check_start
 
 
@@ -69,11 +69,11 @@ def test_the_planner_knows_the_tank_and_the_target():
     scenario = load_scenario(
         "quick", None, {"control.obstacles": [[2.0, 0.0, 1.0, 0.1]], "control.levers.spare": False}
     )
-    flight = build_flight(scenario, build_mission(scenario))
-    table = flight.controller.model.table
+    parts = scenario.parts()
+    table = parts.controller.model.table
     assert table.planes.shape == (6, 4)
     assert table.spheres[0].tolist() == [2.0, 0.0, 1.0, 0.1]
-    vertices = flight.mission.target.mesh.vertices_m
+    vertices = parts.target.mesh.vertices_m
     inside = [np.linalg.norm(vertices - sphere[:3], axis=1) <= sphere[3] + 1e-9 for sphere in table.spheres[1:]]
     assert np.all(np.any(inside, axis=0))
 
@@ -81,21 +81,22 @@ def test_the_planner_knows_the_tank_and_the_target():
 def test_a_wide_target_is_covered_by_several_spheres():
     """Their radii stay near a sixth of a metre, so that the water beside a wide target is free."""
     scenario = load_scenario("quick", None, {})
-    target = build_target(scenario.target.model_copy(update={"kind": "plate"}), 1.5)
-    one = build_surroundings(scenario, target).spheres
+    target = scenario.replace(**{"target.kind": "plate"}).parts().target
+    one = surroundings_of(scenario, target).spheres
     assert len(one) >= 1 and one[:, 3].max() <= 0.2
 
 
 def test_a_flight_from_a_bad_start_is_refused_whoever_planned_it():
     """A mission that was made by hand is checked, too."""
     scenario = load_scenario("quick", None, {})
-    mission = build_mission(scenario)
-    start = mission.route.body(0.0, mission.vehicle.X_BC)
+    start = scenario.parts().start
     blocked = scenario.model_copy(
         update={"control": scenario.control.model_copy(update={"obstacles": ((*start.X_WB.p_m, 0.1),)})}
     )
     with pytest.raises(InputError, match=r"start: .*obstacle 1"):
-        build_flight(blocked, mission)
+        fly(blocked, duration_s=0.1)
+    with pytest.raises(InputError, match=r"start: .*obstacle 1"):
+        fly(blocked, duration_s=0.1, checked=False)
 
 
 def test_names_are_numbers_where_there_are_none():
@@ -103,6 +104,6 @@ def test_names_are_numbers_where_there_are_none():
     around = Surroundings(planes=np.array([[0.0, 0.0, -1.0, -1.5]]), spheres=np.array([[0.0, 0.0, 1.0, 0.2]]))
     assert (around.name(0), around.name(1)) == ("plane 1", "sphere 1")
     scenario = load_scenario("quick", None, {})
-    mission = build_mission(scenario)
+    parts = scenario.parts()
     with pytest.raises(InputError, match="finite"):
-        check_start(mission.vehicle, mission.region, np.full(13, np.nan), around)
+        check_start(parts.vehicle, parts.region, np.full(13, np.nan), around)

@@ -8,10 +8,11 @@ import polars as pl
 import pytest
 
 from wakewise.geometry import Pose, quat_from_matrix
-from wakewise.interfaces import BodyState, Command, Goal, Measurement, ScalarGrid
+from wakewise.interfaces import BodyState, Command, Goal, Measurement, ScalarGrid, Truth, WaterTruth
 from wakewise.missions import MissionSettings, RoutePilot, plan_route
 from wakewise.missions.orbit import R_FC
-from wakewise.operation import FlightRecorder, Truth, WaterTruth, fly, read_exposures, step_columns
+from wakewise.operation import FlightRecorder, read_exposures, step_columns
+from wakewise.operation.loop import run_loop
 
 ROUTE = plan_route(
     np.array([0.0, 0.0, 1.4]), MissionSettings(elevations_deg=(30,), views=(4,), speed_m_s=0.5, settle_s=1)
@@ -59,7 +60,7 @@ def flown(witnessed: bool = True) -> tuple[FlightRecorder, Perfect]:
     recorder = FlightRecorder(
         route=ROUTE, X_BC=X_BC, exposure_s=0.01, instants=3, thrusters=2, dt_s=DT_S, witness=witness
     )
-    fly(
+    run_loop(
         pilot=RoutePilot(route=ROUTE, X_BC=X_BC, exposure_s=0.01),
         controller=everything,  # type: ignore[arg-type]
         estimator=everything,  # type: ignore[arg-type]

@@ -9,14 +9,14 @@ import pytest
 FLIGHT = """
 import sys
 from pathlib import Path
-from wakewise.operation import build_mission, fly_mission, load_scenario
+from wakewise.operation import fly_trial, load_scenario
 short = {
     "mission.elevations_deg": [40], "mission.views": [3], "mission.speed_m_s": 0.5, "mission.acceleration_m_s2": 0.5,
     "mission.settle_s": 0.5, "mission.approach_m": 0.0, "tank.wave_amplitude_m": 0.01, "tank.background_m_s": 0.005,
     "tank.inflow_loss": True, "method": "dp",
 }
 scenario = load_scenario("quick", None, short)
-fly_mission(scenario, build_mission(scenario), Path(sys.argv[1]))
+fly_trial(scenario.parts(), Path(sys.argv[1]))
 """
 
 

@@ -23,7 +23,7 @@ from wakewise.errors import InputError
 from wakewise.geometry import Pose, look_at
 from wakewise.imaging import PinholeCamera
 from wakewise.interfaces import ScalarGrid
-from wakewise.operation import build_mission, load_scenario, write_scenario
+from wakewise.operation import load_scenario, write_scenario
 from wakewise.operation.recorder import ExposureRecord, write_exposures
 from wakewise.reports.film import compared_trials, make, write_film, write_rows
 from wakewise.reports.film.encode import film_writer
@@ -50,22 +50,22 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     changes = {"imaging.width": 160, "imaging.height": 120, "imaging.samples": 1, "target.kind": str(ball)}
     scenario = load_scenario("quick", None, changes)
     write_scenario(folder / "scenario.yaml", scenario, {})
-    mission = build_mission(scenario)
+    parts = scenario.parts()
     time_s = np.arange(0.0, 1.2, 0.02)
-    centre = mission.target.centre_W_m
+    centre = parts.target.centre_W_m
     place = centre + np.column_stack([-0.6 + 0.1 * time_s, 0.1 * time_s, np.full(len(time_s), -0.25)])
     turns = np.array([Pose.from_matrix(look_at(p, centre), p).q for p in place])
     columns = {"time_s": time_s}
     columns |= {f"true_{a}_m": place[:, i] for i, a in enumerate("xyz")}
     columns |= {f"true_q{a}": turns[:, i] for i, a in enumerate("wxyz")}
-    n = len(mission.vehicle.thrusters)
+    n = len(parts.vehicle.thrusters)
     columns |= {f"thrust_{i + 1}_N": np.full(len(time_s), 3.0 if i == 0 else 0.0) for i in range(n)}
     columns |= {"target_speed_mean_m_s": 0.01 * time_s, "turbidity_per_m": 0.1 * time_s}
     table = pl.DataFrame(columns).with_columns(leg=pl.Series(["orbit 20 deg"] * len(time_s)))
     table.write_parquet(folder / "steps.parquet")
     rows, exposures = [], []
     for k, row in enumerate((10, 40)):
-        X_WC = Pose(place[row], turns[row]) @ mission.vehicle.X_BC
+        X_WC = Pose(place[row], turns[row]) @ parts.vehicle.X_BC
         (folder / "images").mkdir(exist_ok=True)
         colour = (255, 0, 0) if k else (0, 0, 255)  # BGR: first red, then blue
         cv2.imwrite(str(folder / "images" / f"{k}.png"), np.full((120, 160, 3), colour, np.uint8))

@@ -8,13 +8,13 @@ import pytest
 from wakewise.errors import InputError, StageError
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState
+from wakewise.operation.instant_water import InstantWater, paper_jets
 from wakewise.reports.levers import draw_levers
 from wakewise.studies.gentle import bench as gentle
 from wakewise.studies.gentle.figures import change, flow_figures, reduction_pct
 from wakewise.studies.gentle.flight import FIGURES, Trial, gentle_route, helped_by, scenario_of
 from wakewise.studies.gentle.levers import GENTLE, PARTS, PLAIN, entries, method_trial, together
 from wakewise.studies.gentle.store import FlightStore, source_version, store_folder
-from wakewise.studies.paper_world import PaperWorld
 from wakewise.tank import TankSettings
 from wakewise.targets import coral, place_on_bed
 from wakewise.trials import BenchOptions
@@ -211,7 +211,7 @@ def test_the_papers_world_is_the_papers_model():
     target = place_on_bed("branching", coral("branching", 0), 1.5)
     settings = TankSettings(current_m_s=(0.0, 0.0, 0.0))
     start = BodyState(X_WB=Pose(np.array([0.0, 0.0, 0.9])))
-    world = PaperWorld(VEHICLE, target, settings, start, np.random.default_rng(0))
+    world = InstantWater(paper_jets(), VEHICLE, target, settings, start, np.random.default_rng(0))
     points = np.array([[0.09, 0.14, 1.2], [0.0, 0.0, 1.4]])
     assert np.all(world.speeds_m_s(points) == 0.0)
     thrusts = np.zeros(8)

@@ -8,7 +8,7 @@ import pytest
 from wakewise.evaluation import Crop
 from wakewise.evaluation.surface import sample_surface
 from wakewise.files import write_json
-from wakewise.operation import build_mission, load_scenario, write_scenario
+from wakewise.operation import load_scenario, write_scenario
 from wakewise.reconstruction import Cloud, write_cloud
 from wakewise.reconstruction.nerf import PROFILES
 from wakewise.studies import neural
@@ -33,11 +33,11 @@ def test_a_model_without_truth_has_no_score(tmp_path, monkeypatch):
 def test_points_of_a_trial_are_measured_against_the_truth(tmp_path, monkeypatch):
     """True points with 1 mm of noise score what they must; the region is the plan's; a missing dense cloud is said."""
     scenario = load_scenario("quick", None, {})
-    mission = build_mission(scenario)
+    parts = scenario.parts()
     write_scenario(tmp_path / "scenario.yaml", scenario, {})
     (tmp_path / "images.csv").write_text("name,true_x_m,true_y_m,true_z_m\na,0.5,0,1.2\nb,-0.5,0,1.2\nc,0,0.5,1.2\n")
     rng = np.random.default_rng(0)
-    surface = sample_surface(mission.target.mesh, Crop(bed_z_m=mission.target.bed_z_m), rng, 20_000)
+    surface = sample_surface(parts.target.mesh, Crop(bed_z_m=parts.target.bed_z_m), rng, 20_000)
     points = surface.points_m + 1e-3 * rng.normal(size=(len(surface.points_m), 1)) * surface.normals
     asked = {}
 
@@ -50,8 +50,8 @@ def test_points_of_a_trial_are_measured_against_the_truth(tmp_path, monkeypatch)
     assert neural.is_trial(tmp_path)
     out = tmp_path / "nerf"
     figures = neural.field_of_trial(tmp_path, tmp_path / "images", out, PROFILES["cpu"], **ALIKE)
-    np.testing.assert_allclose(asked["region"][0], mission.target.centre_W_m)
-    assert asked["region"][1] > mission.target.radius_m
+    np.testing.assert_allclose(asked["region"][0], parts.target.centre_W_m)
+    assert asked["region"][1] > parts.target.radius_m
     assert figures["rmse_mm"] == pytest.approx(1.0, abs=0.35)
     assert figures["completeness_pct"] > 95.0 and figures["success"] is True
     assert figures["dense_rmse_mm"] is None and figures["why"]["dense_rmse_mm"] == "the trial left no dense.ply"

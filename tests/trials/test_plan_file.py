@@ -4,7 +4,7 @@ import csv
 
 import pytest
 
-from wakewise.operation import build_mission, load_scenario
+from wakewise.operation import load_scenario
 from wakewise.trials.trial import write_plan
 
 
@@ -12,8 +12,8 @@ from wakewise.trials.trial import write_plan
 def test_planned_names_are_those_of_the_photographs(tmp_path, photo_format, suffix):
     """planned.csv lists 000, 001, ... with the suffix of the format that the scenario asks for."""
     scenario = load_scenario("quick", None, {"imaging.photo_format": photo_format})
-    mission = build_mission(scenario)
-    write_plan(scenario, mission, tmp_path)
+    parts = scenario.parts()
+    write_plan(parts, tmp_path)
     with (tmp_path / "planned.csv").open(encoding="utf-8") as file:
         names = [row["name"] for row in csv.DictReader(file)]
-    assert names == [f"{k:03d}{suffix}" for k in range(len(mission.route.exposure_names))]
+    assert names == [f"{k:03d}{suffix}" for k in range(len(parts.route.exposure_names))]

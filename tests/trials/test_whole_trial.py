@@ -8,8 +8,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from wakewise.operation import Scenario, build_mission, fly_mission, load_scenario
-from wakewise.operation.build import build_flight
+from wakewise.operation import Scenario, fly_trial, load_scenario
+from wakewise.operation.worlds import tank_world
 from wakewise.reports import write_report
 from wakewise.trials import run_trial
 from wakewise.wake import point_disturbance, wake_model
@@ -111,7 +111,7 @@ def test_the_same_seed_flies_the_same_flight_and_another_does_not(tmp_path: Path
         short = {"mission.elevations_deg": [40], "mission.views": [3], "mission.speed_m_s": 0.5}
         scenario = small(seed=seed, **short)
         (tmp_path / name).mkdir()
-        fly_mission(scenario, build_mission(scenario), tmp_path / name)
+        fly_trial(scenario.parts(), tmp_path / name)
         flown.append((tmp_path / name / "steps.parquet").read_bytes())
     assert flown[0] == flown[1]
     assert flown[0] != flown[2]
@@ -130,9 +130,8 @@ def test_the_report_of_a_real_trial_is_one_file_without_addresses(trial: tuple[P
 def test_the_controllers_water_is_not_the_tanks() -> None:
     """What the controller's wake model says of the target's water differs from what the tank's jets do there."""
     scenario = small()
-    mission = build_mission(scenario)
-    flight = build_flight(scenario, mission)
-    vehicle, tank = mission.vehicle, flight.tank
+    parts = scenario.parts()
+    vehicle, tank = parts.vehicle, tank_world(parts).tank()
     for _ in range(100):
         tank.step(np.array([0.0, 0, 0, 0, -3, -3, -3, -3]), 0.02)
     X_WB = tank.state.X_WB
@@ -146,8 +145,8 @@ def test_the_controllers_water_is_not_the_tanks() -> None:
     # One place of several may agree by chance: the true jets are turbulent, and each thruster has its own gain.
     apart = np.abs(np.sqrt(believed) - np.sqrt(real)) / np.sqrt(real)
     assert np.median(apart) > 0.02
-    assert flight.true_vehicle.mass_kg != vehicle.mass_kg
-    assert not np.allclose(flight.true_vehicle.thrust_gains, vehicle.thrust_gains)
+    assert tank.vehicle.mass_kg != vehicle.mass_kg
+    assert not np.allclose(tank.vehicle.thrust_gains, vehicle.thrust_gains)
 
 
 def test_the_table_of_a_flight_makes_sense(trial: tuple[Path, dict]) -> None:

@@ -85,6 +85,7 @@ def allocate(
 
     from wakewise import allocation, wake
     from wakewise.errors import InputError
+    from wakewise.targets import Region
     from wakewise.vehicles import load_vehicle
 
     chosen = load_vehicle(vehicle)
@@ -101,15 +102,8 @@ def allocate(
     dead = sorted({_thruster(name, chosen) for name in failed or []})
     lower[dead] = upper[dead] = 0.0
     layout = allocation.compile_layout(chosen.allocation_matrix, lower, upper)
-    G = wake.gram(
-        model,
-        places,
-        weights,
-        X_WB.apply(chosen.thruster_positions_B_m),
-        chosen.thruster_axes_B @ X_WB.R.T,
-        chosen.disk_areas_m2,
-        superposition,
-    )
+    region = Region(points_W_m=places, weights=weights, distance_m=np.zeros(len(places)))
+    G = wake.WakeView.of(chosen, region, model, superposition).gram(X_WB)
     cost = allocation.Weights(disturbance=1.0, effort=w_effort, previous=w_previous)
     wanted = np.array(wrench)
     gentle = allocation.gentle_allocation(layout, wanted, G, cost, before, priority, budget)

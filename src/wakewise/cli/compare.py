@@ -55,9 +55,9 @@ def compare(
     json: Json = False,
 ) -> None:
     """Fly the same mission with each method in the same water, and set the outcomes side by side."""
+    from wakewise import api
     from wakewise.operation import load_scenario
-    from wakewise.reports import write_comparison, write_report
-    from wakewise.trials import UNITS, compare_methods
+    from wakewise.trials import UNITS
 
     names = [name.strip() for name in methods.split(",") if name.strip()]
     if len(names) != len(set(names)) or not names:
@@ -65,12 +65,8 @@ def compare(
     changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size)
     scenarios = {name: load_scenario(preset, scenario, changes | {"method": name}) for name in names}
     folder = out or default_folder(scenarios[names[0]], "compare")
-    figures = compare_methods(scenarios, folder, Bars())
-    with Bars().stage("report") as progress:
-        for name in names:
-            write_report(folder / name)
-        report = write_comparison({name: folder / name for name in names}, folder)
-        progress(1, 1)
+    result = api.compare(scenarios, folder, Bars())
+    figures, report = result.figures, result.report
     if json:
         print_json(figures)
         return

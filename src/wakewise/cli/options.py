@@ -38,7 +38,8 @@ TargetSize = Annotated[
 
 def default_folder(scenario: Scenario, what: str) -> Path:
     """Folder of a trial that was given none: another target, method or seed goes elsewhere."""
-    return Path("runs") / f"{scenario.name}-{Path(scenario.target.kind).stem}-{what}-{scenario.seed}"
+    named = f"{scenario.name}-{Path(scenario.target.kind).stem}-{what}-{scenario.seed}"
+    return Path("runs") / named.replace(":", "-")
 
 
 def overrides(

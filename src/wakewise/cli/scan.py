@@ -22,7 +22,14 @@ from wakewise.cli.options import (
     overrides,
 )
 
-Method = Annotated[str | None, typer.Option("--method", help="dp or wake-aware.", show_default=False)]
+Method = Annotated[
+    str | None,
+    typer.Option(
+        "--method",
+        help="dp, pseudo-inverse, unaware, smooth, linear, instant, wake-aware, a plug-in, or package.module:make.",
+        show_default=False,
+    ),
+]
 
 _HEADLINES = (
     "success",
@@ -59,17 +66,14 @@ def scan(
 
     Stages that are done are skipped, so running the same command again continues where it stopped.
     """
+    from wakewise.api import trial
     from wakewise.operation import load_scenario
-    from wakewise.reports import write_report
-    from wakewise.trials import run_trial
 
     changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, method=method)
     resolved = load_scenario(preset, scenario, changes)
     folder = out or default_folder(resolved, resolved.method)
-    figures = run_trial(resolved, folder, Bars())
-    with Bars().stage("report") as progress:
-        report = write_report(folder)
-        progress(1, 1)
+    result = trial(resolved, folder, Bars())
+    figures, report = result.figures, result.report
     if json:
         print_json(figures)
         return

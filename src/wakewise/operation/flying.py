@@ -16,6 +16,7 @@ from wakewise.interfaces import Witness, no_progress
 from wakewise.missions import SETTLING
 from wakewise.operation.loop import Step, run_loop
 from wakewise.operation.parts import Parts
+from wakewise.operation.preflight import check_begin
 from wakewise.operation.recorder import FlightRecorder
 from wakewise.operation.scenario import Scenario
 from wakewise.operation.telemetry import write_mcap
@@ -47,7 +48,7 @@ class Flight:
         return {"method": self.parts.method, "seed": self.parts.scenario.seed, **flight_figures(frame)}
 
     def write(self, folder: Path) -> None:
-        """Write log.mcap, exposures.npz and timings.parquet; last steps.parquet, which says that the flight is whole."""
+        """Write log.mcap, exposures.npz, timings.parquet; last steps.parquet, which says that the flight is whole."""
         write_mcap(self.steps, folder / "log.mcap")
         self.recorder.write(folder)
 
@@ -99,6 +100,8 @@ def fly(
     scenario, vehicle, route = parts.scenario, parts.vehicle, parts.route
     if checked:
         _ = parts.preflight
+    else:
+        check_begin(parts)
     progress(0, 1, "compiling, about a minute the first time")
     plant, witness = parts.world.begin()
     dt_s, thrusters = 1.0 / scenario.control.rate_hz, len(vehicle.thrusters)

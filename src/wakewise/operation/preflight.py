@@ -60,12 +60,23 @@ def check_way(parts: Parts) -> None:
     InputError
         See `wakewise.planning.check_start`; what is touched, and when, is named.
     """
+    check_begin(parts)
     around = surroundings_of(parts.scenario)
-    check_start(parts.vehicle, parts.region, state_of(parts.start), around)
     if parts.scenario.control.obstacles:
         for time_s in np.arange(0.0, parts.route.duration_s, 0.25):
             state = state_of(parts.route.body(float(time_s), parts.vehicle.X_BC))
             check_start(parts.vehicle, parts.region, state, around, what=f"mission at {time_s:.0f} s")
+
+
+def check_begin(parts: Parts) -> None:
+    """Refuse a start from which no plan can be good; also of missions that were made by hand.
+
+    Raises
+    ------
+    InputError
+        See `wakewise.planning.check_start`.
+    """
+    check_start(parts.vehicle, parts.region, state_of(parts.start), surroundings_of(parts.scenario))
 
 
 def check_current(parts: Parts, looks: int = 200) -> Holding | None:

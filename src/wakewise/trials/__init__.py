@@ -7,6 +7,7 @@ figure with its unit and definition, `timing.py` how benches and studies measure
 """
 
 from wakewise.trials.metrics import DEFINITIONS, UNITS
+from wakewise.trials.stages import Quiet, Watch
 from wakewise.trials.timing import BenchOptions
 from wakewise.trials.trial import compare_methods, run_trial
 
@@ -14,6 +15,8 @@ __all__ = [
     "DEFINITIONS",
     "UNITS",
     "BenchOptions",
+    "Quiet",
+    "Watch",
     "compare_methods",
     "run_trial",
 ]

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from wakewise import __version__
 from wakewise.errors import InputError, StageError
 from wakewise.evaluation import Crop, evaluate_surface, flight_figures
 from wakewise.files import write_json, write_text
@@ -137,8 +136,8 @@ def claim(folder: Path, scenario: Scenario) -> None:
                 f"--out {folder}: holds another trial ({'; '.join(changed[:3])}); give another --out or remove it"
             )
         return
-    packages = ("numpy", "numba", "pycolmap", "opencv-python-headless", "embreex")
-    versions = {"wakewise": __version__, "python": platform.python_version()} | {p: version(p) for p in packages}
+    packages = ("wakewise", "numpy", "numba", "pycolmap", "opencv-python-headless", "embreex")
+    versions = {"python": platform.python_version()} | {name: version(name) for name in packages}
     write_scenario(path, scenario, versions)
 
 

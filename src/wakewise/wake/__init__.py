@@ -14,7 +14,7 @@ velocities.
 from wakewise.wake.cones import PaperJet, PowerJet
 from wakewise.wake.disturbance import disturbance, gram, incoherent, point_disturbance, split_roots
 from wakewise.wake.floor import FloorJet, bed_of, free_jet
-from wakewise.wake.gradients import disturbance_slopes, gauss_newton, gram_with_derivatives, smooth_roots
+from wakewise.wake.gradients import Superposition, disturbance_slopes, gauss_newton, gram_with_derivatives, smooth_roots
 from wakewise.wake.jets import AxialJet, GaussianJet, RoundJet
 from wakewise.wake.models import WakeSettings, model_names, wake_model
 from wakewise.wake.travel import arrival_time_s, arrival_times_s
@@ -27,6 +27,7 @@ __all__ = [
     "PaperJet",
     "PowerJet",
     "RoundJet",
+    "Superposition",
     "WakeSettings",
     "WakeView",
     "arrival_time_s",

@@ -135,6 +135,14 @@ def wake_model(which: str | WakeSettings, bed_z_m: float | None = None) -> Axial
     ------
     InputError
         If there is no such model, a number is out of its range, or a floor is asked for without a bed.
+
+    Examples
+    --------
+    >>> import numpy as np, wakewise as ww
+    >>> ahead = np.array([[0.5, 0.0, 0.0]])
+    >>> jet = ww.wake_model("jet").unit_velocity(ahead, np.zeros((1, 3)), np.array([[1.0, 0, 0]]), np.array([0.005]))
+    >>> jet.shape  # of one jet at one point, in m/s per square root of newton
+    (1, 1, 3)
     """
     if isinstance(which, str):
         if which not in _RECIPES:

@@ -14,7 +14,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import wakewise
 from wakewise.files import write_json
 
 FLIES = (
@@ -49,7 +48,7 @@ def store_folder() -> Path:
 @lru_cache(maxsize=1)
 def source_version() -> str:
     """Hash of the source that flies."""
-    root = Path(wakewise.__file__).parent
+    root = Path(__file__).parents[2]
     digest = hashlib.sha256()
     for part in FLIES:
         place = root / part
