@@ -21,6 +21,7 @@ from wakewise.evaluation import Crop, evaluate_surface, flight_figures
 from wakewise.experiments.metrics import Figures, Gathering, comparison
 from wakewise.experiments.stages import Ledger, Quiet, Watch
 from wakewise.experiments.textured import write_textured
+from wakewise.experiments.yardstick import add_yardsticks
 from wakewise.files import write_json, write_text
 from wakewise.geometry import matrix_from_quat
 from wakewise.missions import SETTLING
@@ -84,7 +85,11 @@ def run_trial(scenario: Scenario, folder: Path, watch: Watch | None = None) -> F
     stage("fly", "steps.parquet", lambda progress: fly_mission(scenario, mission, folder, progress))
     stage("photograph", "images.csv", lambda progress: photograph_flight(scenario, mission, folder, progress))
     stage("reconstruct", "model.json", lambda progress: reconstruct_trial(scenario, mission, folder, progress))
-    stage("evaluate", "score.json", lambda _: write_json(folder / "score.json", evaluate_trial(mission, folder)))
+    stage(
+        "evaluate",
+        "score.json",
+        lambda _: write_json(folder / "score.json", evaluate_trial(scenario, mission, folder)),
+    )
     figures = json.loads((folder / "score.json").read_text(encoding="utf-8"))
     gathering = Gathering(figures=figures["figures"], reasons=figures["reasons"])
     gathering.add({"method": scenario.method, "seed": scenario.seed})
@@ -179,11 +184,13 @@ def texture_trial(mission: Mission, folder: Path, progress: Callable[..., None])
         write_textured(folder, folder / "images", folder / "mesh.glb", bed_z_m=bed_z_m, progress=progress)
 
 
-def evaluate_trial(mission: Mission, folder: Path) -> dict[str, Any]:
+def evaluate_trial(scenario: Scenario, mission: Mission, folder: Path) -> dict[str, Any]:
     """Judge flight and model against the truth; what could not be computed gets a reason."""
     gathering = Gathering()
     steps = pl.read_parquet(folder / "steps.parquet")
-    gathering.add(flight_figures(steps.filter(pl.col("leg") != SETTLING)))
+    flown = steps.filter(pl.col("leg") != SETTLING)
+    gathering.add(flight_figures(flown))
+    add_yardsticks(gathering, scenario, mission, flown)
     solve_ms = pl.read_parquet(folder / "timings.parquet")["solve_ms"].to_numpy()[50:]
     gathering.add({"solve_ms_median": float(np.median(solve_ms)), "solve_ms_p99": float(np.percentile(solve_ms, 99))})
     photos = pl.read_csv(folder / "images.csv")
