@@ -76,4 +76,4 @@ def test_every_figure_says_which_side_is_better() -> None:
     """Unit, definition and direction stand in one place, for every key of metrics.json."""
     assert BETTER.keys() == UNITS.keys() == DEFINITIONS.keys()
     assert set(BETTER.values()) == {"less", "more", "none"}
-    assert (BETTER["bed_shear_p95_Pa"], BETTER["completeness_visible_1mm_pct"], BETTER["seed"]) == ("less", "more", "none")
+    assert (BETTER["bed_shear_p95_Pa"], BETTER["f_score"], BETTER["seed"]) == ("less", "more", "none")

@@ -61,7 +61,7 @@ _FIGURES: dict[str, tuple[str, str, Better]] = {
     "exposure_optical_depth": ("", "ray_optical_depth while the shutter is open", "less"),
     "disturbance": ("m2/s2", "D as the controller's wake model sees it, over the points that its method watches, mean "
                     "over time; methods that watch other points cannot be compared by it", "none"),
-    "disturbance_flown": ("m2/s2", "D of the commanded thrusts at the estimated poses by the wake model of the settings "
+    "disturbance_flown": ("m2/s2", "D of the commanded thrusts at the estimated poses, by the settings' wake model "
                           "over the target's own points whatever the method watches, mean over time; a model's "
                           "estimate, nothing measured", "less"),
     "disturbance_least_thrusts": ("m2/s2", "the same, had each of these wrenches been made with the least thrusts, as "

@@ -27,7 +27,7 @@ from wakewise.reports.page import (
 )
 from wakewise.reports.photos import contact_sheet
 from wakewise.reports.scene3d import CAMERA_RGB, HULL_RGB, PATH_RGB, PLANNED_RGB, scene_html
-from wakewise.reports.trial import Trial, find_setting, read_trial
+from wakewise.reports.trial import Trial, read_trial
 from wakewise.reports.views import SIDES, Frame, coverage_colours, draw_cloud, draw_surface
 from wakewise.reports.words import grouped, number, shown, unit, verdict
 
@@ -296,7 +296,7 @@ def _row(trial: Trial, key: str) -> str:
 
 
 def _again(trial: Trial) -> str:
-    versions = find_setting(trial.scenario, ("versions",))
+    versions = trial.scenario.get("versions")
     known = [f"{name} {value}" for name, value in versions.items()] if isinstance(versions, dict) else []
     # The scenario's first lines name, as comments, the versions that ran it.
     for line in trial.scenario_text.splitlines():

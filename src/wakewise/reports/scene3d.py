@@ -20,7 +20,7 @@ from wakewise.geometry import Pose, quat_multiply
 from wakewise.reports.errors import ModelErrors
 from wakewise.reports.ink import error_colours
 from wakewise.reports.looks import coloured_model
-from wakewise.reports.trial import Photograph, Surface, Trial, find_setting
+from wakewise.reports.trial import Photograph, Surface, Trial
 from wakewise.vehicles import Vehicle, load_vehicle
 
 # NED to ENU: swap x and y, turn z round; a half turn about the line between x and y.
@@ -85,8 +85,8 @@ def _aim(server: viser.ViserServer, trial: Trial) -> None:
 
 
 def _bed(server: viser.ViserServer, trial: Trial) -> None:
-    size = find_setting(trial.scenario, ("size_m",))
-    width, height = (float(size[1]), float(size[0])) if isinstance(size, list) and len(size) == 3 else (3.0, 3.0)
+    # North runs up the scene, so the tank's length is the grid's height.
+    height, width = (3.0, 3.0) if trial.settings is None else trial.settings.tank.size_m[:2]
     server.scene.add_grid(
         "/bed", width=width, height=height, plane="xy", cell_size=0.1, section_size=0.5, cell_thickness=0.6,
         cell_color=(214, 211, 200), section_color=(186, 181, 164), plane_color=(240, 236, 222), plane_opacity=0.9,
@@ -186,15 +186,12 @@ def _cameras(server: viser.ViserServer, trial: Trial) -> None:
 
 
 def _lens(trial: Trial) -> tuple[float, float]:
-    """Aspect ratio and vertical field of view in radians; 90 degrees across unless the scenario says otherwise."""
-    width = find_setting(trial.scenario, ("width", "width_px"))
-    height = find_setting(trial.scenario, ("height", "height_px"))
-    across = find_setting(trial.scenario, ("fov_rad",))
-    if across is None:
-        degrees = find_setting(trial.scenario, ("fov_deg", "field_of_view_deg"))
-        across = np.radians(float(degrees)) if isinstance(degrees, int | float) else np.pi / 2
-    aspect = float(width) / float(height) if width and height else 4 / 3
-    return aspect, float(2 * np.arctan(np.tan(float(across) / 2) / aspect))
+    """Aspect ratio and vertical field of view in radians; 90 degrees across and 4:3 where the scenario is not known."""
+    if trial.settings is None:
+        return 4 / 3, float(2 * np.arctan(3 / 4))
+    imaging = trial.settings.imaging
+    aspect = imaging.width / imaging.height
+    return aspect, float(2 * np.arctan(np.tan(np.radians(imaging.fov_deg) / 2) / aspect))
 
 
 def _thumbnail(shot: Photograph, width: int = 128) -> Array | None:
