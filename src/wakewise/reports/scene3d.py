@@ -22,6 +22,7 @@ from wakewise.reports.film.hull import hull_of
 from wakewise.reports.ink import error_colours
 from wakewise.reports.looks import coloured_model
 from wakewise.reports.trial import Photograph, Surface, Trial
+from wakewise.reports.views import OUTLOOK
 from wakewise.vehicles import Vehicle, load_vehicle
 
 # NED to ENU: swap x and y, turn z round; a half turn about the line between x and y.
@@ -36,8 +37,6 @@ FRUSTUM_M = 0.03
 FOV_RAD = float(np.radians(40.0))
 FILL = 1.0
 """Where a ball round the target would touch the edges of the picture at 1; targets are rarely balls."""
-OUTLOOK = np.array([0.62, -0.68, 0.39]) / np.linalg.norm([0.62, -0.68, 0.39])
-"""From where the scene is seen at first: the south-east, from above; unit vector, east, north, up."""
 
 PATH_RGB, CAMERA_RGB, PLANNED_RGB = (11, 114, 133), (217, 86, 43), (120, 135, 145)
 HULL_RGB, TRUTH_RGB = (247, 200, 89), (196, 200, 198)
@@ -85,7 +84,7 @@ def _aim(server: viser.ViserServer, trial: Trial) -> None:
     centre, reach = 0.5 * (low + high), max(0.5 * float(np.linalg.norm(high - low)), 0.02)
     distance = FILL * reach / np.sin(0.5 * FOV_RAD)
     server.initial_camera.look_at = tuple(centre)
-    server.initial_camera.position = tuple(centre + distance * OUTLOOK)
+    server.initial_camera.position = tuple(centre + distance * (R_UW @ OUTLOOK.axes[2]))
     server.initial_camera.up = (0.0, 0.0, 1.0)
     server.initial_camera.fov = FOV_RAD
     server.initial_camera.near = 0.005
@@ -229,7 +228,7 @@ def _fly(server: viser.ViserServer, trial: Trial, path: Array) -> str:
         poses = _body_poses(trial)
         if poses:
             hull = scene.add_frame("/vehicle", show_axes=False, visible=False)
-            _hull(server, _vehicle(trial))
+            _hull(server, vehicle_of(trial))
             start = poses[0]
             hull.position, hull.wxyz = upright(start.p_m, trial.bed_z_m), quat_multiply(Q_UW, start.q)
             serializer = server.get_scene_serializer()
@@ -250,7 +249,8 @@ def _body_poses(trial: Trial) -> list[Pose]:
     return [Pose(rows[i, :3], rows[i, 3:]) for i in pick]
 
 
-def _vehicle(trial: Trial) -> Vehicle | None:
+def vehicle_of(trial: Trial) -> Vehicle | None:
+    """Vehicle that the scenario names; None if it is not known here."""
     name = trial.scenario.get("vehicle")
     if not isinstance(name, str):
         return None
