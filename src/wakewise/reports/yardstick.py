@@ -57,7 +57,10 @@ def yardstick_html(trial: Trial) -> str:
     cards = "".join(_card(found) for found in yardsticks(trial))
     if not cards:
         return ""
-    lead = "What the water's speed at the target is to be held against."
+    lead = (
+        "What the wash at the target is to be held against. Wash is the water's speed beyond that of the same flow "
+        "without thrusters."
+    )
     return section("yardstick", "Is that calm?", lead, f'<div class="yardsticks">{cards}</div>')
 
 
@@ -67,8 +70,8 @@ def against_water(trial: Trial) -> Yardstick | None:
     if wash is None:
         return None
     said = f"{number(1e3 * wash)} mm/s"
-    still = f"Without thrusters this figure would be 0: the {said} are only what they add to the water's own motion."
-    bars = (Bar("this flight's wash", 1e3 * wash, said, own=True),)
+    still = f"Without thrusters this would be 0: the {said} are what they add to the water's own motion."
+    bars: tuple[Bar, ...] = (Bar("this flight's wash", 1e3 * wash, said, own=True),)
     if own is None:
         return Yardstick("Against still water", f"{said} of wash", None, still, bars)
     if own < 1e-4:
