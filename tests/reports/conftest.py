@@ -147,7 +147,7 @@ def make_trial(folder: Path, *, seed: int = 7, wash: float = 1.0, method: str = 
     scenario = {
         "seed": seed,
         "vehicle": "paper",
-        "control": {"method": method},
+        "method": method,
         "tank": {"silt": 0.02, "size_m": [6, 5, 1.5]},
         "versions": {"wakewise": "0.1.0"},
     }

@@ -1,5 +1,6 @@
 """The page of a vehicle: self-contained, complete, and safe against words from files."""
 
+import re
 from dataclasses import replace
 from html.parser import HTMLParser
 
@@ -74,3 +75,14 @@ def test_words_from_the_file_cannot_break_the_page() -> None:
     assert "<script" not in page
     assert "<td>evil" not in page
     assert evil in read(odd)
+
+
+def test_coloured_cells_have_a_legend_and_the_page_a_dark_side() -> None:
+    """Both ends of each colour scale are named, worse first; a lost axis has the full tint, a whole one none."""
+    page = vehicle_page(load_draft("paper"))
+    assert "0 %: the axis is lost" in page
+    assert "100 %: nothing is lost" in page
+    assert "prefers-color-scheme: dark" in page
+    for share, left in re.findall(r'class="cell lost" style="--share:([\d.]+)">(\d+)<', page):
+        assert float(share) == pytest.approx(1.0 - min(float(left), 100.0) / 100.0, abs=0.006)
+    assert 'class="cell lost"' in page

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import polars as pl
-from hypothesis import given
-from hypothesis import strategies as st
+import yaml
 
-from wakewise.reports.trial import find_setting, read_trial
+from wakewise.reports.trial import read_trial
 
 
 def test_a_whole_folder_is_read_whole(made_up: Path) -> None:
@@ -39,14 +38,45 @@ def test_columns_that_hold_nothing_are_absent(made_up: Path, tmp_path: Path) -> 
     assert trial.column("exposing") is not None
 
 
-def test_the_setting_nearest_to_the_root_is_found() -> None:
-    """A name deep in one branch does not hide the same name higher up."""
-    tree = {"a": {"b": {"seed": 1}}, "c": {"seed": 2}}
-    assert find_setting(tree, ("seed",)) == 2
-    assert find_setting(tree, ("none",)) is None
+def test_the_bed_is_the_tanks_however_large_the_target(made_up: Path, tmp_path: Path) -> None:
+    """A scenario whose target has a size_m of its own leaves the tank its size, in the bed's depth and in the scene."""
+    folder = rewritten(made_up, tmp_path, target={"kind": "brain", "size_m": 0.25}, tank={"size_m": [7, 4, 1.7]})
+    trial = read_trial(folder)
+    assert trial.bed_z_m == 1.7
+    assert trial.settings is not None
+    assert trial.settings.tank.size_m == (7.0, 4.0, 1.7)
 
 
-@given(st.recursive(st.none() | st.integers() | st.text(), lambda s: st.lists(s) | st.dictionaries(st.text(), s)))
-def test_any_tree_can_be_searched(tree: object) -> None:
-    """Searching never fails, whatever a YAML file holds."""
-    assert find_setting(tree, ("a name that is not there",)) is None
+def test_a_method_or_part_from_outside_is_named_and_hides_no_setting(made_up: Path, tmp_path: Path) -> None:
+    """Settings are read all the same; the package's own methods are not called foreign."""
+    assert read_trial(made_up).outside == ""
+    folder = rewritten(
+        made_up,
+        tmp_path,
+        method="mylab.steering:make",
+        replaced={"estimator": "mylab.Filter"},
+        tank={"size_m": [6, 5, 1.6]},
+    )
+    (folder / "metrics.json").unlink()
+    trial = read_trial(folder)
+    assert trial.method == "mylab.steering:make"
+    assert trial.outside == "controller from outside: mylab.steering:make; estimator replaced: mylab.Filter"
+    assert trial.bed_z_m == 1.6
+
+
+def test_settings_that_cannot_be_read_are_a_gap_not_a_guess(made_up: Path, tmp_path: Path) -> None:
+    """A scenario of another version leaves the settings out and says so; the bed is then the target's foot."""
+    trial = read_trial(rewritten(made_up, tmp_path, tank={"size_m": [6, 5]}))
+    assert trial.settings is None
+    assert "tank.size_m" in trial.missing["scenario.yaml"]
+    assert trial.truth is not None
+    assert trial.bed_z_m == trial.truth.vertices_m[:, 2].max()
+
+
+def rewritten(made_up: Path, tmp_path: Path, **changes: object) -> Path:
+    """A copy of the made-up trial with other settings."""
+    folder = tmp_path / "rewritten"
+    shutil.copytree(made_up, folder, ignore=shutil.ignore_patterns("images", "*.html"))
+    tree = yaml.safe_load((folder / "scenario.yaml").read_text())
+    (folder / "scenario.yaml").write_text(yaml.safe_dump(tree | changes, sort_keys=False))
+    return folder

@@ -9,11 +9,13 @@ from pathlib import Path
 import cv2
 
 from wakewise.errors import InputError
+from wakewise.experiments.metrics import BETTER
 from wakewise.files import write_text
 from wakewise.reports import figures
 from wakewise.reports.errors import ModelErrors, model_errors
 from wakewise.reports.ink import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, data_uri, error_colours
-from wakewise.reports.page import absence, error_scale, missing, panel, pictures, plot, section, whole_page
+from wakewise.reports.looks import coloured_model
+from wakewise.reports.page import absence, error_scale, fold, missing, panel, pictures, plot, section, whole_page
 from wakewise.reports.photos import embed
 from wakewise.reports.trial import Trial, read_trial
 from wakewise.reports.views import SIDES, Frame, coverage_colours, draw_cloud, draw_surface
@@ -24,17 +26,20 @@ PHOTO_WIDTH = 720
 VIEWPOINTS = 3
 ROWS = ("rows.png", "rows.jpg", "rows.webp")
 _PLAIN = 0.01  # a smaller difference, relative to the larger value, is none
-# Where less is better, where more is; for the rest a difference is neither.
-_LESS = (
-    "rmse_mm", "accuracy_median_mm", "accuracy_mean_mm", "accuracy_p90_mm", "completeness_mean_mm", "cameras_rmse_mm",
-    "reprojection_px", "target_speed_mean_m_s", "target_speed_p95_m_s", "exposure_speed_mean_m_s", "bed_speed_p95_m_s",
-    "turbidity_mean_per_m", "disturbance", "position_rmse_mm", "path_rmse_mm", "velocity_deviation_pct",
-    "roll_pitch_rms_deg", "energy_kJ", "sign_flips_per_s", "fallbacks", "collisions",
-)  # fmt: skip
-_MORE = (
-    "completeness_pct", "completeness_visible_pct", "completeness_1mm_pct", "completeness_2mm_pct", "f_score",
-    "features_per_image", "inlier_matches", "registered_images",
-)  # fmt: skip
+# What a person asks of a scan: label, key, unit, factor to that unit.
+MAIN = (
+    ("wash at the target", "target_speed_mean_m_s", "mm/s", 1e3),
+    ("wash while the shutter is open", "exposure_speed_mean_m_s", "mm/s", 1e3),
+    ("wash at the bed, strongest twentieth", "bed_speed_p95_m_s", "mm/s", 1e3),
+    ("silt in the water, by attenuation", "turbidity_mean_per_m", "1/m", 1.0),
+    ("model's error (RMSE)", "rmse_mm", "mm", 1.0),
+    ("surface covered within 3 mm", "completeness_pct", "%", 1.0),
+    ("photographs placed", "registered_images", "", 1.0),
+    ("distance from the wished place, rms", "position_rmse_mm", "mm", 1.0),
+    ("energy of the thrusters", "energy_kJ", "kJ", 1.0),
+    ("D at the target, the wake model's estimate", "disturbance_flown", "m²/s²", 1.0),
+)
+_SAME_BY_NATURE = ("seed", "rmse_cap_mm")  # a ratio of these says nothing
 
 
 def write_comparison(trials: Mapping[str, Path], out: Path) -> Path:
@@ -64,18 +69,18 @@ def comparison_page(trials: Mapping[str, Trial], rows: Path | None = None) -> st
     """HTML of the comparison; `rows` is a picture with a row per method, as `wakewise film --rows` makes it."""
     errors = {name: model_errors(trial) for name, trial in trials.items()}
     parts = (
-        ("figures", "Figures"),
-        ("water", "Water"),
-        ("seen", "Seen"),
+        ("main", "Main figures"),
         ("model", "Models"),
+        ("seen", "Seen"),
+        ("water", "Water"),
+        ("figures", "All figures"),
     )
     links = "".join(f'<a href="#{anchor}">{title}</a>' for anchor, title in parts)
     body = (
         f'<header class="top">{_headline(trials)}</header>'
         f'<nav class="parts" aria-label="parts"><div>{links}</div></nav>'
-        f"<main>{_figures(trials)}{_water(trials)}{_rows(rows)}{_seen(trials)}{_models(trials, errors)}</main>"
-        "<footer>Ratios are to the first method. One trial per method is one draw: only many seeds say how large a "
-        "difference is. Made by Wakewise.</footer>"
+        f"<main>{_main(trials)}{_models(trials, errors)}{_rows(rows)}{_seen(trials)}{_water(trials)}{_figures(trials)}"
+        "</main><footer>Ratios are to the first method. Made by Wakewise.</footer>"
     )
     return whole_page(f"{' and '.join(trials)} · Wakewise", body)
 
@@ -83,19 +88,82 @@ def comparison_page(trials: Mapping[str, Trial], rows: Path | None = None) -> st
 def _headline(trials: Mapping[str, Trial]) -> str:
     first, *others = trials
     seeds = {trial.seed for trial in trials.values()}
-    same = f"seed <b>{escape(seeds.pop())}</b>" if len(seeds) == 1 else "<b>different seeds</b>"
+    same = f"seed <b>{escape(next(iter(seeds)))}</b>" if len(seeds) == 1 else "<b>different seeds</b>"
     title = f"{first} against {' and '.join(others)}" if others else first
-    lines = []
-    for name in others:
-        ratio = _ratio(trials, name, "target_speed_mean_m_s")
-        if ratio is not None and abs(ratio - 1.0) <= _PLAIN:
-            lines.append(f"With {name} the water at the target moved as fast as with {first}.")
-        elif ratio is not None:
-            lines.append(f"With {name} the water at the target moved at {number(ratio)} times its speed with {first}.")
-    for name, trial in trials.items():
-        lines.append(f"{name}: {verdict(trial).headline}")
+    lines = [line for name in others if (line := _water_in_words(trials, name))]
+    top = lines.pop(0) if lines else title
+    lines += [line for name in others if (line := _odd_disturbance(trials, name))]
+    lines += [f"{name}: {verdict(trial).headline}" for name, trial in trials.items()]
+    lines += [f"{name}, {trial.outside}." for name, trial in trials.items() if trial.outside]
     said = "".join(f'<p class="why">{escape(line)}</p>' for line in lines)
-    return f'<p class="eyebrow"><span>comparison</span><span>{same}</span></p><h1>{escape(title)}</h1>{said}'
+    return (
+        f'<p class="eyebrow"><span>comparison</span><span>{escape(title)}</span><span>{same}</span></p>'
+        f"<h1>{escape(top)}</h1>{_one_draw(trials, seeds)}{said}"
+    )
+
+
+def _water_in_words(trials: Mapping[str, Trial], name: str) -> str:
+    first, ratio = next(iter(trials)), _ratio(trials, name, "target_speed_mean_m_s")
+    if ratio is None:
+        return ""
+    if abs(ratio - 1.0) <= _PLAIN:
+        return f"With {name} the water at the target moved as fast as with {first}."
+    return f"With {name} the water at the target moved at {number(ratio)} times its speed with {first}."
+
+
+def _one_draw(trials: Mapping[str, Trial], seeds: set[str]) -> str:
+    """One flight per method says nothing of how much the next ones would differ; the page says so before any figure."""
+    if len(trials) < 2:
+        return ""
+    where = f"from seed {next(iter(seeds))}" if len(seeds) == 1 else "from different seeds"
+    return (
+        f'<p class="caution"><b>One draw.</b> Each method flew once, {escape(where)}. Trim, noise and turbulence are '
+        "drawn anew with every seed, so a ratio here has no interval and claims nothing of other flights: only many "
+        "seeds say how large a difference is.</p>"
+    )
+
+
+def _odd_disturbance(trials: Mapping[str, Trial], name: str) -> str:
+    """Why D can be worse where the water is calmer; empty where it is not so."""
+    speed = _ratio(trials, name, "target_speed_mean_m_s")
+    for key in ("disturbance_flown", "disturbance"):
+        D = _ratio(trials, name, key)
+        if speed is not None and D is not None and speed < 1.0 - _PLAIN and D > 1.0 + _PLAIN:
+            return (
+                f"{key} of {name} is {number(D)} times as high although its water is calmer: D is no measurement but "
+                "the wake model's estimate of the jets"
+                + (", summed over the points that each method watches, which differ." if key == "disturbance" else ".")
+            )
+    return ""
+
+
+def _main(trials: Mapping[str, Trial]) -> str:
+    """The figures that a person asks for, under names that a person uses."""
+    rows = [row for entry in MAIN if (row := _main_row(trials, *entry))]
+    if not rows:
+        return section("main", "Main figures", "", missing("the main figures", "none recorded"))
+    lead = "The better value of a row is bold where it is better by more than 1 %."
+    table = (
+        f'<table class="main"><thead><tr><th></th>{_heads(trials)}</tr></thead><tbody>{"".join(rows)}</tbody></table>'
+    )
+    return section("main", "Main figures", lead, f'<div class="wide">{table}</div>')
+
+
+def _main_row(trials: Mapping[str, Trial], label: str, key: str, unit_name: str, scale: float) -> str:
+    known = {name: trial.metrics.number(key) for name, trial in trials.items()}
+    if all(value is None for value in known.values()):
+        return ""
+    texts = {name: None if value is None else number(scale * value) for name, value in known.items()}
+    name = f'{escape(label)} <span class="null">{escape(unit_name)}</span>'
+    return f"<tr><td>{name}</td>{_cells(trials, key, texts)}</tr>"
+
+
+def _heads(trials: Mapping[str, Trial]) -> str:
+    first = next(iter(trials))
+    return "".join(
+        f'<th class="num">{escape(name)}</th>' + ("" if name == first else '<th class="num">ratio</th>')
+        for name in trials
+    )
 
 
 def _ratio(trials: Mapping[str, Trial], name: str, key: str) -> float | None:
@@ -106,10 +174,6 @@ def _ratio(trials: Mapping[str, Trial], name: str, key: str) -> float | None:
 
 def _figures(trials: Mapping[str, Trial]) -> str:
     first = next(iter(trials))
-    heads = "".join(
-        f'<th class="num">{escape(name)}</th>' + ("" if name == first else '<th class="num">ratio</th>')
-        for name in trials
-    )
     tables = []
     keys: dict[str, list[str]] = {}
     for trial in trials.values():
@@ -118,36 +182,56 @@ def _figures(trials: Mapping[str, Trial]) -> str:
             known += [key for key in found if key not in known]
     for group, found in keys.items():
         rows = "".join(_row(trials, key) for key in found)
-        tables.append(
-            f'<table class="compare"><caption>{group}</caption><colgroup><col class="key"><col class="unit"></colgroup>'
-            f"<thead><tr><th>key</th><th>unit</th>{heads}</tr></thead>"
-            f"<tbody>{rows}</tbody></table>"
+        table = (
+            '<table class="compare"><colgroup><col class="key"><col class="unit"></colgroup>'
+            f"<thead><tr><th>key</th><th>unit</th>{_heads(trials)}</tr></thead><tbody>{rows}</tbody></table>"
         )
-    content = f'<div class="wide">{"".join(tables)}</div>' if tables else missing("the figures", "none recorded")
-    lead = f"Ratios are to {escape(first)}. The better value of a row is bold where it is better by more than 1 %."
-    return section("figures", "The figures", lead, content)
+        tables.append(fold(group, f'<div class="wide">{table}</div>', f"{len(found)} figures"))
+    content = "".join(tables) or missing("the figures", "none recorded")
+    lead = f"Everything in metrics.json. Ratios are to {escape(first)}; bold is better by more than 1 %."
+    return section("figures", "All figures", lead, content)
 
 
 def _row(trials: Mapping[str, Trial], key: str) -> str:
-    known = {name: value for name, trial in trials.items() if (value := trial.metrics.number(key)) is not None}
-    best = None
-    values = list(known.values())
-    if values and max(values) - min(values) > _PLAIN * max(map(abs, values)) and key in _LESS + _MORE:
-        best = min(known.values()) if key in _LESS else max(known.values())
+    texts = {
+        name: None if (value := trial.metrics.values.get(key)) is None else shown(value)
+        for name, trial in trials.items()
+    }
+    units = next((u for trial in trials.values() if (u := unit(trial.metrics, key))), "")
+    cells = _cells(trials, key, texts)
+    return f'<tr><td class="key">{escape(key)}</td><td class="unit">{escape(units)}</td>{cells}</tr>'
+
+
+def _cells(trials: Mapping[str, Trial], key: str, texts: Mapping[str, str | None]) -> str:
+    """Value of each trial, given as text, and its ratio to the first's."""
+    best = _best(trials, key)
     cells = []
     for i, (name, trial) in enumerate(trials.items()):
-        value = trial.metrics.values.get(key)
-        text = escape(shown(value))
-        if value is None:
+        told = texts[name]
+        text = "" if told is None else escape(told)
+        if told is None:
             why = escape(str(trial.metrics.why.get(key, "not recorded")), quote=True)
             text = f'<span class="null" title="{why}">–</span>'
-        style = "num better" if best is not None and known.get(name) == best else "num"
-        cells.append(f'<td class="{style}">{text}</td>')
+        cells.append(f'<td class="{"num better" if name in best else "num"}">{text}</td>')
         if i:
-            ratio = None if key in ("seed", "rmse_cap_mm") else _ratio(trials, name, key)
+            ratio = None if key in _SAME_BY_NATURE else _ratio(trials, name, key)
             cells.append(f'<td class="num unit">{"" if ratio is None else "× " + number(ratio)}</td>')
-    units = next((u for trial in trials.values() if (u := unit(trial.metrics, key))), "")
-    return f'<tr><td class="key">{escape(key)}</td><td class="unit">{escape(units)}</td>{"".join(cells)}</tr>'
+    return "".join(cells)
+
+
+def _best(trials: Mapping[str, Trial], key: str) -> set[str]:
+    """Trials with the better value of a figure; empty where they are alike or neither side is better."""
+    side = BETTER.get(key, "none")
+    known: dict[str, float] = {}
+    for name, trial in trials.items():
+        value = trial.metrics.values.get(key)
+        if isinstance(value, int | float):  # success, which is yes or no, is one of them
+            known[name] = float(value)
+    values = list(known.values())
+    if side == "none" or not values or max(values) - min(values) <= _PLAIN * max(map(abs, values)):
+        return set()
+    best = min(values) if side == "less" else max(values)
+    return {name for name, value in known.items() if value == best}
 
 
 def _water(trials: Mapping[str, Trial]) -> str:
@@ -160,6 +244,7 @@ def _water(trials: Mapping[str, Trial]) -> str:
             "speed at the target of every method",
             "Both sides share the colours.",
             "no trial recorded the speed at the target",
+            narrow=figures.overlaid_speeds(dict(trials), narrow=True),
         ),
     )
 
@@ -236,6 +321,21 @@ def _models(trials: Mapping[str, Trial], errors: Mapping[str, ModelErrors | None
         "model",
         "The models",
         "Every model from the same sides, in the same colours.",
-        panel("Accuracy", "Reconstructions, coloured by distance to the true surface.", near, "".join(accuracy))
+        _in_colour(trials)
+        + panel("Accuracy", "Reconstructions, coloured by distance to the true surface.", near, "".join(accuracy))
         + panel("Completeness", "The true surface, coloured by distance to the model.", far, "".join(coverage)),
     )
+
+
+def _in_colour(trials: Mapping[str, Trial]) -> str:
+    """The models in the colours of their photographs, one row each; empty if none has any."""
+    rows = []
+    for name, trial in trials.items():
+        found = coloured_model(trial)
+        if found is not None:
+            surface, colours = found
+            drawn = draw_surface(surface, colours, SIDES, Frame.around(surface.vertices_m), VIEW_PIXELS)
+            rows.append(
+                f'<p class="sheet-leg">{escape(name)}</p>' + pictures(drawn, SIDES, f"model of {name} in colour")
+            )
+    return panel("Likeness", "The models in the colours of their photographs.", "", "".join(rows)) if rows else ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import cv2
 import numpy as np
@@ -33,7 +33,8 @@ from wakewise.reports.ink import (
 )
 from wakewise.reports.trial import Trial
 
-WIDTH_IN = 10.2
+WIDTH_IN, NARROW_IN = 10.2, 4.0
+"""Widths of a figure on a page and on a phone, where panels stand one below the other."""
 # Opaque at full thrust, clear at none, so that the strip sits on light and dark pages alike.
 _REVERSE, _FORWARD = (0.05, 0.42, 0.62), (0.85, 0.38, 0.12)
 _THRUSTS = LinearSegmentedColormap.from_list(
@@ -53,7 +54,7 @@ def legs(trial: Trial) -> Iterator[tuple[str, float, float]]:
         yield str(names[start]), float(time_s[start]), float(time_s[stop])
 
 
-def plan_and_side(trial: Trial) -> Figure | None:
+def plan_and_side(trial: Trial, narrow: bool = False) -> Figure | None:
     """The flight from above (east to the right) and from the side (height above the bed)."""
     path = trial.positions("true")
     path = path if np.isfinite(path).any() else trial.positions("est")
@@ -61,8 +62,10 @@ def plan_and_side(trial: Trial) -> Figure | None:
     cameras = [pose for pose in poses if pose is not None]
     if len(path) == 0 and not cameras:
         return None
-    figure = new_figure(WIDTH_IN, 5.0)
-    above, side = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
+    figure = new_figure(*((NARROW_IN, 7.0) if narrow else (WIDTH_IN, 5.0)))
+    above, side = figure.subplots(2, 1, height_ratios=(1.35, 1.0)) if narrow else figure.subplots(
+        1, 2, width_ratios=(1.0, 1.25)
+    )  # fmt: skip
     for axes, across, up, labels in (
         (above, 1, 0, ("east (m)", "north (m)")),
         (side, 1, 2, ("east (m)", "height above the bed (m)")),
@@ -97,8 +100,9 @@ def plan_and_side(trial: Trial) -> Figure | None:
     above.set_title("from above", loc="left", color=INK, fontsize=10.5)
     side.set_title("from the south", loc="left", color=INK, fontsize=10.5)
     handles, names = side.get_legend_handles_labels()
+    columns = 2 if narrow else 4
     figure.legend(
-        handles, names, loc="outside upper right", ncols=4, frameon=False, fontsize=9, labelcolor=MUTED,
+        handles, names, loc="outside upper right", ncols=columns, frameon=False, fontsize=9, labelcolor=MUTED,
     )  # fmt: skip
     return figure
 
@@ -113,7 +117,7 @@ def outlines(points: Array, faces: IntArray, pixels: int = 700) -> list[Array]:
     return [(line[:, 0] - 4.0) / pixels * span + low for line in found if len(line) > 2]
 
 
-def water_over_time(trial: Trial) -> Figure | None:
+def water_over_time(trial: Trial, narrow: bool = False) -> Figure | None:
     """Speeds at target and bed, disturbance, turbidity and position error, on one clock with the exposures."""
     time_s = trial.column("time_s")
     if time_s is None:
@@ -121,13 +125,14 @@ def water_over_time(trial: Trial) -> Figure | None:
     rows = list(_water_rows(trial))
     if not rows:
         return None
-    figure = new_figure(WIDTH_IN, 0.7 + 1.45 * len(rows))
+    figure = new_figure(NARROW_IN if narrow else WIDTH_IN, 0.7 + 1.45 * len(rows))
+    buckets = 200 if narrow else 900
     grid = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
     exposures = exposure_times(trial)
     for axes, (label, lines) in zip(grid, rows, strict=True):
         dress(axes, y=label)
         for (name, values, colour), width in zip(lines, (1.4, 1.1, 1.0), strict=False):
-            axes.plot(*thinned(time_s, values), color=colour, linewidth=width, label=name)
+            axes.plot(*thinned(time_s, values, buckets), color=colour, linewidth=width, label=name)
         top = max(float(np.nanmax(values)) for _, values, _ in lines)
         axes.set_ylim(0.0, 1.22 * top if top > 0 else 1.0)
         axes.vlines(exposures, 0.0, 0.06, transform=axes.get_xaxis_transform(), color=CORAL, linewidth=1.1)
@@ -173,7 +178,7 @@ def _water_rows(trial: Trial) -> Iterator[tuple[str, list[tuple[str, Array, str]
                 ),
             ),
             ("speed at the bed,\np95 (mm/s)", lines(("p95", trial.column("bed_speed_p95_m_s"), 1e3, SLATE))),
-            ("disturbance D\n(m²/s²)", lines(("D", trial.column("disturbance"), 1.0, VIOLET))),
+            ("D, by the wake\nmodel (m²/s²)", lines(("D", trial.column("disturbance"), 1.0, VIOLET))),
             ("turbidity (1/m)", lines(("turbidity", trial.column("turbidity_per_m"), 1.0, SLATE))),
             (
                 "position error\n(mm)",
@@ -201,28 +206,32 @@ def name_legs(axes: Axes, trial: Trial) -> None:
         return
     whole = max(spans[-1][2] - spans[0][1], 1e-9)
     for name, start, stop in spans:
-        if (stop - start) / whole > 0.011 * len(name):
+        if (stop - start) / whole > 0.11 / axes.figure.get_figwidth() * len(name):  # type: ignore[union-attr]
             axes.annotate(
                 name, (0.5 * (start + stop), 1.0), xycoords=("data", "axes fraction"), ha="center", va="bottom",
                 color=MUTED, fontsize=9, xytext=(0, 3), textcoords="offset points",
             )  # fmt: skip
 
 
-def thrust_strip(trial: Trial) -> Figure | None:
-    """Thrust of every thruster over time, one row each; forward and reverse in two colours."""
+def thrust_strip(trial: Trial, names_of: Sequence[str] = (), narrow: bool = False) -> Figure | None:
+    """Thrust of every thruster over time, one row each; forward and reverse in two colours.
+
+    `names_of` are the thrusters' names in their order, where the vehicle is known.
+    """
     time_s = trial.column("time_s")
     names = thrust_columns(trial)
     if trial.steps is None or time_s is None or not names:
         return None
     thrusts = trial.steps.select(names).to_numpy().astype(np.float64).T
-    buckets = min(1100, thrusts.shape[1])
+    buckets = min(400 if narrow else 1100, thrusts.shape[1])
     edges = np.linspace(0, thrusts.shape[1], buckets + 1).astype(int)
     shown = np.add.reduceat(np.nan_to_num(thrusts), edges[:-1], axis=1) / np.diff(edges)
     rms = np.sqrt(np.nanmean(thrusts**2, axis=1))
     limit = max(float(np.quantile(np.abs(shown), 0.995)), 1e-6)
-    figure = new_figure(WIDTH_IN, 0.8 + 0.3 * len(names))
-    strip, bars = figure.subplots(1, 2, width_ratios=(9.0, 1.0), sharey=True)
-    dress(strip, x="time (s)", y="thruster", grid="")
+    figure = new_figure(NARROW_IN if narrow else WIDTH_IN, 0.8 + 0.3 * len(names))
+    strip, bars = figure.subplots(1, 2, width_ratios=(4.0, 1.0) if narrow else (9.0, 1.0), sharey=True)
+    named = len(names_of) == len(names)
+    dress(strip, x="time (s)", y="" if named else "thruster", grid="")
     dress(bars, x="rms (N)", grid="x")
     image = strip.imshow(
         shown, aspect="auto", cmap=_THRUSTS, vmin=-limit, vmax=limit, interpolation="nearest",
@@ -230,12 +239,18 @@ def thrust_strip(trial: Trial) -> Figure | None:
     )  # fmt: skip
     for row in range(1, len(names)):
         strip.axhline(row + 0.5, color=CARD, linewidth=2)
-    strip.set_yticks(range(1, len(names) + 1))
+    labels = [f"{name} {i}" for i, name in enumerate(names_of, start=1)] if named else None
+    if narrow and labels is not None:
+        labels = [label.replace(" horizontal", " h.").replace(" vertical", " v.") for label in labels]
+    strip.set_yticks(range(1, len(names) + 1), labels)
     strip.set_ylim(len(names) + 0.5, 0.5)
     strip.vlines(exposure_times(trial), 0.0, -0.025, transform=strip.get_xaxis_transform(), color=CORAL, clip_on=False)
     bars.barh(range(1, len(names) + 1), rms, height=0.62, color=SLATE)
     bars.tick_params(axis="y", length=0)
-    bar = figure.colorbar(image, ax=bars, pad=0.12, aspect=18, extend="both")
+    if narrow:
+        bar = figure.colorbar(image, ax=[strip, bars], location="bottom", pad=0.02, aspect=30, extend="both")
+    else:
+        bar = figure.colorbar(image, ax=bars, pad=0.12, aspect=18, extend="both")
     bar.outline.set_visible(False)
     bar.ax.tick_params(colors=MUTED, labelsize=9, length=3)
     bar.set_label("thrust (N)", color=MUTED, fontsize=9.5)
@@ -252,10 +267,10 @@ def thrust_columns(trial: Trial) -> list[str]:
     return sorted((name for name in names if numbers[name].isdigit()), key=lambda name: int(numbers[name]))
 
 
-def error_histogram(errors: ModelErrors) -> Figure:
+def error_histogram(errors: ModelErrors, narrow: bool = False) -> Figure:
     """How many points of the model are how far from the truth, and how much of the truth is covered how nearly."""
-    figure = new_figure(WIDTH_IN, 3.3)
-    accuracy, coverage = figure.subplots(1, 2)
+    figure = new_figure(*((NARROW_IN, 5.6) if narrow else (WIDTH_IN, 3.3)))
+    accuracy, coverage = figure.subplots(*((2, 1) if narrow else (1, 2)))
     error_mm = 1e3 * errors.accuracy_m
     edges = np.linspace(0.0, 5.0, 51)
     shares = 100.0 * np.histogram(np.minimum(error_mm, 4.999), edges)[0] / len(error_mm)
@@ -289,7 +304,7 @@ def error_histogram(errors: ModelErrors) -> Figure:
     return figure
 
 
-def overlaid_speeds(trials: dict[str, Trial]) -> Figure | None:
+def overlaid_speeds(trials: dict[str, Trial], narrow: bool = False) -> Figure | None:
     """Mean water speed at the target of several trials on one clock, and how much of the time each was below what."""
     found = {
         name: (time_s, 1e3 * speed)
@@ -299,12 +314,12 @@ def overlaid_speeds(trials: dict[str, Trial]) -> Figure | None:
     }
     if not found:
         return None
-    figure = new_figure(WIDTH_IN, 3.6)
-    clock, shares = figure.subplots(1, 2, width_ratios=(2.4, 1.0))
-    dress(clock, x="time (s)", y="mean water speed at the target (mm/s)")
+    figure = new_figure(*((NARROW_IN, 5.8) if narrow else (WIDTH_IN, 3.6)))
+    clock, shares = figure.subplots(2, 1) if narrow else figure.subplots(1, 2, width_ratios=(2.4, 1.0))
+    dress(clock, x="time (s)", y="mean water speed at the target (mm/s)" if not narrow else "mean speed (mm/s)")
     dress(shares, x="water speed (mm/s)", y="share of the time below (%)", grid="both")
     for (name, (time_s, speed)), colour in zip(found.items(), SERIES * len(found), strict=False):
-        clock.plot(*thinned(time_s, speed), color=colour, linewidth=1.1, label=name)
+        clock.plot(*thinned(time_s, speed, 200 if narrow else 900), color=colour, linewidth=1.1, label=name)
         ordered = np.sort(speed[np.isfinite(speed)])
         pick = np.unique(np.linspace(0, len(ordered) - 1, 300).astype(int))
         shares.plot(ordered[pick], 100.0 * (pick + 1) / len(ordered), color=colour, linewidth=1.6, label=name)

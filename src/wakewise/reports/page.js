@@ -5,8 +5,16 @@
     const store = box.querySelector("script[type='application/json']");
     const frame = box.querySelector("iframe");
     if (!store || !frame) continue;
+    const stage = box.querySelector(".stage");
+    // The scene unpacks itself for seconds after it is loaded; until it draws, its place holds a picture.
+    const unveil = (tries) => {
+      const page = frame.contentDocument;
+      if ((page && page.querySelector("canvas")) || !tries) setTimeout(() => stage.classList.add("drawn"), 700);
+      else setTimeout(() => unveil(tries - 1), 200);
+    };
     const open = () => {
       frame.srcdoc = JSON.parse(store.textContent);
+      frame.addEventListener("load", () => unveil(150), { once: true });
       store.remove();
     };
     if (!("IntersectionObserver" in window)) { open(); continue; }
@@ -14,6 +22,11 @@
       if (seen.some((entry) => entry.isIntersecting)) { near.disconnect(); open(); }
     }, { rootMargin: "300px" });
     near.observe(box);
+  }
+
+  // A phone begins with the long parts folded, but for the first photographs.
+  if (matchMedia("screen and (max-width: 720px)").matches) {
+    document.querySelectorAll("details.fold").forEach((part, i) => { part.open = i === 0 && !!part.querySelector(".photo"); });
   }
 
   const loupe = document.getElementById("loupe");

@@ -29,11 +29,14 @@ def section(anchor: str, title: str, lead: str, content: str) -> str:
     return f'<section id="{anchor}"><h2>{escape(title)}</h2><p class="lead">{lead}</p>{content}</section>'
 
 
-def plot(figure: Figure | None, title: str, caption: str, absent: str = "") -> str:
-    """A figure with its caption, or a note why there is none."""
+def plot(figure: Figure | None, title: str, caption: str, absent: str = "", narrow: Figure | None = None) -> str:
+    """A figure with its caption, or a note why there is none; `narrow` is the same drawn for a phone."""
     if figure is None:
         return missing(title, absent or "nothing was recorded")
     svg = inline_svg(figure, escape(title, quote=True))
+    if narrow is not None:
+        small = inline_svg(narrow, escape(f"{title}, narrow", quote=True))
+        svg = f'<div class="wide-only">{svg}</div><div class="narrow-only">{small}</div>'
     return f'<figure class="plot">{svg}<figcaption>{caption}</figcaption></figure>'
 
 
@@ -85,14 +88,25 @@ def pictures(sources: Sequence[str], views: Sequence[View], what: str) -> str:
     ) + "</div>"  # fmt: skip
 
 
-def scene_box(html: str, legend: str) -> str:
-    """A 3D scene, itself a whole HTML page, in a frame that is filled when it comes into sight."""
+def scene_box(html: str, legend: str, poster: str = "") -> str:
+    """A 3D scene, itself a whole HTML page, in a frame that is filled when it comes into sight.
+
+    Until it has drawn itself, and where it cannot, `poster` stands in its place: an image as a data URI.
+    """
     # A JSON string without "<" cannot end the script that holds it.
     store = json.dumps(html, ensure_ascii=False).replace("<", "\\u003c")
+    still = f'<img alt="the model" src="{poster}">' if poster else ""
     return (
-        '<div class="scene"><iframe title="3D scene of the flight" allow="fullscreen"></iframe>'
+        f'<div class="scene"><div class="stage"><div class="poster">{still}<p>The 3D scene is loading …</p></div>'
+        '<iframe title="3D scene of the model and the flight" allow="fullscreen"></iframe></div>'
         f'<script type="application/json">{store}</script><div class="legend">{legend}</div></div>'
     )
+
+
+def fold(title: str, content: str, note: str = "") -> str:
+    """A part with a heading that can be folded; a phone folds it at first."""
+    aside = f"<span>{escape(note)}</span>" if note else ""
+    return f'<details class="fold" open><summary>{escape(title)}{aside}</summary>{content}</details>'
 
 
 def chip(colour: str, name: str) -> str:

@@ -8,6 +8,7 @@ from html import escape
 import cv2
 
 from wakewise.reports.ink import data_uri
+from wakewise.reports.page import fold
 from wakewise.reports.trial import Photograph, Trial
 from wakewise.reports.words import number
 
@@ -62,20 +63,18 @@ def contact_sheet(trial: Trial, leg_of: dict[int, str]) -> str:
     shots = trial.photographs
     width = embedded_width(len(shots))
     marked = extremes(shots)
-    parts: list[str] = []
-    leg: str | None = None
+    groups: list[tuple[str, list[str]]] = []
     for i, shot in enumerate(shots):
-        if not parts or leg_of.get(i, "") != leg:
-            leg = leg_of.get(i, "")
-            count = sum(leg_of.get(k, "") == leg for k in range(len(shots)))
-            parts.append("</div>" if parts else "")
-            if leg:
-                parts.append(
-                    f'<p class="sheet-leg">{escape(leg)}<span>{count} photograph{"s" if count > 1 else ""}</span></p>'
-                )
-            parts.append('<div class="sheet">')
-        parts.append(_photo(shot, i, marked, width))
-    return "".join(parts) + "</div>"
+        leg = leg_of.get(i, "")
+        if not groups or groups[-1][0] != leg:
+            groups.append((leg, []))
+        groups[-1][1].append(_photo(shot, i, marked, width))
+    parts = []
+    for leg, found in groups:
+        sheet = f'<div class="sheet">{"".join(found)}</div>'
+        count = f"{len(found)} photograph{'s' if len(found) > 1 else ''}"
+        parts.append(fold(leg, sheet, count) if leg else sheet)
+    return "".join(parts)
 
 
 def _turbidity(per_m: float) -> str:

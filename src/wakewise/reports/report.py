@@ -16,6 +16,7 @@ from wakewise.reports.page import (
     absence,
     chip,
     error_scale,
+    fold,
     missing,
     panel,
     pictures,
@@ -26,17 +27,19 @@ from wakewise.reports.page import (
     whole_page,
 )
 from wakewise.reports.photos import contact_sheet
-from wakewise.reports.scene3d import CAMERA_RGB, HULL_RGB, PATH_RGB, PLANNED_RGB, scene_html
-from wakewise.reports.trial import Trial, find_setting, read_trial
-from wakewise.reports.views import SIDES, Frame, coverage_colours, draw_cloud, draw_surface
+from wakewise.reports.scene3d import CAMERA_RGB, HULL_RGB, PATH_RGB, PLANNED_RGB, scene_html, vehicle_of
+from wakewise.reports.trial import Trial, read_trial
+from wakewise.reports.views import OUTLOOK, SIDES, Frame, coverage_colours, draw_cloud, draw_surface
 from wakewise.reports.words import grouped, number, shown, unit, verdict
+from wakewise.reports.yardstick import yardstick_html
 
 VIEW_PIXELS = 360
 PARTS = (
+    ("yardstick", "Yardstick"),
+    ("model", "Model"),
     ("flown", "Flown"),
     ("seen", "Seen"),
     ("water", "Water"),
-    ("model", "Model"),
     ("figures", "Figures"),
     ("again", "Reproduce"),
 )
@@ -61,25 +64,28 @@ def write_report(trial: Path) -> Path:
 def report_page(trial: Trial) -> str:
     """HTML of the whole report."""
     errors = model_errors(trial)
-    links = "".join(f'<a href="#{anchor}">{title}</a>' for anchor, title in PARTS)
+    calm = yardstick_html(trial)
+    parts = [part for part in PARTS if calm or part[0] != "yardstick"]
+    links = "".join(f'<a href="#{anchor}">{title}</a>' for anchor, title in parts)
     body = (
         f'<header class="top">{_headline(trial)}</header><nav class="parts" aria-label="parts"><div>{links}</div></nav>'
-        f"<main>{_flown(trial, errors)}{_seen(trial)}{_water(trial)}{_model(trial, errors)}{_figures(trial)}"
+        f"<main>{calm}{_model(trial, errors)}{_flown(trial)}{_seen(trial)}{_water(trial)}{_figures(trial)}"
         f"{_again(trial)}</main><footer>{_footer(trial)}</footer>"
     )
     return whole_page(f"{trial.name} · Wakewise", body)
 
 
 def _headline(trial: Trial) -> str:
-    said = verdict(trial)
+    said = verdict(trial, named=True)
     state = {True: "good", False: "bad", None: ""}[said.good]
     reasons = "".join(f'<p class="why">{escape(line)}</p>' for line in said.reasons)
     facts = [("trial", trial.name), ("method", trial.method), ("seed", trial.seed)]
     facts += [(key, str(trial.scenario[key])) for key in ("vehicle",) if trial.scenario.get(key)]
     eyebrow = "".join(f"<span>{name} <b>{escape(value)}</b></span>" for name, value in facts)
+    foreign = f'<p class="outside">{escape(_capital(trial.outside))}.</p>' if trial.outside else ""
     return (
         f'<p class="eyebrow">{eyebrow}</p><h1 class="{state}"><span class="mark"></span>{escape(said.headline)}</h1>'
-        f'{reasons}<dl class="tiles">{_tiles(trial)}</dl>'
+        f'{foreign}{reasons}<dl class="tiles">{_tiles(trial)}</dl>'
     )
 
 
@@ -89,13 +95,13 @@ def _tiles(trial: Trial) -> str:
     def one(name: str, key: str, unit_name: str, note: str, scale: float = 1.0, ok: bool | None = None) -> str:
         value = metrics.number(key)
         if value is None:
-            return tile(name, "–", "", metrics.why.get(key, "not recorded"))
+            return tile(name, "–", "", _short(metrics.why.get(key, "not recorded")))
         state = "" if ok is None else "ok" if ok else "off"
         return tile(name, number(scale * value), unit_name, note, state)
 
     rmse, covered = metrics.number("rmse_mm"), metrics.number("completeness_pct")
     registered, images = metrics.number("registered_images"), metrics.number("images")
-    photos = tile("photographs placed", "–", "", metrics.why.get("registered_images", "not recorded"))
+    photos = tile("photographs placed", "–", "", _short(metrics.why.get("registered_images", "not recorded")))
     if registered is not None:
         of = "" if images is None else f"of {images:.0f}"
         photos = tile("photographs placed", f"{registered:.0f}", of, "registered in the model")
@@ -112,11 +118,20 @@ def _tiles(trial: Trial) -> str:
         + photos
         + one(
             "water at the target", "target_speed_mean_m_s", "mm/s",
-            "mean speed" if during is None else f"mean; {number(1e3 * during)} while exposing", scale=1e3,
+            "wash, mean" if during is None else f"wash, mean; {number(1e3 * during)} while exposing", scale=1e3,
         )
         + one("position error", "position_rmse_mm", "mm", "rms, from where it was wished to be")
         + one("flight", "duration_s", "s", _energy(trial))
     )  # fmt: skip
+
+
+def _short(why: str) -> str:
+    """A reason for a tile: the header has said why there is no model."""
+    return "no model" if why.startswith("no model") else why
+
+
+def _capital(words: str) -> str:
+    return words[:1].upper() + words[1:]
 
 
 def _energy(trial: Trial) -> str:
@@ -124,7 +139,7 @@ def _energy(trial: Trial) -> str:
     return "duration" if energy is None else f"{number(energy)} kJ in the thrusters"
 
 
-def _flown(trial: Trial, errors: ModelErrors | None) -> str:
+def _flown(trial: Trial) -> str:
     legs = [name for name, _, _ in figures.legs(trial)]
     orbits = len({name for name in legs if name.startswith("orbit")})
     duration = trial.metrics.number("duration_s")
@@ -136,11 +151,26 @@ def _flown(trial: Trial, errors: ModelErrors | None) -> str:
             + ". "
             + lead
         )
-    lead += (
-        '<span class="on-screen"> Drag to turn, scroll to come closer, press play to fly again; the button at the '
-        "lower right hides parts.</span>"
+    return section(
+        "flown",
+        "What was flown",
+        lead,
+        film_html(trial)
+        + plot(
+            figures.plan_and_side(trial),
+            "flight from above and from the side",
+            "Arrows point where the camera looked; crosses are the planned viewpoints.",
+            absence(trial, "steps.parquet", "images.csv"),
+            narrow=figures.plan_and_side(trial, narrow=True),
+        ),
     )
+
+
+def _scene(trial: Trial, errors: ModelErrors | None, poster: str) -> str:
+    """The 3D scene, opened on the model, and what its layers are."""
     html = scene_html(trial, errors)
+    if html is None:
+        return missing("the 3D scene", absence(trial, "steps.parquet", "images.csv", "truth.ply"))
     legend = "".join(
         chip("rgb({},{},{})".format(*colour), name)
         for colour, name in (
@@ -151,23 +181,12 @@ def _flown(trial: Trial, errors: ModelErrors | None) -> str:
         )
     )
     if errors is not None:
-        legend = error_scale("model error (mm)") + legend
-    scene = missing("the 3D scene", absence(trial, "steps.parquet", "images.csv", "truth.ply"))
-    if html is not None:
-        scene = scene_box(html, legend)
-    return section(
-        "flown",
-        "What was flown",
-        lead,
-        film_html(trial)
-        + scene
-        + plot(
-            figures.plan_and_side(trial),
-            "flight from above and from the side",
-            "The same flight on paper. Arrows point where the camera looked; crosses are the planned viewpoints.",
-            absence(trial, "steps.parquet", "images.csv"),
-        ),
+        legend = error_scale("model by error (mm)") + legend
+    hint = (
+        '<span class="hint">Drag to turn, scroll to come closer. The button at the lower right switches layers on and '
+        "off: the model by its error, photographs, path, and the vehicle, which flies when you press play.</span>"
     )
+    return scene_box(html, hint + legend, poster)
 
 
 def _leg_of(trial: Trial, time_s: float) -> str:
@@ -193,6 +212,8 @@ def _seen(trial: Trial) -> str:
 def _water(trial: Trial) -> str:
     gap = absence(trial, "steps.parquet")
     exposures = len(figures.exposure_times(trial))
+    vehicle = vehicle_of(trial)
+    names = [] if vehicle is None else [thruster.name for thruster in vehicle.thrusters]
     ticks = f" Orange ticks mark the {exposures} exposures." if exposures else ""
     return section(
         "water",
@@ -201,23 +222,29 @@ def _water(trial: Trial) -> str:
         plot(
             figures.water_over_time(trial),
             "water and position over time",
-            f"Shading separates the legs.{ticks}",
+            f"Shading separates the legs.{ticks} D is no measurement: it is the controller's own wake model, asked how "
+            "fast the jets move the points that its method watches (weighted sum of squared speeds), and what its "
+            "method keeps low.",
             gap,
+            narrow=figures.water_over_time(trial, narrow=True),
         )
         + plot(
-            figures.thrust_strip(trial),
+            figures.thrust_strip(trial, names),
             "thrusts over time",
             "Orange pushes along the thruster's axis, blue against it; the stronger the colour, the harder. Bars: root "
             "mean square over the flight.",
             gap,
+            narrow=figures.thrust_strip(trial, names, narrow=True),
         ),
     )
 
 
 def _model(trial: Trial, errors: ModelErrors | None) -> str:
+    scene = _scene(trial, errors, _poster(trial, errors))
     if errors is None or trial.truth is None:
         why = absence(trial, "dense.ply", "truth.ply")
-        return section("model", "The model", "There is nothing to measure.", missing("the model's error", why))
+        gap = missing("the model's error", why)
+        return section("model", "The model", "There is nothing to measure.", scene + gap)
     frame = Frame.around(trial.truth.vertices_m[errors.counts])
     if errors.model is not None and errors.model_accuracy_m is not None:
         colours = error_colours(errors.model_accuracy_m)
@@ -233,7 +260,8 @@ def _model(trial: Trial, errors: ModelErrors | None) -> str:
         "The model",
         f"How far the reconstruction is from the true surface, {aligned}. What stands less than 10 mm above the bed "
         "does not count: sand touches it.",
-        _in_colour(trial)
+        scene
+        + _in_colour(trial)
         + panel(
             "Accuracy",
             "The reconstruction, coloured by its distance to the true surface.",
@@ -251,8 +279,21 @@ def _model(trial: Trial, errors: ModelErrors | None) -> str:
             "distribution of errors",
             f"From {number(len(errors.points_m))} points of the cloud, thinned to one per 0.8 mm. The last bar holds "
             "everything beyond.",
+            narrow=figures.error_histogram(errors, narrow=True),
         ),
     )
+
+
+def _poster(trial: Trial, errors: ModelErrors | None) -> str:
+    """The model as the 3D scene opens on it, for as long as the scene loads; empty where there is none."""
+    found = coloured_model(trial)
+    if found is None and errors is not None and errors.model is not None and errors.model_accuracy_m is not None:
+        found = errors.model, error_colours(errors.model_accuracy_m)
+    if found is None or trial.truth is None:
+        return ""
+    surface, colours = found
+    frame = Frame.around(trial.truth.vertices_m)
+    return draw_surface(surface, colours, (OUTLOOK,), frame, VIEW_PIXELS)[0]
 
 
 def _in_colour(trial: Trial) -> str:
@@ -271,24 +312,29 @@ def _figures(trial: Trial) -> str:
         gap = missing("the figures", absence(trial, "metrics.json"))
         return section("figures", "The figures", "No figures are on record.", gap)
     tables = []
+    told: set[str] = set()
     for group, keys in grouped(metrics).items():
-        rows = "".join(_row(trial, key) for key in keys)
-        tables.append(
-            f'<table class="figures"><caption>{group}</caption><colgroup><col class="key"><col class="val">'
-            '<col class="unit"><col></colgroup><thead><tr><th>key</th><th class="num">value</th><th>unit</th>'
-            f"<th>definition</th></tr></thead><tbody>{rows}</tbody></table>"
+        rows = "".join(_row(trial, key, told) for key in keys)
+        table = (
+            '<table class="figures"><colgroup><col class="key"><col class="val"><col class="unit"><col></colgroup>'
+            '<thead><tr><th>key</th><th class="num">value</th><th>unit</th><th>definition</th></tr></thead>'
+            f"<tbody>{rows}</tbody></table>"
         )
+        tables.append(fold(group, table, f"{len(keys)} figures"))
     lead = "Everything in metrics.json. A figure that could not be computed says why."
-    return section("figures", "The figures", lead, f'<div class="wide">{"".join(tables)}</div>')
+    return section("figures", "The figures", lead, "".join(tables))
 
 
-def _row(trial: Trial, key: str) -> str:
+def _row(trial: Trial, key: str, told: set[str]) -> str:
+    """One figure; `told` are the reasons that the rows above have given, which are not given again."""
     metrics = trial.metrics
     value, text = metrics.values[key], escape(str(metrics.definitions.get(key, "")))
     cell = '<span class="null">–</span>' if value is None else escape(shown(value))
     if value is None:
-        why = escape(str(metrics.why.get(key, "no reason was given")))
-        text = f'{text}{"<br>" if text else ""}<span class="why-null">not computed: {why}</span>'
+        why = str(metrics.why.get(key, "no reason was given"))
+        said = "not computed, for the reason above" if why in told else f"not computed: {why}"
+        told.add(why)
+        text = f'{text}{"<br>" if text else ""}<span class="why-null">{escape(said)}</span>'
     return (
         f'<tr><td class="key">{escape(key)}</td><td class="num">{cell}</td><td class="unit">'
         f'{escape(unit(metrics, key))}</td><td class="text">{text}</td></tr>'
@@ -296,7 +342,7 @@ def _row(trial: Trial, key: str) -> str:
 
 
 def _again(trial: Trial) -> str:
-    versions = find_setting(trial.scenario, ("versions",))
+    versions = trial.scenario.get("versions")
     known = [f"{name} {value}" for name, value in versions.items()] if isinstance(versions, dict) else []
     # The scenario's first lines name, as comments, the versions that ran it.
     for line in trial.scenario_text.splitlines():

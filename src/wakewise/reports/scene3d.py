@@ -18,9 +18,11 @@ from wakewise.arrays import Array, IntArray
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_multiply
 from wakewise.reports.errors import ModelErrors
+from wakewise.reports.film.hull import hull_of
 from wakewise.reports.ink import error_colours
 from wakewise.reports.looks import coloured_model
-from wakewise.reports.trial import Photograph, Surface, Trial, find_setting
+from wakewise.reports.trial import Photograph, Surface, Trial
+from wakewise.reports.views import OUTLOOK
 from wakewise.vehicles import Vehicle, load_vehicle
 
 # NED to ENU: swap x and y, turn z round; a half turn about the line between x and y.
@@ -32,9 +34,12 @@ FRAMES = 240
 MAX_FACES = 90_000
 MAX_POINTS = 50_000
 FRUSTUM_M = 0.03
+FOV_RAD = float(np.radians(40.0))
+FILL = 1.0
+"""Where a ball round the target would touch the edges of the picture at 1; targets are rarely balls."""
 
 PATH_RGB, CAMERA_RGB, PLANNED_RGB = (11, 114, 133), (217, 86, 43), (120, 135, 145)
-HULL_RGB, THRUSTER_RGB, TRUTH_RGB = (222, 184, 60), (60, 70, 80), (196, 200, 198)
+HULL_RGB, TRUTH_RGB = (247, 200, 89), (196, 200, 198)
 
 
 def upright(points_W_m: Array, bed_z_m: float) -> Array:
@@ -68,25 +73,26 @@ def scene_html(trial: Trial, errors: ModelErrors | None) -> str | None:
 
 
 def _aim(server: viser.ViserServer, trial: Trial) -> None:
-    centre, reach = np.array([0.0, 0.0, 0.1]), 1.4
-    if trial.truth is not None:
-        corners = upright(trial.truth.vertices_m, trial.bed_z_m)
-        centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-    eyes = [shot.X_WC_true or shot.X_WC_est for shot in trial.photographs]
-    if any(eyes):
-        away = upright(np.array([pose.p_m for pose in eyes if pose]), trial.bed_z_m) - centre
-        reach = float(np.linalg.norm(away, axis=1).max())
-    centre = centre + np.array([0.0, 0.0, 0.2 * reach])
-    server.initial_camera.look_at = tuple(centre + reach * np.array([0.0, 0.0, 0.2]))
-    server.initial_camera.position = tuple(centre + reach * np.array([1.4, -1.6, 1.2]))
+    """Open on the target, which fills the view; without one on all that was flown."""
+    seen = trial.truth if trial.truth is not None else trial.model
+    if seen is not None:
+        points = upright(seen.vertices_m[np.unique(seen.faces)], trial.bed_z_m)
+    else:
+        points = upright(np.array([shot.X_WC_true.p_m for shot in trial.photographs if shot.X_WC_true]), trial.bed_z_m)
+    # Of a model with strays, nearly all.
+    low, high = np.quantile(points, (0.002, 0.998), axis=0) if len(points) else (np.zeros(3), np.ones(3))
+    centre, reach = 0.5 * (low + high), max(0.5 * float(np.linalg.norm(high - low)), 0.02)
+    distance = FILL * reach / np.sin(0.5 * FOV_RAD)
+    server.initial_camera.look_at = tuple(centre)
+    server.initial_camera.position = tuple(centre + distance * (R_UW @ OUTLOOK.axes[2]))
     server.initial_camera.up = (0.0, 0.0, 1.0)
-    server.initial_camera.fov = float(np.radians(45.0))
-    server.initial_camera.near = 0.01
+    server.initial_camera.fov = FOV_RAD
+    server.initial_camera.near = 0.005
 
 
 def _bed(server: viser.ViserServer, trial: Trial) -> None:
-    size = find_setting(trial.scenario, ("size_m",))
-    width, height = (float(size[1]), float(size[0])) if isinstance(size, list) and len(size) == 3 else (3.0, 3.0)
+    # North runs up the scene, so the tank's length is the grid's height.
+    height, width = (3.0, 3.0) if trial.settings is None else trial.settings.tank.size_m[:2]
     server.scene.add_grid(
         "/bed", width=width, height=height, plane="xy", cell_size=0.1, section_size=0.5, cell_thickness=0.6,
         cell_color=(214, 211, 200), section_color=(186, 181, 164), plane_color=(240, 236, 222), plane_opacity=0.9,
@@ -95,7 +101,9 @@ def _bed(server: viser.ViserServer, trial: Trial) -> None:
 
 
 def _target(server: viser.ViserServer, trial: Trial, errors: ModelErrors | None) -> None:
+    """One surface is in sight at first: the model in colour, else by its error, else its points, else the truth."""
     scene = server.scene
+    found = coloured_model(trial)
     if errors is not None and errors.model is not None and errors.model_accuracy_m is not None:
         model, chosen = lightened(errors.model)
         mesh = trimesh.Trimesh(upright(model.vertices_m, trial.bed_z_m), model.faces, process=False)
@@ -103,8 +111,7 @@ def _target(server: viser.ViserServer, trial: Trial, errors: ModelErrors | None)
         matt = trimesh.visual.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=0.9)
         mesh.visual = trimesh.visual.TextureVisuals(material=matt)
         mesh.visual.vertex_attributes["color"] = _linear(error_colours(errors.model_accuracy_m[chosen]))
-        scene.add_mesh_trimesh("/model by error", mesh)
-    found = coloured_model(trial)
+        scene.add_mesh_trimesh("/model by error", mesh, visible=found is None)
     if found is not None:
         whole, colours = found
         model, chosen = lightened(whole)
@@ -113,7 +120,7 @@ def _target(server: viser.ViserServer, trial: Trial, errors: ModelErrors | None)
             material=trimesh.visual.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=0.9)
         )
         mesh.visual.vertex_attributes["color"] = _linear(colours[chosen])
-        scene.add_mesh_trimesh("/model in colour", mesh, visible=errors is None)
+        scene.add_mesh_trimesh("/model in colour", mesh)
     if errors is not None:
         step = max(1, -(-len(errors.points_m) // MAX_POINTS))
         scene.add_point_cloud(
@@ -123,12 +130,15 @@ def _target(server: viser.ViserServer, trial: Trial, errors: ModelErrors | None)
             point_size=0.0011,
             point_shape="circle",
             precision="float32",
-            visible=errors.model is None,
+            visible=errors.model is None and found is None,
         )
     elif trial.cloud_m is not None:
         step = max(1, -(-len(trial.cloud_m) // MAX_POINTS))
         points = upright(trial.cloud_m[::step], trial.bed_z_m).astype(np.float32)
-        scene.add_point_cloud("/model points", points=points, colors=TRUTH_RGB, point_size=0.0015, precision="float32")
+        scene.add_point_cloud(
+            "/model points", points=points, colors=TRUTH_RGB, point_size=0.0015, precision="float32",
+            visible=found is None,
+        )  # fmt: skip
     if trial.truth is not None:
         truth, _ = lightened(trial.truth)
         scene.add_mesh_simple(
@@ -137,7 +147,7 @@ def _target(server: viser.ViserServer, trial: Trial, errors: ModelErrors | None)
             faces=truth.faces.astype(np.uint32),
             color=TRUTH_RGB,
             side="double",
-            visible=errors is None,
+            visible=found is None and errors is None and trial.cloud_m is None,
         )
 
 
@@ -165,6 +175,7 @@ def lightened(mesh: Surface, max_faces: int = MAX_FACES) -> tuple[Surface, IntAr
 def _cameras(server: viser.ViserServer, trial: Trial) -> None:
     scene = server.scene
     aspect, fov_rad = _lens(trial)
+    scene.add_frame("/photographs", show_axes=False, visible=False)
     for i, shot in enumerate(trial.photographs):
         pose = shot.X_WC_true or shot.X_WC_est
         if pose is None:
@@ -182,19 +193,17 @@ def _cameras(server: viser.ViserServer, trial: Trial) -> None:
             point_size=0.008,
             point_shape="diamond",
             precision="float32",
+            visible=False,
         )
 
 
 def _lens(trial: Trial) -> tuple[float, float]:
-    """Aspect ratio and vertical field of view in radians; 90 degrees across unless the scenario says otherwise."""
-    width = find_setting(trial.scenario, ("width", "width_px"))
-    height = find_setting(trial.scenario, ("height", "height_px"))
-    across = find_setting(trial.scenario, ("fov_rad",))
-    if across is None:
-        degrees = find_setting(trial.scenario, ("fov_deg", "field_of_view_deg"))
-        across = np.radians(float(degrees)) if isinstance(degrees, int | float) else np.pi / 2
-    aspect = float(width) / float(height) if width and height else 4 / 3
-    return aspect, float(2 * np.arctan(np.tan(float(across) / 2) / aspect))
+    """Aspect ratio and vertical field of view in radians; 90 degrees across and 4:3 where the scenario is not known."""
+    if trial.settings is None:
+        return 4 / 3, float(2 * np.arctan(3 / 4))
+    imaging = trial.settings.imaging
+    aspect = imaging.width / imaging.height
+    return aspect, float(2 * np.arctan(np.tan(np.radians(imaging.fov_deg) / 2) / aspect))
 
 
 def _thumbnail(shot: Photograph, width: int = 128) -> Array | None:
@@ -213,12 +222,13 @@ def _fly(server: viser.ViserServer, trial: Trial, path: Array) -> str:
     if len(path) > 1:
         line = upright(path[:: max(1, len(path) // 1500)], trial.bed_z_m).astype(np.float32)
         scene.add_line_segments(
-            "/path", points=np.stack([line[:-1], line[1:]], axis=1), colors=PATH_RGB, thickness=0.003
-        )
+            "/path", points=np.stack([line[:-1], line[1:]], axis=1), colors=PATH_RGB, thickness=0.003,
+            visible=False,
+        )  # fmt: skip
         poses = _body_poses(trial)
         if poses:
-            hull = scene.add_frame("/vehicle", show_axes=False)
-            _hull(server, _vehicle(trial))
+            hull = scene.add_frame("/vehicle", show_axes=False, visible=False)
+            _hull(server, vehicle_of(trial))
             start = poses[0]
             hull.position, hull.wxyz = upright(start.p_m, trial.bed_z_m), quat_multiply(Q_UW, start.q)
             serializer = server.get_scene_serializer()
@@ -239,7 +249,8 @@ def _body_poses(trial: Trial) -> list[Pose]:
     return [Pose(rows[i, :3], rows[i, 3:]) for i in pick]
 
 
-def _vehicle(trial: Trial) -> Vehicle | None:
+def vehicle_of(trial: Trial) -> Vehicle | None:
+    """Vehicle that the scenario names; None if it is not known here."""
     name = trial.scenario.get("vehicle")
     if not isinstance(name, str):
         return None
@@ -250,20 +261,24 @@ def _vehicle(trial: Trial) -> Vehicle | None:
 
 
 def _hull(server: viser.ViserServer, vehicle: Vehicle | None) -> None:
-    """Hull and thrusters of the vehicle, in its body frame; only axes where the vehicle is not known."""
+    """The vehicle as the film draws it, in its body frame; only axes where the vehicle is not known."""
     if vehicle is None:
         server.scene.add_frame("/vehicle/axes", axes_length=0.15, axes_radius=0.005)
         return
-    server.scene.add_box("/vehicle/hull", dimensions=tuple(vehicle.size_m), color=HULL_RGB, opacity=0.35)
-    for thruster in vehicle.thrusters:
-        # The shortest turn from z, the cylinder's own axis, to the thruster's; either way round looks the same.
-        axis = np.asarray(thruster.axis_B) * (-1.0 if thruster.axis_B[2] < 0 else 1.0)
-        q = np.array([1.0 + axis[2], *np.cross([0.0, 0.0, 1.0], axis)])
-        q /= np.linalg.norm(q)
-        server.scene.add_cylinder(
-            f"/vehicle/{thruster.name}", radius=float(np.sqrt(thruster.disk_area_m2 / np.pi)), height=0.05,
-            color=THRUSTER_RGB, wxyz=q, position=thruster.p_BT_m,
-        )  # fmt: skip
+    hull = hull_of(vehicle)
+    # Each face has corners of its own, so that edges stay edges and colours do not run.
+    mesh = trimesh.Trimesh(
+        hull.vertices_B_m[hull.faces].reshape(-1, 3),
+        np.arange(3 * len(hull.faces)).reshape(-1, 3),
+        vertex_normals=hull.normals.reshape(-1, 3),
+        process=False,
+    )
+    mesh.visual = trimesh.visual.TextureVisuals(
+        material=trimesh.visual.material.PBRMaterial(metallicFactor=0.0, roughnessFactor=0.7)
+    )
+    colours = np.concatenate([np.repeat(hull.colours, 3, axis=0), np.ones((len(mesh.vertices), 1))], axis=1)
+    mesh.visual.vertex_attributes["color"] = _bytes(colours)
+    server.scene.add_mesh_trimesh("/vehicle/hull", mesh)
 
 
 def _linear(colours: Array) -> Array:

@@ -14,8 +14,11 @@ import trimesh
 import yaml
 
 from wakewise.arrays import Array, IntArray
+from wakewise.control import METHODS
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
+from wakewise.operation import Scenario
+from wakewise.operation.scenario import check_scenario
 
 T = TypeVar("T")
 
@@ -60,12 +63,14 @@ class Metrics:
 class Trial:
     """What a trial folder holds, all in world NED.
 
-    `missing` says for every absent part (by file name) why the report has to do without it.
+    `missing` says for every absent part (by file name) why the report has to do without it. `scenario` is the file as
+    it stands, `settings` the same checked and typed; None where it is absent or not one that this version can read.
     """
 
     folder: Path
     scenario: Mapping[str, Any]
     scenario_text: str
+    settings: Scenario | None
     metrics: Metrics
     steps: pl.DataFrame | None
     photographs: tuple[Photograph, ...]
@@ -83,22 +88,32 @@ class Trial:
     @property
     def method(self) -> str:
         """Control method, as the metrics or the scenario have it."""
-        found = self.metrics.values.get("method") or find_setting(self.scenario, ("method",))
+        found = self.metrics.values.get("method") or self.scenario.get("method")
         return str(found) if found else "unknown method"
+
+    @property
+    def outside(self) -> str:
+        """In words what of the flight was not the package's own; empty if all of it was."""
+        parts = [] if self.method in (*METHODS, "unknown method") else [f"controller from outside: {self.method}"]
+        replaced = self.scenario.get("replaced")
+        if isinstance(replaced, Mapping):
+            parts += [f"{part} replaced: {said}" for part, said in replaced.items()]
+        elif replaced:
+            parts.append(f"replaced: {replaced}")
+        return "; ".join(parts)
 
     @property
     def seed(self) -> str:
         """Seed of the trial, as the metrics or the scenario have it."""
         found = self.metrics.values.get("seed")
-        found = find_setting(self.scenario, ("seed",)) if found is None else found
+        found = self.scenario.get("seed") if found is None else found
         return "unknown" if found is None else str(found)
 
     @property
     def bed_z_m(self) -> float:
         """Depth of the bed: the tank's depth, else the lowest point of the target, else of the path."""
-        size = find_setting(self.scenario, ("size_m",))
-        if isinstance(size, list | tuple) and len(size) == 3:
-            return float(size[2])
+        if self.settings is not None:
+            return float(self.settings.tank.size_m[2])
         if self.truth is not None:
             return float(self.truth.vertices_m[:, 2].max())
         return float(self.positions("true")[:, 2].max()) if self.steps is not None else 0.0
@@ -116,19 +131,6 @@ class Trial:
             return None
         values = self.steps[name].cast(pl.Float64, strict=False).fill_null(float("nan")).to_numpy()
         return values if np.isfinite(values).any() else None
-
-
-def find_setting(tree: object, names: tuple[str, ...]) -> Any:
-    """First value under one of `names` in nested mappings, nearest to the root first; None if there is none."""
-    level = [tree]
-    while level:
-        mappings = [node for node in level if isinstance(node, Mapping)]
-        for node in mappings:
-            for name in names:
-                if node.get(name) is not None:
-                    return node[name]
-        level = [child for node in mappings for child in node.values()]
-    return None
 
 
 def read_trial(folder: Path) -> Trial:
@@ -165,6 +167,7 @@ def read_trial(folder: Path) -> Trial:
         folder=folder,
         scenario=scenario,
         scenario_text=text,
+        settings=None if not scenario else part("scenario.yaml", lambda _: _typed(scenario)),
         metrics=part("metrics.json", _read_metrics) or Metrics(values={}, why={}, definitions={}, units={}),
         steps=part("steps.parquet", _read_steps),
         photographs=part("images.csv", lambda path: _read_photographs(path, folder / "images")) or (),
@@ -184,6 +187,14 @@ def _read_scenario(path: Path) -> dict[str, Any]:
     if not isinstance(tree, dict):
         raise ValueError("holds no settings")
     return tree
+
+
+def _typed(tree: Mapping[str, Any]) -> Scenario:
+    """The scenario's settings; what this version has no field for, or a method from outside, is left out."""
+    known = {key: value for key, value in tree.items() if key in Scenario.model_fields}
+    if known.get("method") not in METHODS:
+        known.pop("method", None)
+    return check_scenario(known, "scenario")
 
 
 def _read_metrics(path: Path) -> Metrics:

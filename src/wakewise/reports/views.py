@@ -42,6 +42,8 @@ SIDES = (
     View(name="from the west", azimuth_deg=270, elevation_deg=20),
     View(name="from above", azimuth_deg=180, elevation_deg=89.9),
 )
+OUTLOOK = View(name="from the south-east", azimuth_deg=138, elevation_deg=23)
+"""From where the 3D scene is seen at first."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

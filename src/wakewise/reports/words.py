@@ -24,8 +24,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "images", "registered", "features", "inlier", "reprojection", "cameras", "points", "sharpness", "sparse",
     ),
     "The water": (
-        "target_speed", "exposure_speed", "bed_speed", "turbidity", "disturbance", "target_pressure",
-        "exposure_pressure", "exposure_optical", "bed_shear", "tracer", "ray_optical",
+        "target_speed", "exposure_speed", "ambient_speed", "bed_speed", "turbidity", "disturbance", "target_pressure",
+        "exposure_pressure", "exposure_optical", "bed_shear", "grain_threshold", "tracer", "ray_optical",
     ),
     "The flight": (
         "method", "seed", "duration", "position", "path", "estimate", "velocity", "roll", "energy", "sign",
@@ -45,8 +45,9 @@ class Verdict:
     reasons: tuple[str, ...]
 
 
-def verdict(trial: Trial) -> Verdict:
-    """Say whether the scan succeeded and why, in words."""
+def verdict(trial: Trial, *, named: bool = False) -> Verdict:
+    """Say whether the scan succeeded and why, in words; `named` says in the headline which method flew."""
+    who = f" with {trial.method}" if named else ""
     metrics = trial.metrics
     rmse, covered = metrics.number("rmse_mm"), metrics.number("completeness_pct")
     success = metrics.values.get("success")
@@ -55,6 +56,7 @@ def verdict(trial: Trial) -> Verdict:
         made = trial.cloud_m is not None
         why = metrics.why.get("rmse_mm") or metrics.why.get("completeness_pct")
         headline = "The model was not measured." if made else "There is no model."
+        headline += f" Flown{who}." if named else ""
         return Verdict(
             False if success is False else None,
             headline,
@@ -62,7 +64,7 @@ def verdict(trial: Trial) -> Verdict:
         )
     figures = f"{number(rmse)} mm RMSE, {number(covered)} % of the surface covered"
     good = success if isinstance(success, bool) else rmse < SUCCESS_RMSE_MM and covered > SUCCESS_COMPLETENESS_PCT
-    return Verdict(good, f"{'Success' if good else 'Not good enough'}: {figures}.", reasons)
+    return Verdict(good, f"{'Success' if good else 'Not good enough'}{who}: {figures}.", reasons)
 
 
 def _reasons(trial: Trial, rmse: float | None, covered: float | None) -> list[str]:

@@ -3,74 +3,94 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 from wakewise.evaluation import SURFACE_DEFINITIONS
 
 Figures = dict[str, Any]
 
-# key: (unit, definition). The order is that of tables. Target speeds are the excess over the flow without thrusters.
-_FIGURES: dict[str, tuple[str, str]] = {
-    "method": ("", "how thrusts were chosen"),
-    "seed": ("", "every random draw of the trial follows from it"),
-    "success": ("", "rmse_mm < 3 and completeness_pct > 85"),
-    "rmse_mm": ("mm", "root mean square distance from the reconstructed cloud, thinned to 0.8 mm, to the true surface, "
-                "each distance capped at rmse_cap_mm; only what stands 10 mm or more above the bed counts"),
-    "rmse_cap_mm": ("mm", "cap on a single distance in rmse_mm"),
-    "accuracy_median_mm": ("mm", "median distance from the cloud to the true surface"),
-    "completeness_pct": ("%", "share of the true surface with a cloud point within 3 mm"),
-    "completeness_visible_pct": ("%", "the same, over surface seen by at least three photographs"),
-    "completeness_1mm_pct": ("%", "share of the true surface with a cloud point within 1 mm"),
-    "completeness_2mm_pct": ("%", "share of the true surface with a cloud point within 2 mm"),
-    "f_score": ("%", "harmonic mean of precision and recall at 3 mm (Tanks and Temples), 0 to 100"),
-    **{key: SURFACE_DEFINITIONS[key] for key in (
-        "accuracy_p90_mm", "completeness_visible_1mm_pct", "completeness_visible_2mm_pct", "visible_pct",
-        "icp_displacement_mm", "icp_matched_pct", "outside_pct")},
-    "images": ("", "photographs taken"),
-    "registered_images": ("", "photographs that found their place in the model"),
-    "features_per_image": ("", "mean number of SIFT keypoints in a photograph"),
-    "inlier_matches": ("", "feature matches that passed two-view geometry, summed over pairs"),
-    "reprojection_px": ("px", "mean reprojection error of the sparse model"),
-    "cameras_rmse_mm": ("mm", "rms distance of reconstructed camera centres from the vehicle's estimates, aligned"),
-    "target_speed_mean_m_s": ("m/s", "water speed at the target's surface, excess over the flow without thrusters, "
-                              "mean over surface and time from the first leg on"),
-    "target_speed_p95_m_s": ("m/s", "95th percentile over the surface of the same, mean over time"),
-    "exposure_speed_mean_m_s": ("m/s", "target_speed_mean_m_s while the shutter is open"),
-    "bed_speed_p95_m_s": ("m/s", "95th percentile of the excess speed just above the bed within 0.3 m of the target, "
-                          "mean over time"),
-    "turbidity_mean_per_m": ("1/m", "beam attenuation by silt around the target, mean over time"),
-    "exposure_speed_p95_m_s": ("m/s", "target_speed_p95_m_s while the shutter is open"),
-    "target_pressure_mean_Pa": ("Pa", "dynamic pressure of the whole water, currents included, at the target's "
-                                "surface, mean over surface and time"),
-    "target_pressure_p95_Pa": ("Pa", "95th percentile over the surface of the same, mean over time"),
-    "exposure_pressure_mean_Pa": ("Pa", "target_pressure_mean_Pa while the shutter is open"),
-    "exposure_pressure_p95_Pa": ("Pa", "target_pressure_p95_Pa while the shutter is open"),
-    "bed_shear_p95_Pa": ("Pa", "95th percentile of the stress of the whole water on the bed within 0.3 m of the "
-                         "target, mean over time"),
-    "tracer_speed_mean_m_s": ("m/s", "speed of tracers at the target's surface over 1/30 s, as PIV would see the whole "
-                              "water, mean over surface and time"),
-    "ray_optical_depth": ("", "beam attenuation by silt along the rays from camera to target, end to end, mean over "
-                          "rays and time"),
-    "exposure_optical_depth": ("", "ray_optical_depth while the shutter is open"),
-    "disturbance": ("m2/s2", "D as the controller's wake model sees it, mean over time"),
-    "position_rmse_mm": ("mm", "distance of the true vehicle from where it was wished to be"),
-    "path_rmse_mm": ("mm", "distance of the true vehicle from the nearest point of the wished path"),
-    "estimate_rmse_mm": ("mm", "distance of the estimated vehicle from the true one"),
-    "velocity_deviation_pct": ("%", "rms difference of true and wished velocity over the rms wished velocity"),
-    "roll_pitch_rms_deg": ("deg", "rms error in roll and pitch"),
-    "energy_kJ": ("kJ", "electrical energy of the thrusters"),
-    "sign_flips_per_s": ("1/s", "reversals of thrust, all thrusters together, per second"),
-    "duration_s": ("s", "length of the flight from the first leg on; what comes before, settling, is in no figure"),
-    "solve_ms_median": ("ms", "thread CPU time of one control step, median"),
-    "solve_ms_p99": ("ms", "thread CPU time of one control step, 99th percentile"),
-    "fallbacks": ("", "control steps whose answer was not the method's own, or fell short of the wrench asked for"),
-    "collisions": ("", "times the hull touched floor, walls or target"),
-    "wall_s": ("s", "time from start to figures, all sittings"),
-    "cpu_s": ("s", "CPU time of the same, all threads"),
+Better = Literal["less", "more", "none"]
+
+_SURFACE_BETTER: dict[str, Better] = {
+    "accuracy_p90_mm": "less", "completeness_visible_1mm_pct": "more", "completeness_visible_2mm_pct": "more",
+    "visible_pct": "more", "icp_displacement_mm": "less", "icp_matched_pct": "more", "outside_pct": "none",
 }  # fmt: skip
 
-UNITS = {key: unit for key, (unit, _) in _FIGURES.items()}
-DEFINITIONS = {key: text for key, (_, text) in _FIGURES.items()}
+# key: (unit, definition, which side is better). The order is that of tables. Target speeds are the excess over the flow
+# without thrusters. "none": the figure says what was flown or how it was measured, and neither side is better.
+_FIGURES: dict[str, tuple[str, str, Better]] = {
+    "method": ("", "how thrusts were chosen", "none"),
+    "seed": ("", "every random draw of the trial follows from it", "none"),
+    "success": ("", "rmse_mm < 3 and completeness_pct > 85", "more"),
+    "rmse_mm": ("mm", "root mean square distance from the reconstructed cloud, thinned to 0.8 mm, to the true surface, "
+                "each distance capped at rmse_cap_mm; only what stands 10 mm or more above the bed counts", "less"),
+    "rmse_cap_mm": ("mm", "cap on a single distance in rmse_mm", "none"),
+    "accuracy_median_mm": ("mm", "median distance from the cloud to the true surface", "less"),
+    "completeness_pct": ("%", "share of the true surface with a cloud point within 3 mm", "more"),
+    "completeness_visible_pct": ("%", "the same, over surface seen by at least three photographs", "more"),
+    "completeness_1mm_pct": ("%", "share of the true surface with a cloud point within 1 mm", "more"),
+    "completeness_2mm_pct": ("%", "share of the true surface with a cloud point within 2 mm", "more"),
+    "f_score": ("%", "harmonic mean of precision and recall at 3 mm (Tanks and Temples), 0 to 100", "more"),
+    **{key: (*SURFACE_DEFINITIONS[key], better) for key, better in _SURFACE_BETTER.items()},
+    "images": ("", "photographs taken", "none"),
+    "registered_images": ("", "photographs that found their place in the model", "more"),
+    "features_per_image": ("", "mean number of SIFT keypoints in a photograph", "more"),
+    "inlier_matches": ("", "feature matches that passed two-view geometry, summed over pairs", "more"),
+    "reprojection_px": ("px", "mean reprojection error of the sparse model", "less"),
+    "cameras_rmse_mm": ("mm", "rms distance of reconstructed camera centres from the vehicle's estimates, aligned",
+                        "less"),
+    "target_speed_mean_m_s": ("m/s", "water speed at the target's surface, excess over the flow without thrusters, "
+                              "mean over surface and time from the first leg on", "less"),
+    "target_speed_p95_m_s": ("m/s", "95th percentile over the surface of the same, mean over time", "less"),
+    "exposure_speed_mean_m_s": ("m/s", "target_speed_mean_m_s while the shutter is open", "less"),
+    "bed_speed_p95_m_s": ("m/s", "95th percentile of the excess speed just above the bed within 0.3 m of the target, "
+                          "mean over time", "less"),
+    "turbidity_mean_per_m": ("1/m", "beam attenuation by silt around the target, mean over time", "less"),
+    "exposure_speed_p95_m_s": ("m/s", "target_speed_p95_m_s while the shutter is open", "less"),
+    "target_pressure_mean_Pa": ("Pa", "dynamic pressure of the whole water, currents included, at the target's "
+                                "surface, mean over surface and time", "less"),
+    "target_pressure_p95_Pa": ("Pa", "95th percentile over the surface of the same, mean over time", "less"),
+    "exposure_pressure_mean_Pa": ("Pa", "target_pressure_mean_Pa while the shutter is open", "less"),
+    "exposure_pressure_p95_Pa": ("Pa", "target_pressure_p95_Pa while the shutter is open", "less"),
+    "bed_shear_p95_Pa": ("Pa", "95th percentile of the stress of the whole water on the bed within 0.3 m of the "
+                         "target, mean over time", "less"),
+    "tracer_speed_mean_m_s": ("m/s", "speed of tracers at the target's surface over 1/30 s, as PIV would see the whole "
+                              "water, mean over surface and time", "less"),
+    "ray_optical_depth": ("", "beam attenuation by silt along the rays from camera to target, end to end, mean over "
+                          "rays and time", "less"),
+    "exposure_optical_depth": ("", "ray_optical_depth while the shutter is open", "less"),
+    "disturbance": ("m2/s2", "D as the controller's wake model sees it, over the points that its method watches, mean "
+                    "over time; methods that watch other points cannot be compared by it", "none"),
+    "disturbance_flown": ("m2/s2", "D of the commanded thrusts at the estimated poses, by the settings' wake model "
+                          "over the target's own points whatever the method watches, mean over time; a model's "
+                          "estimate, nothing measured", "less"),
+    "disturbance_least_thrusts": ("m2/s2", "the same, had each of these wrenches been made with the least thrusts, as "
+                                  "dp shares them out", "none"),
+    "ambient_speed_m_s": ("m/s", "speed of the water's own motion (current, waves, pump, turbulence) at the target's "
+                          "surface without thrusters or target, mean over surface and time", "none"),
+    "grain_threshold_Pa": ("Pa", "bed shear stress from which the scenario's loose grains move", "none"),
+    "position_rmse_mm": ("mm", "distance of the true vehicle from where it was wished to be", "less"),
+    "path_rmse_mm": ("mm", "distance of the true vehicle from the nearest point of the wished path", "less"),
+    "estimate_rmse_mm": ("mm", "distance of the estimated vehicle from the true one", "less"),
+    "velocity_deviation_pct": ("%", "rms difference of true and wished velocity over the rms wished velocity", "less"),
+    "roll_pitch_rms_deg": ("deg", "rms error in roll and pitch", "less"),
+    "energy_kJ": ("kJ", "electrical energy of the thrusters", "less"),
+    "sign_flips_per_s": ("1/s", "reversals of thrust, all thrusters together, per second", "less"),
+    "duration_s": ("s", "length of the flight from the first leg on; what comes before, settling, is in no figure",
+                   "none"),
+    "solve_ms_median": ("ms", "thread CPU time of one control step, median", "less"),
+    "solve_ms_p99": ("ms", "thread CPU time of one control step, 99th percentile", "less"),
+    "fallbacks": ("", "control steps whose answer was not the method's own, or fell short of the wrench asked for",
+                  "less"),
+    "collisions": ("", "times the hull touched floor, walls or target", "less"),
+    "wall_s": ("s", "time from start to figures, all sittings", "less"),
+    "cpu_s": ("s", "CPU time of the same, all threads", "less"),
+}  # fmt: skip
+
+UNITS = {key: unit for key, (unit, _, _) in _FIGURES.items()}
+DEFINITIONS = {key: text for key, (_, text, _) in _FIGURES.items()}
+BETTER: dict[str, Better] = {key: better for key, (_, _, better) in _FIGURES.items()}
+"""Which side of a figure is better; "none" where neither is."""
 
 # Ratio of two trials, named as in tables, and the figure it is taken from.
 _RATIOS = {

@@ -35,6 +35,7 @@ from wakewise.reconstruction import read_cloud, read_lens, reconstruct
 from wakewise.targets import write_mesh
 from wakewise.trials.metrics import Figures, Gathering, comparison
 from wakewise.trials.stages import Ledger, Quiet, Watch
+from wakewise.trials.yardstick import add_yardsticks
 
 _SURFACE_FIGURES = (
     "rmse_mm",
@@ -193,7 +194,9 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
     """Judge flight and model against the truth; what could not be computed gets a reason."""
     gathering = Gathering()
     steps = pl.read_parquet(folder / "steps.parquet")
-    gathering.add(flight_figures(steps.filter(pl.col("leg") != SETTLING)))
+    flown = steps.filter(pl.col("leg") != SETTLING)
+    gathering.add(flight_figures(flown))
+    add_yardsticks(gathering, parts, flown)
     solve_ms = pl.read_parquet(folder / "timings.parquet")["solve_ms"].to_numpy()[50:]
     gathering.add({"solve_ms_median": float(np.median(solve_ms)), "solve_ms_p99": float(np.percentile(solve_ms, 99))})
     photos = pl.read_csv(folder / "images.csv")

@@ -50,7 +50,7 @@ def vehicle_page(vehicle: AnyVehicle) -> str:
         _card(
             "If one thruster fails",
             "Percent left of the achievable wrench along each axis (the weaker of its two directions).",
-            _failures(facts),
+            _legend("loss", "0 %: the axis is lost", "100 %: nothing is lost") + _failures(facts),
         ),
         _mixing(facts),
         _card(
@@ -59,7 +59,7 @@ def vehicle_page(vehicle: AnyVehicle) -> str:
         _card(
             "Allocation matrix",
             "Wrench about the body origin per newton of thrust: N/N, and N m/N below.",
-            _matrix(draft.allocation_matrix),
+            _legend("sign", "pushes against the axis", "along it") + _matrix(draft.allocation_matrix),
         ),
         _card("Parameters", "Every number with its unit and source.", _parameters(draft)),
         _full_matrices(draft),
@@ -67,6 +67,7 @@ def vehicle_page(vehicle: AnyVehicle) -> str:
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        '<meta name="color-scheme" content="light dark">'
         f"<title>{escape(draft.title)}</title><style>{style}</style></head><body><main>\n"
         + "\n".join(part for part in body if part)
         + "\n</main></body></html>\n"
@@ -146,8 +147,8 @@ def _failures(facts: dict[str, Any]) -> str:
                 cells.append(Cell('<td class="cell muted">–</td>'))
                 continue
             worst = min(values)
-            tint = f"rgba(180,35,44,{0.55 * (1.0 - min(worst, 100.0) / 100.0):.2f})"
-            cells.append(Cell(f'<td class="cell" style="background:{tint}">{worst:.0f}</td>'))
+            lost_share = 1.0 - min(max(worst, 0.0), 100.0) / 100.0
+            cells.append(Cell(f'<td class="cell lost" style="--share:{lost_share:.2f}">{worst:.0f}</td>'))
         lost = ", ".join(failure["lost"]) or "none"
         rows.append([failure["thruster"], failure["name"], failure["rank"], lost, *cells])
     heads = ["", "thruster", "rank left", "axes lost", *WRENCH_AXES]
@@ -192,10 +193,9 @@ def _matrix(matrix: Array) -> str:
         largest = float(abs(matrix[3 * (i // 3) : 3 * (i // 3) + 3]).max()) or 1.0
         cells = []
         for value in matrix[i] + 0.0:
-            tint = "11,118,184" if value > 0 else "197,90,17"
-            strength = 0.35 * abs(float(value)) / largest
+            kind, share = "plus" if value > 0 else "minus", abs(float(value)) / largest
             shown = f"{value:+.3f}" if abs(value) > 5e-4 else "0"
-            cells.append(Cell(f'<td class="cell" style="background:rgba({tint},{strength:.2f})">{shown}</td>'))
+            cells.append(Cell(f'<td class="cell {kind}" style="--share:{share:.2f}">{shown}</td>'))
         rows.append([axis, *cells])
     return _table(["", *(f"T{j}" for j in range(1, matrix.shape[1] + 1))], rows)
 
@@ -252,6 +252,11 @@ def _card(title: str, hint: str, content: str) -> str:
 def _sentence(words: str) -> str:
     """A note as a sentence; the first word keeps its letters."""
     return f"{words[:1].upper()}{words[1:].rstrip('.')}."
+
+
+def _legend(kind: str, left: str, right: str) -> str:
+    """What the colours of the cells below mean, from end to end."""
+    return f'<p class="legend"><span>{escape(left)}</span><i class="{kind}"></i><span>{escape(right)}</span></p>'
 
 
 def _chip(words: str, kind: str = "") -> str:
