@@ -11,3 +11,10 @@ class InputError(WakewiseError):
 
 class StageError(WakewiseError):
     """A stage of a trial could not finish on valid input, such as photographs that do not register."""
+
+
+class EnvironmentFailure(WakewiseError):  # noqa: N818  (no error of the program)
+    """The computer did not let a stage finish: a full disk, no permission, a file that went away.
+
+    Says nothing about the input, so no result is made of it: the same command, given room, does the stage again.
+    """

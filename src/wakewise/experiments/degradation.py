@@ -21,7 +21,7 @@ import numpy as np
 from wakewise.errors import InputError
 from wakewise.experiments.photo_model import judge
 from wakewise.experiments.photo_sets import planned_views, render_clean, write_photos
-from wakewise.experiments.stages import Quiet, Watch
+from wakewise.experiments.stages import Quiet, Watch, of_the_computer
 from wakewise.files import write_json, write_text
 from wakewise.imaging import Render
 from wakewise.interfaces import ScalarGrid
@@ -117,7 +117,7 @@ def degrade(
     for name, steps in wanted.items():
         for level in steps:
             path = folder / name / f"{level:g}.json"
-            if not path.exists():
+            if not path.exists() or of_the_computer(json.loads(path.read_text(encoding="utf-8"))["failure"]):
                 with watch.stage(f"{name} {level:g}") as progress:
                     write_json(path, _one(scenario, target, name, level, folder / name / f"{level:g}", clean, progress))
             figures = json.loads(path.read_text(encoding="utf-8"))

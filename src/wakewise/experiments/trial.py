@@ -19,7 +19,7 @@ from wakewise import __version__
 from wakewise.errors import InputError, StageError
 from wakewise.evaluation import Crop, evaluate_surface, flight_figures
 from wakewise.experiments.metrics import Figures, Gathering, comparison
-from wakewise.experiments.stages import Ledger, Quiet, Watch
+from wakewise.experiments.stages import Ledger, Quiet, Watch, of_the_computer
 from wakewise.experiments.textured import write_textured
 from wakewise.files import write_json, write_text
 from wakewise.geometry import matrix_from_quat
@@ -67,6 +67,8 @@ def run_trial(scenario: Scenario, folder: Path, watch: Watch | None = None) -> F
     ------
     InputError
         If the scenario cannot be flown, or the folder holds another trial.
+    EnvironmentFailure
+        If the disk is full, or a file cannot be read or written; the stages before it are kept.
     """
     watch = watch or Quiet()
     mission = build_mission(scenario)
@@ -80,6 +82,7 @@ def run_trial(scenario: Scenario, folder: Path, watch: Watch | None = None) -> F
         with watch.stage(name) as progress, ledger.account(name):
             work(progress)
 
+    _forget_what_was_not_measured(folder)
     stage("plan", "planned.csv", lambda _: write_plan(scenario, mission, folder))
     stage("fly", "steps.parquet", lambda progress: fly_mission(scenario, mission, folder, progress))
     stage("photograph", "images.csv", lambda progress: photograph_flight(scenario, mission, folder, progress))
@@ -149,7 +152,13 @@ def reconstruct_trial(scenario: Scenario, mission: Mission, folder: Path, progre
     """Reconstruct from the photographs and the vehicle's own estimates; model.json says how it went.
 
     Nothing true goes in: pairs, scale and place come from the estimated camera poses, the region from the plan. A model
-    that does not come about is a result too, so its reason is kept instead of its figures.
+    that does not come about is a result too, so its reason is kept instead of its figures. That the disk is full is no
+    result.
+
+    Raises
+    ------
+    EnvironmentFailure
+        If the disk is full, or a file cannot be read or written.
     """
     photos = pl.read_csv(folder / "images.csv")
     names = photos["name"].to_list()
@@ -170,6 +179,14 @@ def reconstruct_trial(scenario: Scenario, mission: Mission, folder: Path, progre
         write_json(folder / "model.json", {"figures": summary, "failure": None})
     except StageError as fault:
         write_json(folder / "model.json", {"figures": {}, "failure": str(fault)})
+
+
+def _forget_what_was_not_measured(folder: Path) -> None:
+    """Have reconstruction and score done again where model.json holds a full disk as if it had been measured."""
+    path = folder / "model.json"
+    if path.exists() and of_the_computer(json.loads(path.read_text(encoding="utf-8"))["failure"]):
+        (folder / "score.json").unlink(missing_ok=True)
+        path.unlink()
 
 
 def texture_trial(mission: Mission, folder: Path, progress: Callable[..., None]) -> None:

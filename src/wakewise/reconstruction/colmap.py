@@ -15,7 +15,7 @@ from typing import TypeVar
 
 import pycolmap
 
-from wakewise.errors import StageError
+from wakewise.errors import EnvironmentFailure, StageError
 
 T = TypeVar("T")
 # Room that a disk must keep while COLMAP writes its database: what it writes in about a second.
@@ -48,7 +48,11 @@ def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: 
     Raises
     ------
     StageError
-        If COLMAP fails, with its reason in one line, or the disk fills.
+        If COLMAP fails, with its reason in one line.
+    EnvironmentFailure
+        If the disk fills.
+    OSError
+        If a file cannot be read or written.
     """
     token = pycolmap.CancellationToken()
     result: list[T] = []
@@ -68,7 +72,7 @@ def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: 
             thread.join(0.25 if disk is None else 0.05)
             watch()
             if disk is not None and thread.is_alive() and (free := shutil.disk_usage(disk).free / 1e6) < RESERVE_MB:
-                raise StageError(
+                raise EnvironmentFailure(
                     f"{what}: the disk of {disk} is full, {free:.0f} MB are left and {RESERVE_MB:g} MB needed; the "
                     "stages before it are kept"
                 )
@@ -77,6 +81,8 @@ def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: 
             token.cancel()
             thread.join()
     if failure:
+        if isinstance(failure[0], OSError):
+            raise failure[0]
         reason = " ".join(str(failure[0]).split())[:200]
         raise StageError(f"{what}: COLMAP stopped: {reason}") from failure[0]
     return result[0]

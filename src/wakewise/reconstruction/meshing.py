@@ -19,6 +19,7 @@ from wakewise.interfaces import Progress
 from wakewise.reconstruction.clouds import read_cloud, write_mesh
 from wakewise.reconstruction.colmap import call, no_stderr
 from wakewise.reconstruction.settings import ReconstructionSettings
+from wakewise.reconstruction.stages import need_room
 
 
 def mesh_points(
@@ -39,6 +40,8 @@ def mesh_points(
     ------
     StageError
         If no surface comes out.
+    EnvironmentFailure
+        If the disk is full.
     """
     cloud = read_cloud(dense)
     options = pycolmap.PoissonMeshingOptions()
@@ -51,6 +54,7 @@ def mesh_points(
         raw = Path(scratch) / "poisson.ply"
         with no_stderr():
             call(lambda **_: pycolmap.poisson_meshing(dense, raw, options), "mesh", lambda: progress(0, 1, "mesh"))
+        need_room(out.parent, 0.0, "mesh")  # on a full disk the surface is cut short without a word
         if not raw.is_file() or raw.stat().st_size == 0:
             raise StageError("mesh: no surface came out of the dense points")
         loaded = trimesh.load(raw, process=False)

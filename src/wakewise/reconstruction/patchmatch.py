@@ -16,6 +16,7 @@ from wakewise.interfaces import Progress
 from wakewise.reconstruction.clouds import Cloud, read_cloud, write_cloud
 from wakewise.reconstruction.colmap import call
 from wakewise.reconstruction.settings import ReconstructionSettings
+from wakewise.reconstruction.stages import need_room
 from wakewise.reconstruction.views import Ball
 
 
@@ -71,6 +72,7 @@ def patch_match(
             "dense",
             lambda: progress(2, 3, "fusion"),
         )
+        need_room(out.parent, 0.0, "dense")  # on a full disk the points are cut short without a word
         cloud = read_cloud(raw)
     keep = np.ones(len(cloud.points_m), dtype=np.bool_)
     if region is not None:

@@ -142,6 +142,8 @@ def reconstruct(
         If the photos, references, pairs or region cannot be used.
     StageError
         If too little of it fits together.
+    EnvironmentFailure
+        If the disk is full, or a file cannot be read or written.
     """
     start = time.perf_counter()
     settings = settings or ReconstructionSettings()
