@@ -2,4 +2,6 @@
 
 from importlib.metadata import version
 
+from wakewise import numba_cache as numba_cache  # before Numba is imported anywhere
+
 __version__ = version("wakewise")

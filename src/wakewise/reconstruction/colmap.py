@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import sqlite3
 import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import TypeVar
 
@@ -29,7 +30,14 @@ def be_quiet() -> None:
     pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL.value
 
 
+def keep_sigterm() -> None:
+    """Give SIGTERM back to who had it: COLMAP's log took it on import, to print a stack and end without tidying up."""
+    with suppress(ValueError):  # only the main thread may
+        signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGTERM))
+
+
 be_quiet()
+keep_sigterm()
 
 
 def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: None, *, disk: Path | None = None) -> T:
