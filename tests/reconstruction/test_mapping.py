@@ -176,8 +176,10 @@ def test_a_killed_processs_room_in_memory_is_swept(tmp_path, monkeypatch):
     dead.mkdir()
     with colmap.workroom(tmp_path / "database.db", 1e3) as room:
         assert room.parent == tmp_path / "memory" and mine.exists() and not dead.exists()
+    dead = tmp_path / ".wakewise-999999999-c"
+    dead.mkdir()
     with colmap.workroom(tmp_path / "database.db", 1e12) as room:
-        assert room.parent == tmp_path
+        assert room.parent == tmp_path and not dead.exists()
 
 
 def test_a_given_camera_is_used_and_must_fit(relief_photos, tmp_path):

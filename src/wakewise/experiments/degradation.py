@@ -27,6 +27,7 @@ from wakewise.imaging import Render
 from wakewise.interfaces import ScalarGrid
 from wakewise.operation import Scenario
 from wakewise.operation.build import build_target
+from wakewise.processes import alone
 from wakewise.targets import Target
 
 
@@ -106,11 +107,19 @@ def degrade(
     Raises
     ------
     InputError
-        If a factor is unknown, levels do not rise from 0 or more, or the folder holds another study.
+        If a factor is unknown, levels do not rise from 0 or more, the folder holds another study, or another run
+        is at it.
     """
     watch = watch or Quiet()
     wanted = _checked({name: factor.levels for name, factor in FACTORS.items()} if levels is None else levels)
     _claim(folder, scenario)
+    with alone(folder):
+        return _study(scenario, folder, wanted, watch)
+
+
+def _study(
+    scenario: Scenario, folder: Path, wanted: dict[str, tuple[float, ...]], watch: Watch
+) -> list[dict[str, Any]]:
     target = build_target(scenario.target, scenario.tank.size_m[2])
     clean: list[Render] = []
     rows = []

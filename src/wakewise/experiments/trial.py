@@ -35,6 +35,7 @@ from wakewise.operation import (
     read_scenario,
     write_scenario,
 )
+from wakewise.processes import alone
 from wakewise.reconstruction import read_cloud, read_lens, reconstruct
 from wakewise.targets import write_mesh
 
@@ -66,13 +67,18 @@ def run_trial(scenario: Scenario, folder: Path, watch: Watch | None = None) -> F
     Raises
     ------
     InputError
-        If the scenario cannot be flown, or the folder holds another trial.
+        If the scenario cannot be flown, or the folder holds another trial, or another run is at it.
     EnvironmentFailure
         If the disk is full, or a file cannot be read or written; the stages before it are kept.
     """
     watch = watch or Quiet()
     mission = build_mission(scenario)
     claim(folder, scenario)
+    with alone(folder):
+        return _run(scenario, mission, folder, watch)
+
+
+def _run(scenario: Scenario, mission: Mission, folder: Path, watch: Watch) -> Figures:
     ledger = Ledger(folder / "stages.json")
 
     def stage(name: str, product: str, work: Callable[[Callable[..., None]], None]) -> None:

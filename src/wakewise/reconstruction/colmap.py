@@ -107,14 +107,14 @@ def workroom(beside: Path, size_bytes: float) -> Iterator[Path]:
     roomy = size_bytes <= MOST_IN_MEMORY and os.access(MEMORY, os.W_OK)
     if roomy and shutil.disk_usage(MEMORY).free > 2.0 * size_bytes + 1e6 * RESERVE_MB:
         where = MEMORY
-        _sweep()
+    _sweep(where)
     with tempfile.TemporaryDirectory(prefix=f".wakewise-{os.getpid()}-", dir=where) as folder:
         yield Path(folder)
 
 
-def _sweep() -> None:
-    """Remove from memory what processes left that were killed."""
-    for left in MEMORY.glob(".wakewise-*-*"):
+def _sweep(where: Path) -> None:
+    """Remove the rooms of processes that were killed."""
+    for left in where.glob(".wakewise-*-*"):
         process = left.name.split("-")[1]
         if process.isdecimal() and not Path("/proc", process).exists():
             shutil.rmtree(left, ignore_errors=True)

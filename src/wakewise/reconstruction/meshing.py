@@ -16,6 +16,7 @@ from scipy.spatial import KDTree
 from wakewise.arrays import Array, IntArray
 from wakewise.errors import StageError
 from wakewise.interfaces import Progress
+from wakewise.processes import half_done
 from wakewise.reconstruction.clouds import read_cloud, write_mesh
 from wakewise.reconstruction.colmap import call, no_stderr
 from wakewise.reconstruction.settings import ReconstructionSettings
@@ -50,7 +51,7 @@ def mesh_points(
     options.color = False
     # Its threads wait for each other by spinning: two took 8 times as long as one (measured, 430,000 points, depth 8).
     options.num_threads = 1
-    with tempfile.TemporaryDirectory(prefix=".mesh.", dir=out.parent) as scratch:
+    with tempfile.TemporaryDirectory(prefix=half_done("mesh"), dir=out.parent) as scratch:
         raw = Path(scratch) / "poisson.ply"
         with no_stderr():
             call(lambda **_: pycolmap.poisson_meshing(dense, raw, options), "mesh", lambda: progress(0, 1, "mesh"))

@@ -13,6 +13,7 @@ from scipy.spatial import KDTree
 
 from wakewise.errors import InputError, StageError
 from wakewise.interfaces import Progress
+from wakewise.processes import half_done
 from wakewise.reconstruction.clouds import Cloud, read_cloud, write_cloud
 from wakewise.reconstruction.colmap import call
 from wakewise.reconstruction.settings import ReconstructionSettings
@@ -58,7 +59,7 @@ def patch_match(
     StageError
         If no points come out.
     """
-    with tempfile.TemporaryDirectory(prefix=".patch-match.", dir=out.parent) as scratch:
+    with tempfile.TemporaryDirectory(prefix=half_done("patch-match"), dir=out.parent) as scratch:
         work = Path(scratch) / "work"
         call(partial(pycolmap.undistort_images, work, sparse, folder), "dense", lambda: progress(0, 3, "undistort"))
         options = pycolmap.PatchMatchOptions()
