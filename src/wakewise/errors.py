@@ -18,3 +18,8 @@ class EnvironmentFailure(WakewiseError):  # noqa: N818  (no error of the program
 
     Says nothing about the input, so no result is made of it: the same command, given room, does the stage again.
     """
+
+
+def how_to_install(extra: str) -> str:
+    """What to type for one of the package's extras; it is on no index, so it comes from a clone."""
+    return f"in the project's folder, pip install -e '.[{extra}]'"
