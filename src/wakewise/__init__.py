@@ -60,6 +60,8 @@ __all__ = [
     "wake_model",
 ]
 
+from wakewise import numba_cache as numba_cache  # before Numba is imported anywhere
+
 __version__ = version("wakewise")
 
 _ROOMS = {

@@ -11,3 +11,15 @@ class InputError(WakewiseError):
 
 class StageError(WakewiseError):
     """A stage of a trial could not finish on valid input, such as photographs that do not register."""
+
+
+class EnvironmentFailure(WakewiseError):  # noqa: N818  (no error of the program)
+    """The computer did not let a stage finish: a full disk, no permission, a file that went away.
+
+    Says nothing about the input, so no result is made of it: the same command, given room, does the stage again.
+    """
+
+
+def how_to_install(extra: str) -> str:
+    """What to type for one of the package's extras; it is on no index, so it comes from a clone."""
+    return f"in the project's folder, pip install -e '.[{extra}]'"

@@ -12,12 +12,16 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from wakewise.processes import half_done
+
+_MOST_HEAD_LINES, _LONGEST_LINE = 1000, 10_000
+
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
     """Give a temporary path beside `path`, same suffix; rename it into place if the block ends well, else remove it."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=path.suffix, dir=path.parent)
+    handle, name = tempfile.mkstemp(prefix=half_done(path.stem), suffix=path.suffix, dir=path.parent)
     os.close(handle)
     temporary = Path(name)
     try:
@@ -32,7 +36,7 @@ def whole_file(path: Path) -> Iterator[Path]:
 def whole_folder(path: Path) -> Iterator[Path]:
     """Give a temporary folder beside `path`; rename it into place if the block ends well, else remove it."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
+    temporary = Path(tempfile.mkdtemp(prefix=half_done(path.name), dir=path.parent))
     try:
         yield temporary
         if path.exists():
@@ -57,3 +61,22 @@ def write_json(path: Path, value: Any) -> None:
 def finite_or_none(value: float | None) -> float | None:
     """Turn NaN and infinity into None, which JSON can hold."""
     return None if value is None or not math.isfinite(value) else float(value)
+
+
+def broken_promise(path: Path) -> str | None:
+    """What an ASCII PLY file holds less of than its head promises, in words; None for a whole one or another format.
+
+    Readers take what is there, so a file that was cut short passes for a small one.
+    """
+    with path.open("rb") as file:
+        promised = 0
+        for _ in range(_MOST_HEAD_LINES):
+            words = file.readline(_LONGEST_LINE).split()
+            if words[:1] == [b"format"] and words[1:2] != [b"ascii"]:
+                return None
+            if words[:1] == [b"element"] and len(words) == 3 and words[2].isdigit():
+                promised += int(words[2])
+            if words == [b"end_header"]:
+                held = sum(1 for line in file if line.strip())
+                return None if held >= promised else f"promises {promised} vertices and faces, holds {held}"
+    return None

@@ -166,3 +166,31 @@ def test_bad_points_are_one_line(capsys: Capsys, tmp_path: Path, text: str, said
     assert run(words(path)) == 2
     assert said in capsys.readouterr().err
     assert run(words(tmp_path / "none.csv")) == 2
+
+
+def test_a_target_that_no_jet_reaches_is_said_with_the_nearest_passage(capsys: Capsys, tmp_path: Path) -> None:
+    """D is 0 both ways: the distance from a point to the nearest jet's axis, found by walking along it, is told."""
+    path = tmp_path / "far.csv"
+    path.write_text("x_m,y_m,z_m,weight\n0.2,3,0.1,1\n0,0,5,0\n")
+    level = ("--pose", "0", "0", "0", "0", "0", "0", "--wrench", "10", "0", "0", "0", "0", "0")
+    assert run(["allocate", "--vehicle", "paper", *level, "--points", str(path)]) == 0
+    said = capsys.readouterr().out
+    told = float(said.split("no jet of either reaches a point; the nearest passes ")[1].split(" m")[0])
+    assert run(["allocate", "--vehicle", "paper", *level, "--points", str(path), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["disturbance"] == found["disturbance_pinv"] == 0.0
+    nearest = np.inf
+    for thrusts in (found["thrusts_N"], found["thrusts_pinv_N"]):
+        for thruster, T in zip(PAPER.thrusters, thrusts, strict=True):
+            if abs(T) > 1e-6:
+                along = thruster.p_BT_m - np.sign(T) * np.linspace(0.0, 40.0, 40001)[:, None] * thruster.axis_B
+                nearest = min(nearest, np.linalg.norm(along - [0.2, 3.0, 0.1], axis=1).min())
+    assert told == pytest.approx(nearest, abs=0.006)
+
+
+def test_a_wrench_of_nothing_spares_nothing(capsys: Capsys, points: Path) -> None:
+    """Without a push there is no jet, and that is said; where jets meet the points nothing of the kind is."""
+    assert run(["allocate", "--pose", *POSE, "--wrench", *["0"] * 6, "--points", str(points)]) == 0
+    assert "no thruster pushes" in capsys.readouterr().out
+    assert run(words(points)) == 0
+    assert "reaches" not in capsys.readouterr().out

@@ -101,3 +101,44 @@ def test_comparing_nothing_or_the_same_twice_is_refused(capsys: Capsys) -> None:
 def test_a_vehicle_that_does_not_exist_is_refused(capsys: Capsys) -> None:
     """The line lists the vehicles there are."""
     assert "bluerov2-heavy" in said(capsys, "vehicle", "show", "submarine")
+
+
+CUT = "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "data"),
+    [
+        ("prose.ply", b"call me Ishmael\n" * 40),
+        ("prose.txt", b"call me Ishmael\n" * 40),
+        ("prose.obj", b"\x00\xff" * 40),
+        ("empty.ply", b""),
+        ("short.ply", CUT.format(10**12).encode() + b"0 0 0\n"),
+        ("less.ply", CUT.format(3).encode() + b"0 0 0\n0 0 1\n"),
+    ],
+)
+@pytest.mark.parametrize("as_model", [True, False])
+def test_what_holds_no_model_is_refused_in_words(name: str, data: bytes, as_model: bool, capsys: Capsys) -> None:
+    """As the model or as the reference: the file is named, and no name of an exception of ours or others is shown."""
+    import trimesh
+
+    Path(name).write_bytes(data)
+    trimesh.creation.icosphere(subdivisions=2, radius=0.1).export("ball.ply")
+    one, other = (name, "ball.ply") if as_model else ("ball.ply", name)
+    line = said(capsys, "evaluate", one, "--reference", other)
+    assert name in line
+    assert "Error" not in line
+    assert "Exception" not in line
+    if name in ("short.ply", "less.ply"):
+        assert "was cut short, promises" in line or "no faces" in line
+
+
+def test_points_in_ascii_that_are_all_there_are_read(capsys: Capsys) -> None:
+    """A whole ASCII file is no broken promise, blank lines, comments and faces included."""
+    from wakewise.files import broken_promise
+
+    Path("whole.ply").write_text(CUT.format(2) + "0 0 0\n\n0 0 1\n")
+    Path("other.txt").write_text("nothing of the kind\n")
+    assert broken_promise(Path("whole.ply")) is None
+    assert broken_promise(Path("other.txt")) is None
+    assert capsys.readouterr().out == ""

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from wakewise.cli.main import run
+from wakewise.operation import Scenario
 
 ROOT = Path(__file__).parents[2]
 
@@ -21,6 +22,23 @@ def test_the_documentation_is_what_commands_and_settings_say() -> None:
         sys.path.pop(0)
     for name, text in PAGES.items():
         assert (DOCS / name).read_text(encoding="utf-8") == text(), f"docs/{name} is stale: run make docs"
+
+
+def _leaves(tree: dict[str, object], prefix: str = "") -> list[str]:
+    """Dotted names of all values of a tree."""
+    names = []
+    for key, value in tree.items():
+        names += _leaves(value, f"{prefix}{key}.") if isinstance(value, dict) else [f"{prefix}{key}"]
+    return names
+
+
+def test_the_page_of_fields_lists_every_one() -> None:
+    """Whatever a resolved scenario holds, however deep, has a row of docs/scenario.md, and only one."""
+    rows = [line.split("`")[1] for line in (ROOT / "docs" / "scenario.md").read_text().splitlines() if "| `" in line]
+    fields = _leaves(Scenario().model_dump(mode="json"))
+    assert len(fields) > 200
+    assert sorted(set(fields) - set(rows)) == []
+    assert len(rows) == len(set(rows))
 
 
 def test_help_is_quick_and_loads_no_heavy_library() -> None:

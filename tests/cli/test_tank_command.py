@@ -48,6 +48,8 @@ def test_the_answer_can_be_written(files, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("more", "words"),
     [
+        (["--out", "u.foo"], "--out u.foo: must end in .json or .npz"),
+        (["--out", "u"], "--out u: must end in .json or .npz"),
         (["--floor", "0.3"], "below the floor"),
         (["--target", "brain"], "give --floor"),
         (["--flow", "magic"], "allowed are parcels, lattice"),

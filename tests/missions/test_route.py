@@ -5,11 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_from_euler, quat_from_matrix, quat_multiply
 from wakewise.interfaces import BodyState
 from wakewise.missions import MissionSettings, RoutePilot, plan_route
 from wakewise.missions.orbit import R_FC
-from wakewise.missions.route import rest_to_rest
+from wakewise.missions.route import LONGEST_S, rest_to_rest
 
 CENTRE = np.array([0.0, 0.0, 1.43])
 SETTINGS = MissionSettings(elevations_deg=(20, 50), views=(6, 5))
@@ -69,3 +70,18 @@ def test_before_the_first_leg_the_vehicle_is_asked_to_hover() -> None:
     wished = ROUTE.body(0.5, X_BC)
     np.testing.assert_allclose(wished.nu_B, 0.0, atol=1e-12)
     np.testing.assert_allclose(wished.X_WB.p_m, ROUTE.body(0.0, X_BC).X_WB.p_m)
+
+
+def test_a_flight_of_more_than_a_day_is_refused_with_its_length() -> None:
+    """Eight orbits at a crawl take days: the message says how many hours, of how many metres."""
+    crawl = MissionSettings(
+        elevations_deg=tuple(range(10, 50, 5)), views=(12,) * 8, standoff_m=3.0, speed_m_s=1e-3, settle_s=0.0
+    )
+    with pytest.raises(
+        InputError, match=r"mission: \d+\.\d m at 0\.001 m/s and 0\.05 m/s2 take (\d+\.\d) h, at most 24 h"
+    ) as fault:
+        plan_route(np.zeros(3), crawl)
+    hours = float(str(fault.value).split("take ")[1].split(" h")[0])
+    metres = float(str(fault.value).split()[1])
+    assert hours == pytest.approx(metres / 1e-3 / 3600.0, rel=0.01)
+    assert plan_route(np.zeros(3), crawl.model_copy(update={"speed_m_s": 0.1})).duration_s < LONGEST_S

@@ -112,3 +112,51 @@ def test_overrides_are_yaml_values() -> None:
     for bad in ("silt", "=3", "a=[1"):
         with pytest.raises(InputError, match="--set"):
             parse_overrides([bad])
+
+
+@pytest.mark.parametrize(
+    "name", ["../x", "/abs/evil", "a/b", "a\\b", ".hidden", "..", " a", "a ", "a\nb", "a\x00b", "a\u202eb"]
+)
+def test_a_name_cannot_leave_its_folder(name: str) -> None:
+    """A name becomes a folder's: separators, leading dots and what cannot be seen are refused in one line."""
+    with pytest.raises(InputError, match=r"name: found .* names a folder") as caught:
+        load_scenario("quick", None, {"name": name})
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["scan", "Größe 2", "a..b", "reef-7_x", "珊瑚"])
+def test_an_honest_name_is_kept(name: str) -> None:
+    """Letters of any script, digits, inner dots and spaces are all a name."""
+    assert load_scenario("quick", None, {"name": name}).name == name
+
+
+def test_a_key_given_twice_is_refused_with_its_line(tmp_path: Path) -> None:
+    """The second `seed` is not silently the one that counts, at the top or in a group."""
+    path = tmp_path / "twice.yaml"
+    path.write_text("seed: 1\nname: a\nseed: 2\n")
+    with pytest.raises(InputError, match=r"twice\.yaml line 3: not YAML \(key seed given more than once\)"):
+        load_scenario("quick", path, {})
+    path.write_text("[" * 5000)
+    with pytest.raises(InputError, match="too deep"):
+        load_scenario("quick", path, {})
+    with pytest.raises(InputError, match=r"--set a: .*too deep"):
+        parse_overrides(["a=" + "[" * 5000])
+
+
+@pytest.mark.parametrize("text", ["seed: true", "seed: 12:30", "mission: {speed_m_s: true}", "tank: {silt: yes}"])
+def test_neither_yes_nor_a_time_is_a_number(text: str, tmp_path: Path) -> None:
+    """`true` is not 1 and `12:30` is not 750; a switch may be `true`, as before."""
+    path = tmp_path / "odd.yaml"
+    path.write_text(text + "\n")
+    with pytest.raises(InputError, match=r"odd\.yaml: .*(number|integer)"):
+        load_scenario("quick", path, {})
+    path.write_text("tank: {inflow_loss: true}\n")
+    assert load_scenario("quick", path, {}).tank.inflow_loss is True
+
+
+@pytest.mark.parametrize("field", ["mission.speed_m_s", "mission.acceleration_m_s2"])
+@pytest.mark.parametrize("value", [1e-300, 1e-9, 1e-6])
+def test_a_speed_that_takes_months_is_refused(field: str, value: float) -> None:
+    """Speeds and accelerations below a millimetre per second (squared) are refused before anything is computed."""
+    with pytest.raises(InputError, match=rf"{field}: found .*0\.001"):
+        load_scenario("quick", None, {field: value})

@@ -78,3 +78,13 @@ def test_real_boards_behind_an_aquarium_wall():
     assert found.photos == 12
     assert found.residual_px < 0.5
     assert found.residuals_px["pinhole"] > 2.0
+
+
+def test_what_is_no_file_among_the_photos_is_let_be(boards, tmp_path):
+    """A pipe, a folder and a hidden file beside the photos are not waited for nor read."""
+    for photo in boards.iterdir():
+        (tmp_path / photo.name).write_bytes(photo.read_bytes())
+    os.mkfifo(tmp_path / "pipe.png")
+    (tmp_path / "folder.png").mkdir()
+    (tmp_path / ".hidden.png").touch()
+    assert calibrate(tmp_path, BOARD).photos == 6

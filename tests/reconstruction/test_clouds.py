@@ -5,7 +5,7 @@ import errno
 import numpy as np
 import pytest
 
-from wakewise.errors import InputError, StageError
+from wakewise.errors import EnvironmentFailure, InputError, StageError
 from wakewise.reconstruction import Cloud, read_cloud, write_cloud, write_mesh
 from wakewise.reconstruction.colmap import call, no_stderr
 from wakewise.reconstruction.stages import fingerprint, need_room, run_stage
@@ -84,7 +84,9 @@ def test_a_full_disk_is_told_and_what_was_done_before_is_kept(tmp_path):
     def fill():
         raise OSError(errno.ENOSPC, "No space left on device", str(tmp_path / "x"))
 
-    with pytest.raises(StageError, match=r"second: the disk of .* is full; the stages before it are kept") as caught:
+    with pytest.raises(
+        EnvironmentFailure, match=r"second: the disk of .* is full; the stages before it are kept"
+    ) as caught:
         run_stage(tmp_path, "second", "b", (), fill)
     assert "\n" not in str(caught.value)
     assert run_stage(tmp_path, "first", "a", (), dict).skipped
@@ -94,7 +96,7 @@ def test_a_full_disk_is_told_and_what_was_done_before_is_kept(tmp_path):
 def test_a_stage_that_could_not_bear_a_full_disk_is_not_begun(tmp_path):
     """More than there is on any disk is refused with what is left and what is needed; little is let pass."""
     need_room(tmp_path, 1.0, "match")
-    with pytest.raises(StageError, match=r"match: the disk of .* is full, .* MB are left"):
+    with pytest.raises(EnvironmentFailure, match=r"match: the disk of .* is full, .* MB are left"):
         need_room(tmp_path, 1e18, "match")
 
 
@@ -122,3 +124,20 @@ def test_quiet_is_over_when_it_is_over(capfd):
         os.write(2, b"inside")
     os.write(2, b"after")
     assert capfd.readouterr().err == "after"
+
+
+@pytest.mark.parametrize("fault", [RuntimeError("database or disk is full"), StageError("x: No space left on device")])
+def test_what_sqlite_says_of_a_full_disk_is_the_disks_fault(tmp_path, fault):
+    """A full disk told in a library's own words is no failure of the photographs; other words stay what they are."""
+
+    def fail():
+        raise fault
+
+    with pytest.raises(EnvironmentFailure, match=r"the disk of .* is full"):
+        run_stage(tmp_path, "s", "a", (), fail)
+
+    def break_down():
+        raise StageError("too few points")
+
+    with pytest.raises(StageError, match="too few points"):
+        run_stage(tmp_path, "s", "a", (), break_down)

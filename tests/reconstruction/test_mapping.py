@@ -8,7 +8,7 @@ import pycolmap
 import pytest
 from relief import FOCAL
 
-from wakewise.errors import InputError, StageError
+from wakewise.errors import EnvironmentFailure, InputError, StageError
 from wakewise.interfaces import no_progress
 from wakewise.reconstruction import Lens, ReconstructionSettings, colmap, read_photos, reconstruct
 from wakewise.reconstruction.features import match_photos
@@ -160,7 +160,7 @@ def test_a_disk_that_fills_ends_the_call_before_colmap_ends_the_process(tmp_path
             time.sleep(0.01)
         cancelled.append(True)
 
-    with pytest.raises(StageError, match=r"matching: the disk of .* is full"):
+    with pytest.raises(EnvironmentFailure, match=r"matching: the disk of .* is full"):
         colmap.call(work, "matching", disk=tmp_path)
     assert cancelled == [True]
     with colmap.workroom(tmp_path / "database.db", 1e3) as room:
@@ -176,8 +176,10 @@ def test_a_killed_processs_room_in_memory_is_swept(tmp_path, monkeypatch):
     dead.mkdir()
     with colmap.workroom(tmp_path / "database.db", 1e3) as room:
         assert room.parent == tmp_path / "memory" and mine.exists() and not dead.exists()
+    dead = tmp_path / ".wakewise-999999999-c"
+    dead.mkdir()
     with colmap.workroom(tmp_path / "database.db", 1e12) as room:
-        assert room.parent == tmp_path
+        assert room.parent == tmp_path and not dead.exists()
 
 
 def test_a_given_camera_is_used_and_must_fit(relief_photos, tmp_path):

@@ -1,9 +1,13 @@
 """Meshing: crumbs go, pieces stay."""
 
 import numpy as np
+import pytest
 import trimesh
 
-from wakewise.reconstruction.meshing import without_crumbs
+from wakewise.errors import EnvironmentFailure
+from wakewise.reconstruction import ReconstructionSettings, stages
+from wakewise.reconstruction.clouds import Cloud, write_cloud
+from wakewise.reconstruction.meshing import mesh_points, without_crumbs
 
 
 def test_crumbs_go_and_everything_worth_showing_stays():
@@ -15,3 +19,20 @@ def test_crumbs_go_and_everything_worth_showing_stays():
     faces = np.concatenate([balls, crumb + vertices - 4])
     kept = without_crumbs(faces, vertices)
     assert np.array_equal(kept, balls)
+
+
+def test_a_surface_that_a_full_disk_cut_short_is_not_taken(tmp_path, monkeypatch):
+    """What the mesher wrote on a disk without room is no surface, and no failure of the points either."""
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
+    points, normals = np.asarray(ball.vertices), np.asarray(ball.vertex_normals)
+    write_cloud(tmp_path / "dense.ply", Cloud(points_m=points, normals=normals, colours=np.full_like(points, 0.5)))
+    monkeypatch.setattr(stages, "RESERVE_MB", 1e15)
+    with pytest.raises(EnvironmentFailure, match="mesh: the disk of"):
+        mesh_points(
+            tmp_path / "dense.ply",
+            tmp_path / "mesh.ply",
+            ReconstructionSettings(),
+            spacing_m=0.02,
+            progress=lambda *_: None,
+        )
+    assert [path.name for path in tmp_path.iterdir()] == ["dense.ply"]

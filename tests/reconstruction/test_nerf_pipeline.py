@@ -62,7 +62,9 @@ def test_missing_torch_is_one_line_with_the_remedy(folder, capsys, monkeypatch):
     """Exit code 2, and what to install."""
     monkeypatch.setattr(backend.importlib.util, "find_spec", lambda name: None)
     line = said(capsys, 2, "nerf", folder)
-    assert line == "wakewise: neural field: PyTorch is not installed; pip install 'wakewise[nerf]'\n"
+    assert (
+        line == "wakewise: neural field: PyTorch is not installed; in the project's folder, pip install -e '.[nerf]'\n"
+    )
 
 
 def test_what_cannot_be_is_one_line(folder, tmp_path, capsys):

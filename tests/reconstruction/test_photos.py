@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from wakewise.errors import InputError, StageError
+from wakewise.errors import EnvironmentFailure, InputError
 from wakewise.reconstruction import match_references, read_photos, read_reference_cameras
 from wakewise.reconstruction.photos import PhotoStore, decode, jpeg_is_whole, png_is_whole, without_duplicates
 
@@ -206,5 +206,5 @@ def test_a_store_decodes_once_and_only_as_much_as_it_may_keep(tmp_path):
     for name in ("a.png", "b.png"):
         (tmp_path / name).unlink()
     assert store.image("a.png") is kept
-    with pytest.raises(StageError, match=r"b\.png: can no longer be read"):
+    with pytest.raises(EnvironmentFailure, match=r"b\.png: can no longer be read"):
         store.image("b.png")

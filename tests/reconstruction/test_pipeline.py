@@ -119,6 +119,16 @@ def test_bad_input_is_named_before_anything_runs(relief_photos, tmp_path):
     shutil.rmtree(tmp_path / "a", ignore_errors=True)
 
 
+def test_a_model_among_its_photos_is_refused(relief_photos):
+    """The folder of the photos is not written to, however it is spelt."""
+    folder, _ = relief_photos
+    before = sorted(folder.iterdir())
+    for out in (folder, folder / "." / ".." / folder.name):
+        with pytest.raises(InputError, match="folder of the photos"):
+            reconstruct(folder, out, SETTINGS)
+    assert sorted(folder.iterdir()) == before
+
+
 def test_a_figure_that_is_null_says_why():
     """Without references and without a mesh the summary holds null, never zero, and a reason beside each."""
     figures = dict.fromkeys(field.name for field in dataclasses.fields(Model))

@@ -8,10 +8,10 @@ import shutil
 from pathlib import Path
 
 import pytest
-from wakewise.experiments.metrics import BETTER
 
 from wakewise.errors import InputError
 from wakewise.reports import write_comparison
+from wakewise.trials.metrics import BETTER
 
 
 @pytest.fixture(scope="module")

@@ -37,7 +37,7 @@ def test_without_openpiv_the_own_correlation_is_taken(monkeypatch):
     rng = np.random.default_rng(0)
     pair = rng.integers(0, 255, (2, 128, 128)).astype(np.uint8)
     assert displacements([(pair[0], pair[0])])[0].engine == "in-house correlation"
-    with pytest.raises(InputError, match=r"wakewise\[piv\]"):
+    with pytest.raises(InputError, match=r"pip install -e .\.\[piv\]"):
         displacements([(pair[0], pair[1])], "openpiv")
 
 

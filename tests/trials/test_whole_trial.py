@@ -1,15 +1,19 @@
 """One small trial from flight to report: whole, resumable, reproducible, and its water is not its controller's."""
 
 import json
+import os
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 import pytest
 
+from wakewise.errors import InputError
 from wakewise.operation import Scenario, fly_trial, load_scenario
 from wakewise.operation.worlds import tank_world
+from wakewise.processes import alone
 from wakewise.reports import write_report
 from wakewise.trials import run_trial
 from wakewise.wake import point_disturbance, wake_model
@@ -55,6 +59,14 @@ class Stages:
 def trial(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     folder = tmp_path_factory.mktemp("trials") / "first"
     return folder, run_trial(small(), folder)
+
+
+def test_a_folder_that_another_run_is_at_is_let_be(trial: tuple[Path, dict]) -> None:
+    """A second run into the same folder is refused at once, with the other's number."""
+    folder, _ = trial
+    refused = pytest.raises(InputError, match=rf"another run is at it \(pid {os.getpid()}\)")
+    with ThreadPoolExecutor(1) as other, alone(folder), refused:
+        other.submit(run_trial, small(), folder).result()
 
 
 def test_a_trial_leaves_every_file_whole(trial: tuple[Path, dict]) -> None:

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from wakewise.geometry import Pose
     from wakewise.vehicles import Vehicle
 
+_STILL_M2_S2 = 1e-12
+"""A disturbance below that of a micrometre per second counts as none."""
+
 Six = tuple[float, float, float, float, float, float]
 
 VehicleName = Annotated[str, typer.Option("--vehicle", help="Library name or vehicle YAML file.")]
@@ -134,6 +137,8 @@ def allocate(
         print_json(figures)
         return
     _show(chosen, gentle, least, figures)
+    if max(gentle.disturbance or 0.0, least.disturbance or 0.0) < _STILL_M2_S2:
+        typer.echo(_nobody_near(chosen, X_WB, places[weights > 0.0], gentle, least))
 
 
 def _show(vehicle: Vehicle, gentle: Allocation, least: Allocation, figures: dict[str, Any]) -> None:
@@ -157,6 +162,24 @@ def _show(vehicle: Vehicle, gentle: Allocation, least: Allocation, figures: dict
     if gentle.given_up:
         lost = ", ".join(f"{axis} {value:.3g} {units[axis]}" for axis, value in gentle.given_up.items())
         typer.echo(f"given up        {lost}")
+
+
+def _nobody_near(vehicle: Vehicle, X_WB: Pose, places: Array, gentle: Allocation, least: Allocation) -> str:
+    """Why nothing is to be spared: no thruster pushes, or how far from a point the nearest jet passes."""
+    import numpy as np
+
+    start, axes = X_WB.apply(vehicle.thruster_positions_B_m), vehicle.thruster_axes_B @ X_WB.R.T
+    distances = []
+    for allocation in (gentle, least):
+        pushing = np.abs(allocation.thrusts_N) > 1e-6
+        # Water goes against the thrust; behind the disk no jet passes, so nothing is nearer than the disk.
+        jets = -np.sign(allocation.thrusts_N[pushing])[:, None] * axes[pushing]
+        offset = places[:, None] - start[pushing]
+        along = np.maximum(np.einsum("ptk,tk->pt", offset, jets), 0.0)
+        distances += np.linalg.norm(offset - along[..., None] * jets, axis=-1).ravel().tolist()
+    if not distances:
+        return "                no thruster pushes, so there is nothing to spare"
+    return f"                no jet of either reaches a point; the nearest passes {min(distances):.2f} m from one"
 
 
 def _saved(before: float, after: float) -> str:

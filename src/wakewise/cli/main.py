@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import io
+import os
+import signal
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any
 
 import typer
 
-from wakewise import __version__
+from wakewise import __version__, numba_cache
 from wakewise.cli import (
     allocate,
     bench,
@@ -52,6 +57,13 @@ app.add_typer(target.app, name="target")
 app.add_typer(wake.app, name="wake")
 
 _INTERRUPTED = 130
+_TERMINATED = 143
+_terminated = False
+# Libraries tell of the computer's faults in exceptions of their own: by their words, and what to say instead.
+_COMPUTER = {
+    "No space left on device": "the disk is full",
+    "no locator available": "compiled code can be kept nowhere; set NUMBA_CACHE_DIR to a folder that can be written",
+}
 _STOPPED = "stopped; what was finished is kept, run the same command again to go on"
 
 
@@ -74,11 +86,15 @@ def _root(
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code: 0 done, 1 failed on good input, 2 bad input, 130 stopped by Ctrl-C."""
+    """Run one command and return its exit code.
+
+    0 done, 1 failed on good input, 2 bad input, 130 stopped by Ctrl-C, 143 ended by SIGTERM.
+    """
     try:
         code = app(args=arguments, standalone_mode=False)
+        sys.stdout.flush()
         if code == _INTERRUPTED:  # Ctrl-C inside a command
-            _say(_STOPPED)
+            return _stopped()
         return code if isinstance(code, int) else 0
     except typer.TyperException as fault:
         _say(fault.format_message())
@@ -90,15 +106,58 @@ def run(arguments: Sequence[str] | None = None) -> int:
         _say(str(fault))
         return 1
     except (KeyboardInterrupt, typer.Abort):
-        _say(_STOPPED)
-        return _INTERRUPTED
+        return _stopped()
+    except BrokenPipeError:  # nobody reads on, as after `| head`
+        _close_output()
+        return 1
+    except OSError as fault:
+        where = "cannot write: " if fault.filename is None else f"{fault.filename}: "
+        _say(f"{where}{fault.strerror or fault}")
+        _close_output()
+        return 1
+    except MemoryError as fault:
+        _say(f"out of memory ({fault})" if str(fault) else "out of memory")
+        return 1
+    except Exception as fault:
+        told = next((said for words, said in _COMPUTER.items() if words in str(fault)), None)
+        if told is None:
+            raise
+        _say(told)
+        return 1
 
 
 def _say(message: str) -> None:
     line = " ".join(message.split())
-    print(f"wakewise: {line}", file=sys.stderr)
+    with suppress(OSError):  # standard error may lie on the full disk, too
+        print(f"wakewise: {line}", file=sys.stderr)
+
+
+def _stopped() -> int:
+    _say(_STOPPED)
+    return _TERMINATED if _terminated else _INTERRUPTED
+
+
+def _close_output() -> None:
+    """Drop what could not be written, else Python tries again at its end and tells of it in words of its own."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _terminate(*_: Any) -> None:
+    """End as after Ctrl-C, so that whatever is half-done is tidied up; a second SIGTERM does not disturb that."""
+    global _terminated  # noqa: PLW0603
+    _terminated = True
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    raise KeyboardInterrupt
 
 
 def main() -> None:
     """Entry point of the installed command."""
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a figure with a sign that the terminal lacks is still a figure
+        sys.stdout.reconfigure(errors="replace")
+    signal.signal(signal.SIGTERM, _terminate)
+    if numba_cache.CHOSEN is not None:
+        _say(f"compiled code is kept in {numba_cache.CHOSEN}: the package's folder and the user's cache are read-only")
     sys.exit(run())

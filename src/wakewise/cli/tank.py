@@ -95,11 +95,14 @@ def probe_command(
     """
     import numpy as np
 
+    from wakewise.errors import InputError
     from wakewise.tank import TankSettings
     from wakewise.tank.probe import probe
     from wakewise.tank.probe_tables import read_points, read_thrusts, regular_times
     from wakewise.vehicles import load_vehicle
 
+    if out is not None and out.suffix not in (".json", ".npz"):
+        raise InputError(f"--out {out}: must end in .json or .npz")
     chosen = load_vehicle(vehicle)
     history, columns = read_thrusts(thrusts, chosen)
     result = probe(

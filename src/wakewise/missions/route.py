@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from wakewise.arrays import Array, freeze
+from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Goal
 from wakewise.missions.orbit import Orbit, camera_pose, camera_twist, layered_orbits
 from wakewise.missions.settings import MissionSettings
 
 SETTLING = "settle"
+LONGEST_S = 24 * 3600.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -128,7 +130,13 @@ class Route:
 
 
 def plan_route(centre_W_m: Array, settings: MissionSettings) -> Route:
-    """Settle, approach, then fly each orbit and the climb to the next; photographs on the orbits only."""
+    """Settle, approach, then fly each orbit and the climb to the next; photographs on the orbits only.
+
+    Raises
+    ------
+    InputError
+        If the flight would take longer than a day.
+    """
     orbits: tuple[Orbit, ...] = layered_orbits(settings)
     far, near = settings.standoff_m + settings.approach_m, settings.standoff_m
     here = np.array([orbits[0].azimuths_rad[0], orbits[0].elevation_rad, far])
@@ -157,6 +165,12 @@ def plan_route(centre_W_m: Array, settings: MissionSettings) -> Route:
             exposures.append(begin_s + leg.time_at((azimuth - first) / (last - first)))
             names.append(f"{len(names):03d}.png")
             planned.append(camera_pose(centre_W_m, float(azimuth), orbit.elevation_rad, near))
+    if clock_s > LONGEST_S:
+        path_m = sum(leg.length_m for leg in legs)
+        raise InputError(
+            f"mission: {path_m:.1f} m at {settings.speed_m_s:g} m/s and {settings.acceleration_m_s2:g} m/s2 take "
+            f"{clock_s / 3600.0:.1f} h, at most {LONGEST_S / 3600.0:g} h are allowed"
+        )
     return Route(
         centre_W_m=centre_W_m,
         legs=tuple(legs),

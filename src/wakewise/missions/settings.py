@@ -22,8 +22,8 @@ class MissionSettings(Settings):
         (20, 16, 12), min_length=1, max_length=8, description="photographs on each orbit, evenly spread"
     )
     standoff_m: float = Field(0.5, gt=0.0, le=3.0, description="distance of the camera from the target's centre")
-    speed_m_s: float = Field(0.10, gt=0.0, le=0.5, description="speed of the camera along its path")
-    acceleration_m_s2: float = Field(0.05, gt=0.0, le=1.0, description="greatest acceleration along the path")
+    speed_m_s: float = Field(0.10, ge=1e-3, le=0.5, description="speed of the camera along its path")
+    acceleration_m_s2: float = Field(0.05, ge=1e-3, le=1.0, description="greatest acceleration along the path")
     approach_m: float = Field(0.3, ge=0.0, le=2.0, description="the flight starts this much farther out")
     settle_s: float = Field(
         12.0, ge=0.0, le=120.0, description="hover before the first leg, until the integral knows trim and current"

@@ -25,6 +25,7 @@ from wakewise.settings import Settings
 from wakewise.tank import TankSettings
 from wakewise.tank.settings import WATERS
 from wakewise.targets import coral_kinds
+from wakewise.yaml_text import YamlError, read_yaml
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
@@ -76,6 +77,13 @@ class Scenario(Settings):
             close = difflib.get_close_matches(value, known, 1)
             hint = f"did you mean {close[0]}? " if close else ""
             raise ValueError(f"{hint}allowed are {', '.join(known)}, or package.module:make")
+        return value
+
+    @field_validator("name")
+    @classmethod
+    def _names_a_folder(cls, value: str) -> str:
+        if value.strip() != value or value.startswith(".") or not value.isprintable() or set(value) & set("/\\"):
+            raise ValueError("names a folder, so no slash, no dot first, no space around it and nothing unprintable")
         return value
 
     @field_validator("vehicle")
@@ -161,7 +169,7 @@ def load_scenario(preset: str | None, path: Path | None, overrides: dict[str, An
         if preset not in PRESETS:
             raise InputError(f"--preset: '{preset}', allowed are {', '.join(PRESETS)}")
         text = resources.files("wakewise.operation").joinpath("presets", f"{preset}.yaml").read_text(encoding="utf-8")
-        layers.append(yaml.safe_load(text))
+        layers.append(read_yaml(text))
     if path is not None:
         source = str(path)
         layers.append(_read_yaml(path))
@@ -213,9 +221,10 @@ def parse_overrides(items: list[str]) -> dict[str, Any]:
         if not equals or not name.strip():
             raise InputError(f"--set: '{item}', must be FIELD=VALUE such as tank.silt=0")
         try:
-            overrides[name.strip()] = yaml.safe_load(text)
-        except yaml.YAMLError:
-            raise InputError(f"--set {name.strip()}: '{text}' is not a value that YAML can read") from None
+            overrides[name.strip()] = read_yaml(text)
+        except YamlError as fault:
+            shown = text if len(text) <= 60 else text[:60] + "..."
+            raise InputError(f"--set {name.strip()}: '{shown}' is not a value that YAML can read ({fault})") from None
     return overrides
 
 
@@ -249,15 +258,14 @@ def differences(a: BaseModel, b: BaseModel, prefix: str = "") -> list[str]:
 
 def _read_yaml(path: Path) -> dict[str, Any]:
     try:
-        tree = yaml.safe_load(path.read_text(encoding="utf-8"))
+        tree = read_yaml(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(f"{path}: no such file, a scenario YAML file is needed") from None
     except (OSError, UnicodeDecodeError):
         raise InputError(f"{path}: cannot be read as text, a scenario YAML file is needed") from None
-    except yaml.YAMLError as fault:
-        mark = getattr(fault, "problem_mark", None)
-        line = f" line {mark.line + 1}" if mark else ""
-        raise InputError(f"{path}{line}: not YAML ({getattr(fault, 'problem', 'unreadable')})") from None
+    except YamlError as fault:
+        line = "" if fault.line is None else f" line {fault.line}"
+        raise InputError(f"{path}{line}: not YAML ({fault.reason})") from None
     if not isinstance(tree, dict):
         raise InputError(f"{path}: holds {type(tree).__name__}, must hold fields of a scenario such as 'seed: 1'")
     return tree

@@ -146,7 +146,8 @@ def calibrate(folder: Path, board: Board, model: str = "radial") -> Calibration:
 
 def _read(folder: Path) -> dict[str, NDArray[np.uint8]]:
     """Grey photographs by name, all of one size."""
-    files = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES) if folder.is_dir() else []
+    inside = folder.iterdir() if folder.is_dir() else ()
+    files = sorted(p for p in inside if p.suffix.lower() in SUFFIXES and p.is_file() and not p.name.startswith("."))
     if not files:
         raise InputError(f"{folder}: holds no photos; a folder of photos of a ChArUco board is needed")
     out: dict[str, NDArray[np.uint8]] = {}

@@ -10,7 +10,7 @@ import trimesh
 
 from wakewise.arrays import Array, IntArray, freeze
 from wakewise.errors import InputError
-from wakewise.files import whole_file
+from wakewise.files import broken_promise, whole_file
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -54,9 +54,12 @@ def read_cloud(path: Path) -> Cloud:
     if not path.is_file():
         raise InputError(f"{path}: does not exist; a file of points is needed (.ply)")
     try:
+        broken = broken_promise(path)
         loaded = trimesh.load(path, process=False)
-    except (ValueError, KeyError, IndexError, TypeError, NotImplementedError, OSError) as error:
-        raise InputError(f"{path}: is no file of points that can be read ({type(error).__name__})") from None
+    except (ValueError, KeyError, IndexError, TypeError, NotImplementedError, OSError):
+        raise InputError(f"{path}: is no file of points that can be read; a PLY file is one, for example") from None
+    if broken is not None:
+        raise InputError(f"{path}: was cut short, {broken}")
     points = np.asarray(getattr(loaded, "vertices", np.zeros((0, 3))), dtype=np.float64).reshape(-1, 3)
     if len(points) == 0 or not np.all(np.isfinite(points)):
         raise InputError(f"{path}: holds {len(points)} points, needs at least one and all finite")

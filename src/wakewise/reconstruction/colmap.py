@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import sqlite3
 import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import TypeVar
 
 import pycolmap
 
-from wakewise.errors import StageError
+from wakewise.errors import EnvironmentFailure, StageError
 
 T = TypeVar("T")
 # Room that a disk must keep while COLMAP writes its database: what it writes in about a second.
@@ -29,7 +30,14 @@ def be_quiet() -> None:
     pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL.value
 
 
+def keep_sigterm() -> None:
+    """Give SIGTERM back to who had it: COLMAP's log took it on import, to print a stack and end without tidying up."""
+    with suppress(ValueError):  # only the main thread may
+        signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGTERM))
+
+
 be_quiet()
+keep_sigterm()
 
 
 def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: None, *, disk: Path | None = None) -> T:
@@ -48,7 +56,11 @@ def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: 
     Raises
     ------
     StageError
-        If COLMAP fails, with its reason in one line, or the disk fills.
+        If COLMAP fails, with its reason in one line.
+    EnvironmentFailure
+        If the disk fills.
+    OSError
+        If a file cannot be read or written.
     """
     token = pycolmap.CancellationToken()
     result: list[T] = []
@@ -68,7 +80,7 @@ def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: 
             thread.join(0.25 if disk is None else 0.05)
             watch()
             if disk is not None and thread.is_alive() and (free := shutil.disk_usage(disk).free / 1e6) < RESERVE_MB:
-                raise StageError(
+                raise EnvironmentFailure(
                     f"{what}: the disk of {disk} is full, {free:.0f} MB are left and {RESERVE_MB:g} MB needed; the "
                     "stages before it are kept"
                 )
@@ -77,6 +89,8 @@ def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: 
             token.cancel()
             thread.join()
     if failure:
+        if isinstance(failure[0], OSError):
+            raise failure[0]
         reason = " ".join(str(failure[0]).split())[:200]
         raise StageError(f"{what}: COLMAP stopped: {reason}") from failure[0]
     return result[0]
@@ -93,14 +107,14 @@ def workroom(beside: Path, size_bytes: float) -> Iterator[Path]:
     roomy = size_bytes <= MOST_IN_MEMORY and os.access(MEMORY, os.W_OK)
     if roomy and shutil.disk_usage(MEMORY).free > 2.0 * size_bytes + 1e6 * RESERVE_MB:
         where = MEMORY
-        _sweep()
+    _sweep(where)
     with tempfile.TemporaryDirectory(prefix=f".wakewise-{os.getpid()}-", dir=where) as folder:
         yield Path(folder)
 
 
-def _sweep() -> None:
-    """Remove from memory what processes left that were killed."""
-    for left in MEMORY.glob(".wakewise-*-*"):
+def _sweep(where: Path) -> None:
+    """Remove the rooms of processes that were killed."""
+    for left in where.glob(".wakewise-*-*"):
         process = left.name.split("-")[1]
         if process.isdecimal() and not Path("/proc", process).exists():
             shutil.rmtree(left, ignore_errors=True)

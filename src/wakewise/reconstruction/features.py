@@ -15,6 +15,7 @@ import pycolmap
 from wakewise.errors import InputError, StageError
 from wakewise.files import whole_file
 from wakewise.interfaces import Progress
+from wakewise.processes import half_done
 from wakewise.reconstruction.colmap import call, settle, workroom
 from wakewise.reconstruction.lenses import Lens
 from wakewise.reconstruction.pairs import Pairs
@@ -256,7 +257,7 @@ def _match(
     done = 0
     for batch in _batches(pairs, min(MATCHING_BATCHES, -(-len(pairs) // LEAST_PAIRS))):
         progress(done, len(pairs), "matches")
-        with tempfile.TemporaryDirectory(prefix=".pairs.", dir=database.parent) as scratch:
+        with tempfile.TemporaryDirectory(prefix=half_done("pairs"), dir=database.parent) as scratch:
             listing = Path(scratch) / "pairs.txt"
             listing.write_text("".join(f"{ids[a]} {ids[b]}\n" for a, b in batch), encoding="utf-8")
             pairing.match_list_path = str(listing)

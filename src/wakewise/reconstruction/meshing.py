@@ -16,9 +16,11 @@ from scipy.spatial import KDTree
 from wakewise.arrays import Array, IntArray
 from wakewise.errors import StageError
 from wakewise.interfaces import Progress
+from wakewise.processes import half_done
 from wakewise.reconstruction.clouds import read_cloud, write_mesh
 from wakewise.reconstruction.colmap import call, no_stderr
 from wakewise.reconstruction.settings import ReconstructionSettings
+from wakewise.reconstruction.stages import need_room
 
 
 def mesh_points(
@@ -39,6 +41,8 @@ def mesh_points(
     ------
     StageError
         If no surface comes out.
+    EnvironmentFailure
+        If the disk is full.
     """
     cloud = read_cloud(dense)
     options = pycolmap.PoissonMeshingOptions()
@@ -47,10 +51,11 @@ def mesh_points(
     options.color = False
     # Its threads wait for each other by spinning: two took 8 times as long as one (measured, 430,000 points, depth 8).
     options.num_threads = 1
-    with tempfile.TemporaryDirectory(prefix=".mesh.", dir=out.parent) as scratch:
+    with tempfile.TemporaryDirectory(prefix=half_done("mesh"), dir=out.parent) as scratch:
         raw = Path(scratch) / "poisson.ply"
         with no_stderr():
             call(lambda **_: pycolmap.poisson_meshing(dense, raw, options), "mesh", lambda: progress(0, 1, "mesh"))
+        need_room(out.parent, 0.0, "mesh")  # on a full disk the surface is cut short without a word
         if not raw.is_file() or raw.stat().st_size == 0:
             raise StageError("mesh: no surface came out of the dense points")
         loaded = trimesh.load(raw, process=False)

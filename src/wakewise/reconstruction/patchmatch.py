@@ -13,9 +13,11 @@ from scipy.spatial import KDTree
 
 from wakewise.errors import InputError, StageError
 from wakewise.interfaces import Progress
+from wakewise.processes import half_done
 from wakewise.reconstruction.clouds import Cloud, read_cloud, write_cloud
 from wakewise.reconstruction.colmap import call
 from wakewise.reconstruction.settings import ReconstructionSettings
+from wakewise.reconstruction.stages import need_room
 from wakewise.reconstruction.views import Ball
 
 
@@ -57,7 +59,7 @@ def patch_match(
     StageError
         If no points come out.
     """
-    with tempfile.TemporaryDirectory(prefix=".patch-match.", dir=out.parent) as scratch:
+    with tempfile.TemporaryDirectory(prefix=half_done("patch-match"), dir=out.parent) as scratch:
         work = Path(scratch) / "work"
         call(partial(pycolmap.undistort_images, work, sparse, folder), "dense", lambda: progress(0, 3, "undistort"))
         options = pycolmap.PatchMatchOptions()
@@ -71,6 +73,7 @@ def patch_match(
             "dense",
             lambda: progress(2, 3, "fusion"),
         )
+        need_room(out.parent, 0.0, "dense")  # on a full disk the points are cut short without a word
         cloud = read_cloud(raw)
     keep = np.ones(len(cloud.points_m), dtype=np.bool_)
     if region is not None:

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from wakewise.errors import InputError, StageError
+from wakewise.errors import EnvironmentFailure, InputError
 
 Image = NDArray[np.uint8]
 SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff")
@@ -55,7 +55,7 @@ class PhotoStore:
 
         Raises
         ------
-        StageError
+        EnvironmentFailure
             If it could be read before and cannot be any more.
         """
         kept = self._kept.get(name)
@@ -67,7 +67,7 @@ class PhotoStore:
         except OSError:
             image = None
         if image is None:
-            raise StageError(f"{path}: can no longer be read")
+            raise EnvironmentFailure(f"{path}: can no longer be read")
         self.keep(name, image)
         return image
 

@@ -15,6 +15,7 @@ from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.files import write_json
 from wakewise.interfaces import Progress, no_progress
+from wakewise.processes import alone
 from wakewise.reconstruction.dense import densify
 from wakewise.reconstruction.features import check_sizes, database_bytes, match_photos
 from wakewise.reconstruction.lenses import Lens
@@ -142,8 +143,12 @@ def reconstruct(
         If the photos, references, pairs or region cannot be used.
     StageError
         If too little of it fits together.
+    EnvironmentFailure
+        If the disk is full, or a file cannot be read or written.
     """
     start = time.perf_counter()
+    if out.resolve() == photos.resolve():
+        raise InputError(f"{out}: is the folder of the photos, the model must go elsewhere")
     settings = settings or ReconstructionSettings()
     if settings.dense == "patch-match":
         require_cuda()
@@ -169,38 +174,39 @@ def reconstruct(
         return fingerprint(VERSION, pycolmap.__version__, stage, before, used, parts)
 
     results: dict[str, StageResult] = {}
-    results["match"] = run_stage(
-        out,
-        "match",
-        key("match", "", [asdict(photo) for photo in found], focal_px, lens and lens.numbers(), listed),
-        (database,),
-        lambda: _match(store, found, database, settings, focal_px, lens, listed, progress),
-    )
-    placed = None if references is None else {name: position.tolist() for name, position in references.items()}
-    results["map"] = run_stage(
-        out,
-        "map",
-        key("map", results["match"].key, placed),
-        (sparse / "images.bin",),
-        lambda: _map(store, database, sparse, settings, len(found), references, progress),
-    )
-    place = None if ball is None else [ball.centre_W_m.tolist(), ball.radius_m]
-    results["dense"] = run_stage(
-        out,
-        "dense",
-        key("dense", results["map"].key, place),
-        (dense,),
-        lambda: _densify(store, sparse, dense, settings, ball, progress),
-    )
-    if settings.mesh:
-        spacing = 1e-3 * results["dense"].figures["point_spacing_mm"]
-        results["mesh"] = run_stage(
+    with alone(out):
+        results["match"] = run_stage(
             out,
-            "mesh",
-            key("mesh", results["dense"].key),
-            (mesh,),
-            lambda: mesh_points(dense, mesh, settings, spacing_m=spacing, progress=progress),
+            "match",
+            key("match", "", [asdict(photo) for photo in found], focal_px, lens and lens.numbers(), listed),
+            (database,),
+            lambda: _match(store, found, database, settings, focal_px, lens, listed, progress),
         )
+        placed = None if references is None else {name: position.tolist() for name, position in references.items()}
+        results["map"] = run_stage(
+            out,
+            "map",
+            key("map", results["match"].key, placed),
+            (sparse / "images.bin",),
+            lambda: _map(store, database, sparse, settings, len(found), references, progress),
+        )
+        place = None if ball is None else [ball.centre_W_m.tolist(), ball.radius_m]
+        results["dense"] = run_stage(
+            out,
+            "dense",
+            key("dense", results["map"].key, place),
+            (dense,),
+            lambda: _densify(store, sparse, dense, settings, ball, progress),
+        )
+        if settings.mesh:
+            spacing = 1e-3 * results["dense"].figures["point_spacing_mm"]
+            results["mesh"] = run_stage(
+                out,
+                "mesh",
+                key("mesh", results["dense"].key),
+                (mesh,),
+                lambda: mesh_points(dense, mesh, settings, spacing_m=spacing, progress=progress),
+            )
     figures: dict[str, Any] = {"mesh_vertices": None, "mesh_faces": None}
     for result in results.values():
         figures |= result.figures

@@ -12,11 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from wakewise.errors import InputError, StageError
+from wakewise.errors import EnvironmentFailure, InputError, WakewiseError
 from wakewise.files import write_json
 from wakewise.reconstruction.colmap import RESERVE_MB
 
 LOW_DISK_MB = 5.0
+# What SQLite and the C library say of it.
+FULL = ("disk is full", "No space left")
 
 
 def fingerprint(*parts: Any) -> str:
@@ -41,6 +43,11 @@ def run_stage(
     """Run `work` unless its products are there and its stamp, `folder/stages/<name>.json`, has the same key.
 
     The stamp is removed before and written after the work, so that a stage that was stopped is done again.
+
+    Raises
+    ------
+    EnvironmentFailure
+        If a file cannot be read or written, or the disk is full; whatever `work` raises else.
     """
     stamp = folder / "stages" / f"{name}.json"
     known = _read_stamp(stamp)
@@ -53,13 +60,16 @@ def run_stage(
         wall_s = time.perf_counter() - start
         write_json(stamp, {"key": key, "wall_s": wall_s, "figures": figures})
     except OSError as fault:
-        raise StageError(f"{name}: {no_room(fault, folder)}; the stages before it are kept") from fault
-    except StageError as fault:
+        raise EnvironmentFailure(f"{name}: {no_room(fault, folder)}; the stages before it are kept") from fault
+    except (EnvironmentFailure, InputError):
+        raise
+    except (WakewiseError, RuntimeError) as fault:
         # COLMAP and SQLite tell of a full disk in words of their own, or not at all.
         free_MB = shutil.disk_usage(folder).free / 1e6
-        if free_MB > LOW_DISK_MB or "is full" in str(fault):
+        if free_MB > LOW_DISK_MB and not any(words in str(fault) for words in FULL):
             raise
-        raise StageError(f"{fault}; the disk of {folder} is full, {free_MB:.0f} MB are left") from fault
+        reason = " ".join(str(fault).split())[:200]
+        raise EnvironmentFailure(f"{reason}; the disk of {folder} is full, {free_MB:.0f} MB are left") from fault
     return StageResult(figures=figures, wall_s=wall_s, key=key, skipped=False)
 
 
@@ -68,13 +78,13 @@ def need_room(folder: Path, size_bytes: float, name: str) -> None:
 
     Raises
     ------
-    StageError
+    EnvironmentFailure
         If less is free than the stage may write.
     """
     free = shutil.disk_usage(folder).free
     size_bytes += 1e6 * RESERVE_MB
     if free < size_bytes:
-        raise StageError(
+        raise EnvironmentFailure(
             f"{name}: the disk of {folder} is full, {free / 1e6:.1f} MB are left and about {size_bytes / 1e6:.1f} MB "
             "needed; the stages before it are kept"
         )

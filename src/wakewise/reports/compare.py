@@ -9,7 +9,6 @@ from pathlib import Path
 import cv2
 
 from wakewise.errors import InputError
-from wakewise.experiments.metrics import BETTER
 from wakewise.files import write_text
 from wakewise.reports import figures
 from wakewise.reports.errors import ModelErrors, model_errors
@@ -20,6 +19,7 @@ from wakewise.reports.photos import embed
 from wakewise.reports.trial import Trial, read_trial
 from wakewise.reports.views import SIDES, Frame, coverage_colours, draw_cloud, draw_surface
 from wakewise.reports.words import grouped, number, shown, unit, verdict
+from wakewise.trials.metrics import BETTER
 
 VIEW_PIXELS = 300
 PHOTO_WIDTH = 720

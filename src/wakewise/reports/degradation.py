@@ -16,7 +16,7 @@ LOG_FROM = 100.0
 
 
 def plot_degradation(rows: list[dict[str, Any]], title: str, unit: str, path: Path) -> None:
-    """Plot one factor's rows (see `experiments.degradation.COLUMNS`) into a PNG; a level without a model is marked."""
+    """Plot one factor's rows (`studies.degradation.COLUMNS`) into a PNG; a level without a model is marked."""
     figure = Figure(figsize=(6.4, 4.4), layout="constrained")
     FigureCanvasAgg(figure)
     error, share = figure.subplots(2, 1, sharex=True)

@@ -23,10 +23,11 @@ from wakewise.files import write_json, write_text
 from wakewise.imaging import Render
 from wakewise.interfaces import ScalarGrid
 from wakewise.operation import Scenario
+from wakewise.processes import alone
 from wakewise.studies.photo_model import judge
 from wakewise.studies.photo_sets import planned_views, render_clean, write_photos
 from wakewise.targets import Target
-from wakewise.trials.stages import Quiet, Watch
+from wakewise.trials.stages import Quiet, Watch, of_the_computer
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,18 +106,26 @@ def degrade(
     Raises
     ------
     InputError
-        If a factor is unknown, levels do not rise from 0 or more, or the folder holds another study.
+        If a factor is unknown, levels do not rise from 0 or more, the folder holds another study, or another run
+        is at it.
     """
     watch = watch or Quiet()
     wanted = _checked({name: factor.levels for name, factor in FACTORS.items()} if levels is None else levels)
     _claim(folder, scenario)
+    with alone(folder):
+        return _study(scenario, folder, wanted, watch)
+
+
+def _study(
+    scenario: Scenario, folder: Path, wanted: dict[str, tuple[float, ...]], watch: Watch
+) -> list[dict[str, Any]]:
     target = scenario.parts().target
     clean: list[Render] = []
     rows = []
     for name, steps in wanted.items():
         for level in steps:
             path = folder / name / f"{level:g}.json"
-            if not path.exists():
+            if not path.exists() or of_the_computer(json.loads(path.read_text(encoding="utf-8"))["failure"]):
                 with watch.stage(f"{name} {level:g}") as progress:
                     write_json(path, _one(scenario, target, name, level, folder / name / f"{level:g}", clean, progress))
             figures = json.loads(path.read_text(encoding="utf-8"))

@@ -38,6 +38,11 @@ def judge(
     dict
         Figures of the model and of its surface; `failure` is None, or says why there is no model, and then there are
         no figures of its surface. stages_s holds wall seconds by stage, total_s all of it, total_cpu_s its CPU time.
+
+    Raises
+    ------
+    EnvironmentFailure
+        If the disk is full, or a file cannot be read or written: that is no figure.
     """
     wall, cpu = time.perf_counter(), time.process_time()
     figures: dict[str, Any] = {"images": len(photos.names), "failure": None}

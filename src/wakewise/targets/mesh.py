@@ -16,7 +16,7 @@ import trimesh
 
 from wakewise.arrays import Array, IntArray, freeze
 from wakewise.errors import InputError
-from wakewise.files import whole_file
+from wakewise.files import broken_promise, whole_file
 
 READABLE_SUFFIXES = (".ply", ".stl", ".obj", ".off", ".glb")
 PLAUSIBLE_SIZE_M = (0.02, 2.0)
@@ -179,11 +179,13 @@ def _read(path: Path) -> tuple[Array, IntArray]:
             vertices = np.asarray(getattr(loaded, "vertices", np.zeros((0, 3))), dtype=np.float64)
             faces = np.asarray(getattr(loaded, "faces", np.zeros((0, 3))), dtype=np.int64)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or type(error).__name__})") from error
+        raise InputError(f"{path}: cannot be read ({error.strerror or 'the file is damaged'})") from error
     except Exception as error:
         # The parsers check little, and raise whatever malformed bytes happen to lead to.
-        reason = f"{type(error).__name__}: {error}".splitlines()[0][:120]
+        reason = str(error).strip().splitlines()[0][:120] if str(error).strip() else "the file is damaged"
         raise InputError(f"{path}: not a readable {path.suffix[1:].upper()} mesh ({reason})") from error
+    if path.suffix.lower() == ".ply" and (broken := broken_promise(path)) is not None:
+        raise InputError(f"{path}: was cut short, {broken}")
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
     return vertices, faces

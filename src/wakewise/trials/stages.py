@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
 from wakewise.files import write_json
 from wakewise.interfaces import no_progress
+
+_NOT_MEASURED = ("the stages before it are kept", "; the disk of ", "can no longer be read")
 
 
 class Watch(Protocol):
@@ -57,15 +59,26 @@ class Ledger:
         wall, cpu = time.perf_counter(), time.process_time()
         try:
             yield
-        finally:
-            costs = self.read()
-            before = costs.get(name, {"wall_s": 0.0, "cpu_s": 0.0})
-            costs[name] = {
-                "wall_s": before["wall_s"] + time.perf_counter() - wall,
-                "cpu_s": before["cpu_s"] + time.process_time() - cpu,
-            }
-            write_json(self.path, costs)
+        except BaseException:
+            with suppress(OSError):  # a full disk has been told of already
+                self._add(name, wall, cpu)
+            raise
+        self._add(name, wall, cpu)
+
+    def _add(self, name: str, wall: float, cpu: float) -> None:
+        costs = self.read()
+        before = costs.get(name, {"wall_s": 0.0, "cpu_s": 0.0})
+        costs[name] = {
+            "wall_s": before["wall_s"] + time.perf_counter() - wall,
+            "cpu_s": before["cpu_s"] + time.process_time() - cpu,
+        }
+        write_json(self.path, costs)
 
     def total(self, kind: str) -> float:
         """Sum of "wall_s" or "cpu_s" over the stages."""
         return sum(cost[kind] for cost in self.read().values())
+
+
+def of_the_computer(failure: str | None) -> bool:
+    """Whether a failure kept by versions up to 0.1.0 tells of the disk or a file, not of the photographs."""
+    return failure is not None and any(words in failure for words in _NOT_MEASURED)

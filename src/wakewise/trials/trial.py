@@ -31,10 +31,11 @@ from wakewise.operation import (
     read_scenario,
     write_scenario,
 )
+from wakewise.processes import alone
 from wakewise.reconstruction import read_cloud, read_lens, reconstruct
 from wakewise.targets import write_mesh
 from wakewise.trials.metrics import Figures, Gathering, comparison
-from wakewise.trials.stages import Ledger, Quiet, Watch
+from wakewise.trials.stages import Ledger, Quiet, Watch, of_the_computer
 from wakewise.trials.yardstick import add_yardsticks
 
 _SURFACE_FIGURES = (
@@ -65,13 +66,20 @@ def run_trial(flight: Parts | Scenario, folder: Path, watch: Watch | None = None
     Raises
     ------
     InputError
-        If the scenario cannot be flown, or the folder holds another trial.
+        If the scenario cannot be flown, or the folder holds another trial, or another run is at it.
+    EnvironmentFailure
+        If the disk is full, or a file cannot be read or written; the stages before it are kept.
     """
     watch = watch or Quiet()
     parts = flight if isinstance(flight, Parts) else flight.parts()
     scenario = as_flown(parts)
     _ = parts.preflight
     claim(folder, scenario)
+    with alone(folder):
+        return _run(parts, scenario, folder, watch)
+
+
+def _run(parts: Parts, scenario: Scenario, folder: Path, watch: Watch) -> Figures:
     ledger = Ledger(folder / "stages.json")
 
     def stage(name: str, product: str, work: Callable[[Callable[..., None]], None]) -> None:
@@ -81,6 +89,7 @@ def run_trial(flight: Parts | Scenario, folder: Path, watch: Watch | None = None
         with watch.stage(name) as progress, ledger.account(name):
             work(progress)
 
+    _forget_what_was_not_measured(folder)
     stage("plan", "planned.csv", lambda _: write_plan(parts, folder))
     stage("fly", "steps.parquet", lambda progress: fly_trial(parts, folder, progress))
     stage("photograph", "images.csv", lambda progress: photograph_flight(parts, folder, progress))
@@ -160,7 +169,13 @@ def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None])
     """Reconstruct from the photographs and the vehicle's own estimates; model.json says how it went.
 
     Nothing true goes in: pairs, scale and place come from the estimated camera poses, the region from the plan. A model
-    that does not come about is a result too, so its reason is kept instead of its figures.
+    that does not come about is a result too, so its reason is kept instead of its figures. That the disk is full is no
+    result.
+
+    Raises
+    ------
+    EnvironmentFailure
+        If the disk is full, or a file cannot be read or written.
     """
     photos = pl.read_csv(folder / "images.csv")
     names = photos["name"].to_list()
@@ -181,6 +196,14 @@ def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None])
         write_json(folder / "model.json", {"figures": summary, "failure": None})
     except StageError as fault:
         write_json(folder / "model.json", {"figures": {}, "failure": str(fault)})
+
+
+def _forget_what_was_not_measured(folder: Path) -> None:
+    """Have reconstruction and score done again where model.json holds a full disk as if it had been measured."""
+    path = folder / "model.json"
+    if path.exists() and of_the_computer(json.loads(path.read_text(encoding="utf-8"))["failure"]):
+        (folder / "score.json").unlink(missing_ok=True)
+        path.unlink()
 
 
 def texture_trial(parts: Parts, folder: Path, progress: Callable[..., None]) -> None:

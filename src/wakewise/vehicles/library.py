@@ -18,6 +18,7 @@ from wakewise.geometry import euler_from_quat, quat_from_matrix
 from wakewise.vehicles.draft import ThrusterDraft, VehicleDraft
 from wakewise.vehicles.vehicle import Vehicle
 from wakewise.vehicles.vehicle_file import R_BODY_CAMERA, VehicleFile
+from wakewise.yaml_text import YamlError, read_yaml
 
 
 @functools.cache
@@ -87,10 +88,9 @@ def parse_vehicle(text: str, where: str, name: str) -> VehicleDraft:
     if text.lstrip().startswith("<"):
         raise InputError(f"vehicle file {where}: is XML, not a vehicle file; see wakewise vehicle import")
     try:
-        value = yaml.load(text, Loader=_StrictLoader)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"vehicle file {where}: not valid YAML ({reason})") from error
+        value = read_yaml(text)
+    except YamlError as error:
+        raise InputError(f"vehicle file {where}: not valid YAML ({error})") from error
     if not isinstance(value, dict):
         raise InputError(f"vehicle file {where}: holds {type(value).__name__}, must be a mapping of groups")
     try:
@@ -252,14 +252,3 @@ def _flow_list(dumper: _Dumper, value: list[Any]) -> yaml.Node:
 
 
 _Dumper.add_representer(list, _flow_list)
-
-
-class _StrictLoader(yaml.SafeLoader):
-    """Safe YAML that refuses a key given twice, which YAML forbids and the plain loader lets pass."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[object, object]:
-        keys = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
-        twice = sorted({key for key in keys if keys.count(key) > 1})
-        if twice:
-            raise yaml.YAMLError(f"key {', '.join(twice)} given more than once in line {node.start_mark.line + 1}")
-        return dict(super().construct_mapping(node, deep=deep))

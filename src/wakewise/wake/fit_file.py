@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from pydantic import ValidationError
 
 from wakewise.errors import InputError
 from wakewise.files import write_text
 from wakewise.wake.calibration import Calibration
 from wakewise.wake.models import WakeSettings
+from wakewise.yaml_text import YamlError, read_yaml
 
 
 def fit_yaml(fit: Calibration, source: str, disk_diameter_m: float) -> str:
@@ -50,9 +50,11 @@ def read_wake_settings(path: Path) -> WakeSettings:
         If the file cannot be read or a field is wrong.
     """
     try:
-        tree: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as fault:
-        raise InputError(f"{path}: cannot be read as YAML ({fault.__class__.__name__})") from None
+        tree: Any = read_yaml(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError):
+        raise InputError(f"{path}: cannot be read as text, a file of `wakewise wake fit` is needed") from None
+    except YamlError as fault:
+        raise InputError(f"{path}: not YAML ({fault})") from None
     for head in ("control", "wake"):
         if isinstance(tree, dict) and set(tree) == {head}:
             tree = tree[head]

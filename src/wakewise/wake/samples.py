@@ -148,7 +148,8 @@ def read_samples(path: Path, disk_diameter_m: float | None = None) -> JetSamples
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as fault:
-        raise InputError(f"{path}: cannot be read ({fault.__class__.__name__})") from None
+        reason = fault.strerror if isinstance(fault, OSError) else "it is no text"
+        raise InputError(f"{path}: cannot be read ({reason})") from None
     lines = [(n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
     if len(lines) < 2:
         raise InputError(f"{path}: no rows, needs a line of column names and one line per point")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 from typing import Any
 
-from wakewise.errors import InputError
+from wakewise.errors import InputError, how_to_install
 
 DEVICES = ("auto", "cpu", "cuda")
 
@@ -19,7 +19,7 @@ def require_torch() -> None:
         If there is no PyTorch.
     """
     if importlib.util.find_spec("torch") is None:
-        raise InputError("neural field: PyTorch is not installed; pip install 'wakewise[nerf]'")
+        raise InputError(f"neural field: PyTorch is not installed; {how_to_install('nerf')}")
 
 
 def pick_device(name: str) -> Any:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image as Pictures
 
-from wakewise.errors import InputError, StageError
+from wakewise.errors import InputError, StageError, how_to_install
 from wakewise.files import whole_file
 
 Frame = NDArray[np.uint8]
@@ -95,7 +95,7 @@ class _VP9:
         code = cv2.VideoWriter.fourcc(*("vp09" if path.suffix.lower() == ".mp4" else "VP90"))
         self._writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, fps, size_px)
         if not self._writer.isOpened():
-            raise StageError("film: OpenCV here cannot write VP9; use --out film.webp, or install wakewise[film]")
+            raise StageError(f"film: OpenCV here cannot write VP9; use --out film.webp, or {how_to_install('film')}")
 
     def add(self, frame: Frame) -> None:
         self._writer.write(np.ascontiguousarray(frame[..., ::-1]))

@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from wakewise.errors import InputError, StageError
+from wakewise.errors import InputError, StageError, how_to_install
 from wakewise.studies.piv.correlation import correlate
 from wakewise.studies.piv.images import Picture
 from wakewise.studies.piv.vectors import Displacements
@@ -53,7 +53,7 @@ def displacements(pairs: Sequence[tuple[Picture, Picture]], engine: Engine = "au
             f"image pairs: {pairs[0][0].shape} px, each side must have {2 * OPENPIV_WINDOWS_PX[0]} or more"
         )
     if engine == "openpiv" and not has_openpiv():
-        raise InputError("engine 'openpiv': not installed, install wakewise[piv] or choose 'in-house'")
+        raise InputError(f"engine 'openpiv': not installed; {how_to_install('piv')}, or choose 'in-house'")
     if engine == "openpiv" or (engine == "auto" and has_openpiv()):
         return _openpiv(pairs)
     return [correlate(first, second) for first, second in pairs]
