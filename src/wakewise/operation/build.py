@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.control import make_controller
+from wakewise.control.settings import told
 from wakewise.errors import InputError
 from wakewise.estimation import ErrorStateFilter
 from wakewise.geometry import Pose, quat_from_rotvec, quat_multiply
@@ -23,6 +24,7 @@ from wakewise.operation.loop import Truth, WaterTruth
 from wakewise.operation.scenario import Scenario, TargetSettings
 from wakewise.planning import Surroundings, check_start, covering_spheres, state_of
 from wakewise.tank import Holding, Tank, build_ambient, holding
+from wakewise.tank.ambient import mean_current_m_s
 from wakewise.tank.fitting import check_fit
 from wakewise.targets import Region, Target, coral, coral_kinds, delicacy, load_mesh, place_on_bed, sample_region
 from wakewise.vehicles import Vehicle, load_vehicle, perturbed
@@ -222,7 +224,8 @@ def build_flight(scenario: Scenario, mission: Mission) -> Flight:
     check_start(believed, mission.region, state_of(wished), build_surroundings(scenario))
     start = BodyState(X_WB=_misplaced(wished.X_WB, seeds.start))
     tank = Tank(true_vehicle, mission.target, tank_settings, start, seeds.tank)
-    control, depth_m = scenario.control, tank_settings.size_m[2]
+    control = told(scenario.control, mean_current_m_s(tank_settings, mission.route.duration_s))
+    depth_m = tank_settings.size_m[2]
     return Flight(
         mission=mission,
         true_vehicle=true_vehicle,
