@@ -19,7 +19,9 @@ def data(tmp_path):
     distance, angle = rng.uniform(0.1, 0.5, 300), rng.uniform(0.0, 0.5, 300)
     thrust = np.repeat([1.0, 2.0, 4.0], 100)
     x, r = distance * np.cos(angle), distance * np.sin(angle)
-    model = wake_model(WakeSettings(model="fitted", gain=0.5, decay_power=1.0, cosine_power=40.0, soft_radius_m=0.05))
+    model = wake_model(
+        WakeSettings(model="fitted", gain=0.5, decay_power=1.0, cosine_power=40.0, soft_radius_m=0.05, floor=False)
+    )
     speed = model.speed(x, r, thrust, 0.25 * np.pi * 0.06**2) + 0.005 * rng.standard_normal(300)
     path = tmp_path / "jet.csv"
     rows = [f"{a},{b},{t},{u}" for a, b, t, u in zip(x, r, thrust, speed, strict=True)]

@@ -38,7 +38,7 @@ def test_obedience_scales_all_weights_of_tracking():
     assert obeying(plan, 5.0) == plan
     strict = obeying(plan, 20.0)
     assert strict.w_track == pytest.approx(4.0 * plan.w_track) and strict.w_path == pytest.approx(4.0 * plan.w_path)
-    assert strict.w_disturbance == plan.w_disturbance and strict.w_effort == plan.w_effort
+    assert strict.w_attitude == plan.w_attitude and strict.w_change == plan.w_change
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, float("nan"), float("inf")])

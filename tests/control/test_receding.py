@@ -1,27 +1,26 @@
 """The methods that plan, in the loop: what is planned is asked once, limits hold, and nobody chatters."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from plan_cases import AROUND, CONE, REGION, VEHICLE, model, problem
+from plan_cases import AROUND, CONE, REGION, VEHICLE
 
 from wakewise.control import ControlSettings, make_controller, planning_controller
 from wakewise.evaluation.flight import sign_flips
 from wakewise.geometry import Pose, quat_from_euler, quat_from_rotvec, quat_multiply
 from wakewise.interfaces import BodyState, Goal
-from wakewise.planning import Planner, PlanSettings
+from wakewise.planning import PlanSettings
 from wakewise.thrusters import thruster_lag
 from wakewise.vehicles import compile_body, step_rk4
 
 PLACE = Pose(np.array([0.45, 0.0, 1.05]), quat_from_euler(0.0, 0.0, np.pi))
-QUICK = ControlSettings(plan=PlanSettings(iterations=2, second_start_every=0))
-PLANNING = ("wake-aware", "unaware", "smooth", "linear", "pseudo-inverse", "planner-paper")
+OFF = {"spare": False, "meet": False, "drift": False}
+QUICK = ControlSettings(plan=PlanSettings(iterations=2), levers=OFF)
+PLANNING = ("wake-aware", "unaware", "smooth", "linear", "pseudo-inverse")
 
 
 @pytest.fixture(scope="module")
 def controller():
-    return planning_controller(VEHICLE, REGION, CONE, QUICK, QUICK.plan, surroundings=AROUND)
+    return planning_controller(VEHICLE, REGION, CONE, QUICK, surroundings=AROUND)
 
 
 def test_a_vehicle_on_its_plan_gets_what_was_planned_and_no_more(controller):
@@ -105,43 +104,3 @@ def test_the_planner_reverses_no_more_often_than_the_pseudo_inverse():
     """Sparing the target is not bought by chatter: reversals per second against the same wrench by least thrusts."""
     gentle, least = (sign_flips(hovering(method)) / 5.0 for method in ("wake-aware", "pseudo-inverse"))
     assert gentle <= least + 0.4, (gentle, least)
-
-
-def test_persistence_weighs_what_lasts():
-    """With the lever a jet that is reversed every tenth of a second hardly weighs, a steady one weighs the same, and a
-    burst weighs as much in the end, only later: momentum is not lost on the way.
-    """
-    costs = {}
-    for name in ("steady", "burst", "reversed"):
-        for lag_s in (0.0, 0.5):
-            U = np.zeros((20, 8))
-            U[: 2 if name == "burst" else 20, :4] = 1.0
-            if name == "reversed":
-                U[1::2] *= -1.0
-            planner = Planner(model(smooth_N=0.02))
-            case = problem()
-            jets = U[0] if name == "steady" else np.zeros(8)
-            planner.load(replace(case, thrusts_N=jets, jets_N=jets, jet_lags_s=np.full(8, lag_s)))
-            planner.cost(U)
-            costs[name, lag_s] = np.array(planner._work.D)
-    assert costs["reversed", 0.5].sum() < 0.3 * costs["reversed", 0.0].sum()
-    assert costs["burst", 0.5].sum() > 0.8 * costs["burst", 0.0].sum()
-    np.testing.assert_allclose(costs["steady", 0.5], costs["steady", 0.0], rtol=1e-9)
-
-
-def test_the_lags_of_jets_are_travel_times():
-    """With the lever on jets lag by distance over speed: farther and weaker is later. With it off they do not lag."""
-    settings = PlanSettings(iterations=1, persistence=1.0)
-    controller = planning_controller(VEHICLE, REGION, CONE, ControlSettings(), settings, surroundings=AROUND)
-    near, far = (np.concatenate([PLACE.p_m + np.array([x, 0.0, 0.0]), PLACE.q, np.zeros(6)]) for x in (0.0, 0.5))
-    lags = controller._jet_lags_s(near, np.full(8, 1.0))
-    assert np.all((lags > 0.05) & (lags < 10.0))
-    assert np.all(controller._jet_lags_s(far, np.full(8, 1.0)) > lags)
-    assert np.all(controller._jet_lags_s(near, np.full(8, 4.0)) < lags)
-    state = controller.init()
-    for _ in range(8):
-        state, command = controller.step(
-            state, 0.02, BodyState(X_WB=PLACE, load_B=np.array([0, 0, 2.0, 0, 0, 0])), Goal(X_WB=PLACE)
-        )
-    assert 0.0 < np.abs(state.jets_N).max() < np.abs(command.thrusts_N).max()
-    assert planning_controller(VEHICLE, REGION, CONE, QUICK, QUICK.plan)._jet_lags_s(near, np.zeros(8)) is None

@@ -24,9 +24,9 @@ def refused(capsys, *arguments):
 @pytest.mark.parametrize(
     ("sets", "words"),
     [
-        (["control.plan.w_disturbance=-1"], ["control.plan.w_disturbance", "-1", "greater than or equal to 0"]),
+        (["control.w_disturbance=-1"], ["control.w_disturbance", "-1", "greater than or equal to 0"]),
         (["control.plan.w_track=.nan"], ["control.plan.w_track", "finite"]),
-        (["control.plan.persistence=-0.5"], ["control.plan.persistence", "-0.5"]),
+        (["control.plan.attitude_tolerance_rad=-0.5"], ["control.plan.attitude_tolerance_rad", "-0.5"]),
         (["control.obstacles=[[0.9, 0, 1.1, -0.2]]"], ["control.obstacles", "-0.2"]),
         (
             ["mission.standoff_m=0.05", "mission.elevations_deg=[80]", "mission.views=[12]"],

@@ -5,7 +5,7 @@ import numpy as np
 from wakewise.geometry import Pose, quat_from_euler
 from wakewise.interfaces import Goal
 from wakewise.planning.planner import compile_plan
-from wakewise.planning.problem import PlanProblem, PlanSettings
+from wakewise.planning.problem import PlanProblem, PlanSettings, PlanTerms
 from wakewise.planning.reference import reference_of
 from wakewise.planning.surroundings import Surroundings
 from wakewise.targets import Region
@@ -19,12 +19,13 @@ _POINTS = _RNG.normal(size=(120, 3))
 _POINTS *= (0.08 * _RNG.random(120) ** (1 / 3) / np.linalg.norm(_POINTS, axis=1))[:, None]
 REGION = Region(points_W_m=CENTRE + _POINTS, weights=_RNG.uniform(0.5, 1.5, 120), distance_m=np.full(120, 0.01))
 AROUND = Surroundings.tank(np.array([-3.0, -2.5, 0.0]), np.array([3.0, 2.5, 1.5]), np.array([[*CENTRE, 0.08]]))
-CONE = wake_model(WakeSettings(model="paper-calibrated", edge_width_deg=3.0))
+CONE = wake_model(WakeSettings(model="paper-calibrated", edge_width_deg=3.0, floor=False))
 
 
 def model(wake=CONE, region=REGION, around=AROUND, **settings):
     limits = {name: settings.pop(name) for name in ("lower_N", "upper_N", "majorise") if name in settings}
-    return compile_plan(VEHICLE, region, wake, PlanSettings(**settings), around, **limits)
+    terms = PlanTerms(**{name: settings.pop(name) for name in list(settings) if name in PlanTerms.__dataclass_fields__})
+    return compile_plan(VEHICLE, region, wake, PlanSettings(**settings), around, terms, **limits)
 
 
 def problem(seed=0, weight_N=1.5, stages=20, away=0.02):
@@ -40,7 +41,6 @@ def problem(seed=0, weight_N=1.5, stages=20, away=0.02):
         thrusts_N=0.5 * rng.normal(size=8),
         command_N=0.5 * rng.normal(size=8),
         reference=reference_of(goal, stages, 0.1),
-        quiet=np.ones(stages),
         force_W_N=np.array([0.2, -0.1, weight_N]),
         moment_B_Nm=np.array([0.01, -0.02, 0.01]),
         current_W_m_s=np.array([0.1, 0.05, 0.0]),

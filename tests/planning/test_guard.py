@@ -22,8 +22,8 @@ GOAL = Goal(X_WB=PLACE)
 
 @pytest.fixture(scope="module")
 def controller():
-    settings = PlanSettings(iterations=2, second_start_every=0)
-    return planning_controller(VEHICLE, REGION, CONE, ControlSettings(), settings, surroundings=AROUND)
+    settings = ControlSettings(plan=PlanSettings(iterations=2))
+    return planning_controller(VEHICLE, REGION, CONE, settings, surroundings=AROUND)
 
 
 class Failing(Planner):

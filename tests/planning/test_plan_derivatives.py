@@ -1,7 +1,5 @@
 """Every derivative of a plan's cost against differences, and every fast kernel against a slow twin."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from plan_cases import CONE, REGION, VEHICLE, model, problem
@@ -116,7 +114,7 @@ def test_condensing_equals_products_of_whole_matrices():
             cross = M[k].T @ work.S[k] @ G[:6]
             H += cross + cross.T + M[k].T @ work.R[k] @ M[k]
             G = work.A[k] @ G + work.B[k] @ M[k]
-    condense(table, planner._case, work, room)
+    condense(table, work, room)
     lower = np.tril(np.ones((160, 160), dtype=bool))
     np.testing.assert_allclose(room.H[lower], H[lower], rtol=0.0, atol=1e-12 * abs(H).max())
 
@@ -249,60 +247,3 @@ def test_the_quadratic_problem_is_solved(bound):
         start = rho * np.sum(np.maximum(np.abs(steps) - limit, 0.0) ** 2)
         fall = start - (0.5 * z @ H @ z + g @ z + rho * np.sum(over**2))
         assert answer.promise == pytest.approx(fall, rel=1e-6)
-
-
-LAGS_S = np.array([0.8, 0.5, 0.0, 1.2, 0.3, 0.05, 2.0, 0.7])
-
-
-def test_jets_that_take_their_time_keep_gradient_and_hessian_exact():
-    """With lags of the jets, gradients agree with differences and the recursion with products of whole matrices."""
-    planner = Planner(model())
-    planner.load(replace(problem(), jets_N=np.linspace(-1.0, 1.0, 8), jet_lags_s=LAGS_S))
-    rng = np.random.default_rng(4)
-    U = rng.normal(0.0, 2.0, (20, 8))
-    gradient = planner.gradient(U).copy()
-    for _ in range(6):
-        d = rng.normal(size=U.shape)
-        d /= np.linalg.norm(d)
-        slope = (planner.cost(U + 1e-5 * d) - planner.cost(U - 1e-5 * d)) / 2e-5
-        assert abs(slope - gradient @ d.ravel()) < 1e-6 * np.linalg.norm(gradient)
-    planner.derivatives(U)
-    table, work, room, case = planner.model.table, planner._work, planner._room, planner._case
-    np.testing.assert_allclose(work.jets, jets_of(U, case, table), atol=1e-5)
-    M, J = np.zeros((20, 8, 160)), np.zeros((20, 8, 160))
-    for k in range(20):
-        for i in range(8):
-            M[k, i, i::8] = table.mean_map[k, i::8]
-            J[k, i, i::8] = case.jet_map[k, i::8]
-    np.testing.assert_allclose(
-        np.einsum("kij,j->ki", J, U.ravel()),
-        jets_of(U, case, table) - jets_of(np.zeros((20, 8)), case, table),
-        atol=1e-5,
-    )
-    G, H = np.zeros((12, 160)), np.zeros((160, 160))
-    for k in range(21):
-        Q = np.zeros((12, 12))
-        Q[:6, :6] = work.Q[k]
-        if k > 0:
-            Q[6:, 6:] = 2.0 * 0.1 * np.eye(6)
-        H += G.T @ Q @ G
-        if k < 20:
-            cross = J[k].T @ work.S[k] @ G[:6]
-            H += cross + cross.T + J[k].T @ work.R[k] @ J[k]
-            G = work.A[k] @ G + work.B[k] @ M[k]
-    condense(table, case, work, room)
-    lower = np.tril(np.ones((160, 160), dtype=bool))
-    np.testing.assert_allclose(room.H[lower], H[lower], rtol=0.0, atol=1e-12 * abs(H).max())
-
-
-def jets_of(U, case, table):
-    """Mean jets of commands, finely integrated: two exact lags, one behind the other."""
-    fine, lags = 2000, np.maximum(LAGS_S, 1e-9)
-    T, jet, jets = np.array(case.thrusts), np.array(case.jets), np.zeros(U.shape)
-    for k in range(len(U)):
-        mean = table.mean * T + (1.0 - table.mean) * U[k]
-        T = table.keep * T + (1.0 - table.keep) * U[k]
-        course = (np.arange(fine)[:, None] + 0.5) * table.stage_s / fine
-        jets[k] = np.mean(mean + (jet - mean) * np.exp(-course / lags), axis=0)
-        jet = mean + (jet - mean) * np.exp(-table.stage_s / lags)
-    return jets

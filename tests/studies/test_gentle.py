@@ -88,14 +88,14 @@ def test_seeds_are_pairs():
 def test_the_answer_has_the_keys_that_were_promised(tmp_path):
     """Methods, reductions and levers of both flows, and a picture of them, from made-up flights."""
     flights = {m: dict.fromkeys((1, 2), ROW) for m in gentle.METHODS}
-    flights |= {PLAIN: {1: ROW, 2: ROW}, "halo": {1: ROW | {SPEED: 0.5}}}
+    flights |= {PLAIN: {1: ROW, 2: ROW}, "wide cone": {1: ROW | {SPEED: 0.5}}}
     flows = {w: flow_figures(w, flights, gentle.METHODS, entries("parcels")) for w in ("parcels", "paper")}
     found = flows["parcels"]
     assert found["circular"] is False and flows["paper"]["circular"] is True
     assert set(found["methods"]) == set(gentle.METHODS) and found["reduction_vs_unaware_pct"] == pytest.approx(0.0)
     assert found["reduction_vs_dp_pct"] == pytest.approx(0.0) and found["position_change_vs_dp_mm"] == 0.0
-    assert found["levers"] == {PLAIN: pytest.approx(0.0), "halo": pytest.approx(50.0)}
-    assert found["lever_details"]["halo"]["flights"] == 1
+    assert found["levers"] == {PLAIN: pytest.approx(0.0), "wide cone": pytest.approx(50.0)}
+    assert found["lever_details"]["wide cone"]["flights"] == 1
     for key in ("target_speed_mean_m_s", "exposure_speed_mean_m_s", "disturbance", "position_rmse_mm", "energy_kJ"):
         assert found["methods"]["dp"][key] == 1.0
     draw_levers({"flows": flows}, tmp_path / "levers.png")
@@ -160,7 +160,7 @@ def test_a_bench_that_was_stopped_goes_on_and_failures_are_named(monkeypatch, tm
         seeds=3,
         methods=("dp", "wake-aware"),
         flows=("parcels",),
-        levers=("halo",),
+        levers=("wide cone",),
         store=tmp_path,
         progress=lambda done, total, note="": said.append((done, total, note)),
     )

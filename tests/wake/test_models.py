@@ -24,16 +24,16 @@ def test_names_give_models_and_a_wrong_name_is_told_the_right_ones():
 @pytest.mark.parametrize("name", model_names())
 def test_settings_without_numbers_are_the_named_model(name):
     """Defaults in settings and by name are the same model."""
-    assert wake_model(WakeSettings(model=name)) == wake_model(name)
+    assert wake_model(WakeSettings(model=name, floor=False)) == wake_model(name)
 
 
 def test_settings_carry_numbers():
     """A fit goes into a scenario file: its numbers replace the defaults, the rest stays."""
-    fitted = wake_model(WakeSettings(model="fitted", cosine_power=80.0))
+    fitted = wake_model(WakeSettings(model="fitted", cosine_power=80.0, floor=False))
     assert (fitted.gain, fitted.cosine_power, fitted.decay_power) == (0.6, 80.0, 0.85)
-    assert wake_model(WakeSettings(model="jet-fitted", decay=5.0)).decay == 5.0
-    assert wake_model(WakeSettings(model="jet", half_width_slope=0.18)).half_width_slope == 0.18
-    smooth = wake_model(WakeSettings(model="paper", edge_width_deg=3.0))
+    assert wake_model(WakeSettings(model="jet-fitted", decay=5.0, floor=False)).decay == 5.0
+    assert wake_model(WakeSettings(model="jet", half_width_slope=0.18, floor=False)).half_width_slope == 0.18
+    smooth = wake_model(WakeSettings(model="paper", edge_width_deg=3.0, floor=False))
     assert (smooth.name, smooth.edge_width_rad, smooth.gain) == ("paper", pytest.approx(np.deg2rad(3.0)), 1.0)
 
 
@@ -56,11 +56,11 @@ def test_a_number_that_a_model_does_not_have_is_refused(numbers, message):
 
 def test_a_floor_needs_a_bed():
     """With `floor` the model is the jet and its wall jet; without a bed's depth it is refused."""
-    model = wake_model(WakeSettings(model="fitted", floor=True), bed_z_m=1.5)
+    model = wake_model(WakeSettings(model="fitted"), bed_z_m=1.5)
     assert isinstance(model, FloorJet)
     assert (model.name, model.bed_z_m, model.jet.name) == ("fitted+floor", 1.5, "fitted")
     with pytest.raises(InputError, match="floor is set but there is no bed"):
-        wake_model(WakeSettings(floor=True))
+        wake_model(WakeSettings())
 
 
 def test_the_default_levels_agree_where_they_say_so():

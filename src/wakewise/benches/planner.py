@@ -15,13 +15,13 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.benches.cases import REGION, TARGET, VEHICLE
+from wakewise.benches.paper_planner import PaperPlanner
 from wakewise.benches.planner_load import deadline_misses
 from wakewise.benches.planner_reference import IpoptReference
 from wakewise.geometry import Pose, quat_from_euler
 from wakewise.interfaces import Goal
-from wakewise.planning.paper_planner import PaperPlanner
 from wakewise.planning.planner import PlanModel, Planner, compile_plan, shifted
-from wakewise.planning.problem import Horizon, PlanProblem, PlanSettings
+from wakewise.planning.problem import Horizon, PlanProblem, PlanSettings, PlanTerms
 from wakewise.planning.reference import reference_of
 from wakewise.planning.surroundings import Surroundings
 from wakewise.thrusters import thruster_lag
@@ -61,12 +61,12 @@ def run(options: BenchOptions) -> dict[str, Any]:
 
 def plan_model(iterations: int, second_start_every: int = 10, tolerance: float = 1e-3) -> PlanModel:
     """What the planner of this bench believes."""
-    settings = PlanSettings(iterations=iterations, second_start_every=second_start_every, tolerance=tolerance)
+    terms = PlanTerms(second_start_every=second_start_every, tolerance=tolerance)
     around = Surroundings(
         planes=np.array([[0.0, 0.0, -1.0, -TARGET.bed_z_m]]), spheres=np.array([[*TARGET.centre_W_m, TARGET.radius_m]])
     )
-    wake = wake_model(WakeSettings(model="paper-calibrated", edge_width_deg=3.0))
-    return compile_plan(VEHICLE, REGION, wake, settings, around)
+    wake = wake_model(WakeSettings(model="paper-calibrated", edge_width_deg=3.0, floor=False))
+    return compile_plan(VEHICLE, REGION, wake, PlanSettings(iterations=iterations), around, terms)
 
 
 def goal_at(time_s: float) -> Goal:
@@ -96,7 +96,6 @@ def problem_at(
         thrusts_N=np.zeros(n) if thrusts_N is None else thrusts_N,
         command_N=np.zeros(n) if before is None else before,
         reference=reference_of(goal, settings.stages, settings.stage_s),
-        quiet=np.ones(settings.stages),
         force_W_N=np.array([0.0, 0.0, weight_N]),
         current_W_m_s=CURRENT_M_S,
     )
@@ -176,7 +175,7 @@ def _restart_spread(problem: PlanProblem) -> tuple[float, float]:
     A start is 1 N of noise on every command of every stage; plans that did not converge are left out.
     """
     rng = np.random.default_rng(0)
-    shape = (len(problem.quiet), len(problem.thrusts_N))
+    shape = (len(problem.reference) - 1, len(problem.thrusts_N))
     model = plan_model(50, second_start_every=1, tolerance=1e-5)
     found = [Planner(model).plan(problem, rng.normal(0.0, 1.0, shape)) for _ in range(RESTARTS)]
     spreads = []

@@ -11,7 +11,7 @@ import numpy as np
 
 from wakewise.planning.guard import Guard
 from wakewise.planning.planner import PlanModel, Planner
-from wakewise.planning.problem import PlanProblem
+from wakewise.planning.problem import PLAN_EVERY_S, PlanProblem
 
 PLANS = 100
 
@@ -20,7 +20,7 @@ def deadline_misses(model: PlanModel, problem: PlanProblem) -> tuple[int, float]
     """Late plans of `PLANS`, ten per second, and the longest time in ms, with one busy process per core."""
     busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(os.cpu_count() or 1)]
     try:
-        guard = Guard(planner=Planner(model), deadline_s=model.settings.deadline_s)
+        guard = Guard(planner=Planner(model), deadline_s=PLAN_EVERY_S)
         plan, longest = None, 0.0
         guard.ask(lambda: problem, None, 0.0)
         guard.counts.clear()

@@ -30,7 +30,6 @@ def dynamic_positioning(
     return TrackingController(
         name="dp",
         tracker=make_tracker(vehicle, settings),
-        view=WakeView.of(vehicle, region, wake, settings.wake.sum),
+        view=WakeView.of(vehicle, region, wake, settings.superposition),
         allocate=allocate,
-        hold_s=settings.hold_s,
     )

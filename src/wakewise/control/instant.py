@@ -7,9 +7,9 @@ from typing import Any
 
 from wakewise.allocation.allocate import Allocation, Weights, gentle_allocation, least_thrusts
 from wakewise.arrays import Array
-from wakewise.control.levers import levelled, watched
+from wakewise.control.levers import watched
 from wakewise.control.loop import TrackingController, vehicle_layout
-from wakewise.control.settings import ControlSettings
+from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
 from wakewise.control.spare import meeting_view
 from wakewise.control.tracker import make_tracker
 from wakewise.interfaces import Controller, WakeModel
@@ -28,9 +28,11 @@ def instant_allocator(
     D is divided by the sum of the region's weights, so that the cost does not depend on how many points sample it.
     """
     layout = vehicle_layout(vehicle)
-    view = WakeView.of(vehicle, region, wake, settings.wake.sum)
+    view = WakeView.of(vehicle, region, wake, settings.superposition)
     weights = Weights(
-        disturbance=settings.w_disturbance / view.total_weight, effort=settings.w_effort, previous=settings.w_previous
+        disturbance=settings.w_disturbance / view.total_weight,
+        effort=settings.w_effort,
+        previous=PREVIOUS_SHARE * settings.w_effort,
     )
 
     def allocate(wrench_B: Array, gram: Array | None, previous_N: Array) -> Allocation:
@@ -43,7 +45,6 @@ def instant_allocator(
         tracker=make_tracker(vehicle, settings),
         view=view,
         allocate=allocate,
-        hold_s=settings.hold_s,
     )
 
 
@@ -56,9 +57,7 @@ def instant(
 ) -> Controller[Any]:
     """`instant`: the tracker, and the gentlest thrusts for its wrench, one instant at a time."""
     levers = settings.levers
-    chosen = settings
-    if levers.incoherent:
-        chosen = settings.model_copy(update={"wake": settings.wake.model_copy(update={"sum": "incoherent"})})
-    controller = instant_allocator(vehicle, watched(region, levers, bed_of(wake)), wake, chosen)
-    view = meeting_view(controller.view, vehicle_layout(vehicle)) if levers.meet else controller.view
-    return levelled(replace(controller, view=view), levers)
+    controller = instant_allocator(vehicle, watched(region, levers, bed_of(wake)), wake, settings)
+    if not levers.meet:
+        return controller
+    return replace(controller, view=meeting_view(controller.view, vehicle_layout(vehicle)))

@@ -23,6 +23,9 @@ def vehicle_layout(vehicle: Vehicle) -> Layout:
     return compile_layout(vehicle.allocation_matrix, vehicle.thrust_lower_N, vehicle.thrust_upper_N)
 
 
+HOLD_S = 0.5
+"""Time constant with which thrusts fade while there is no usable estimate: some filter updates may be missed, a
+vehicle that is lost must not go on pushing."""
 FULL = 1.0 - 1e-9
 """Shares of a wrench above this are all of it, but for rounding."""
 
@@ -46,14 +49,13 @@ class ControllerState:
 class TrackingController:
     """A tracker and a way to allocate; implements `wakewise.interfaces.Controller`.
 
-    An estimate or goal that is not finite gives the last thrusts, fading with `hold_s`, and says so in `fallback`.
+    An estimate or goal that is not finite gives the last thrusts, fading with `HOLD_S`, and says so in `fallback`.
     """
 
     name: str
     tracker: Tracker
     view: WakeView
     allocate: Allocate
-    hold_s: float
 
     def init(self) -> ControllerState:
         """State before the first step."""
@@ -80,5 +82,5 @@ class TrackingController:
         return ControllerState(tracker=tracker_state, thrusts_N=found.thrusts_N, share=found.scale), command
 
     def _hold(self, state: ControllerState, dt_s: float, why: str) -> tuple[ControllerState, Command]:
-        thrusts = state.thrusts_N * np.exp(-dt_s / self.hold_s)
+        thrusts = state.thrusts_N * np.exp(-dt_s / HOLD_S)
         return replace(state, thrusts_N=thrusts), Command(thrusts_N=thrusts, wrench_B=np.zeros(6), fallback=why)

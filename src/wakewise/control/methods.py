@@ -18,29 +18,14 @@ from typing import Any, cast
 from wakewise.control.dynamic_positioning import dynamic_positioning
 from wakewise.control.instant import instant
 from wakewise.control.pseudo_inverse import planned_pseudo_inverse
-from wakewise.control.receding import PlanningController, planning_controller
 from wakewise.control.settings import ControlSettings
 from wakewise.control.unaware import smooth, unaware
 from wakewise.control.wake_aware import linear, planned
 from wakewise.interfaces import Controller, WakeModel
-from wakewise.planning import PaperPlanner, Surroundings
+from wakewise.planning import Surroundings
 from wakewise.plugins import find
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
-
-
-def _planner(
-    vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings, around: Surroundings | None
-) -> PlanningController:
-    return planning_controller(vehicle, region, wake, settings, settings.plan, surroundings=around)
-
-
-def _paper_planner(
-    vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings, around: Surroundings | None
-) -> PlanningController:
-    return planning_controller(
-        vehicle, region, wake, settings, settings.plan, name="planner-paper", solver=PaperPlanner, surroundings=around
-    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,8 +62,6 @@ MAKERS: dict[str, Maker] = {
     "linear": linear,
     "instant": instant,
     "wake-aware": planned,
-    "planner": _planner,
-    "planner-paper": _paper_planner,
 }
 
 METHODS: tuple[str, ...] = tuple(MAKERS)

@@ -50,5 +50,5 @@ def planned_pseudo_inverse(
         name="pseudo-inverse",
         inner=planned(vehicle, region, wake, settings, around),
         layout=vehicle_layout(vehicle),
-        view=WakeView.of(vehicle, region, wake, settings.wake.sum),
+        view=WakeView.of(vehicle, region, wake, settings.superposition),
     )

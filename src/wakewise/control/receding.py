@@ -23,22 +23,20 @@ import numpy as np
 
 from wakewise.arrays import Array, freeze
 from wakewise.control.instant import instant_allocator
-from wakewise.control.loop import ControllerState, TrackingController
+from wakewise.control.loop import HOLD_S, ControllerState, TrackingController
 from wakewise.control.settings import ControlSettings
 from wakewise.control.tracker import Tracker, TrackerState, make_tracker
 from wakewise.geometry import Pose, quat_conjugate, quat_multiply, rotvec_from_quat
 from wakewise.interfaces import BodyState, Command, Goal, WakeModel
 from wakewise.planning.guard import Guard
 from wakewise.planning.planner import PlanModel, Planner, compile_plan
-from wakewise.planning.problem import Horizon, PlanProblem, PlanSettings, state_of
+from wakewise.planning.problem import PLAN_EVERY_S, Horizon, PlanProblem, PlanTerms, state_of
 from wakewise.planning.reference import between, reference_of
 from wakewise.planning.surroundings import Surroundings
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
-from wakewise.wake import arrival_time_s
-
-IDLE_N = 0.5
-"""Thrust that stands for less: wash of a thruster that idles would take for ever, and is not worth a delay."""
+from wakewise.wake import FloorJet
+from wakewise.wake.gradients import Superposition
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,14 +54,12 @@ class PlanState:
 
     `thrusts_N`, shape (n,), are the last commands; `nominal_N`, shape (n,), what the planned commands alone would
     make the thrusters give at the plan's start; `share`, shape (n, 6), shares corrections out; `backup` is the state
-    of PID and allocator; `goal_nu`, shape (6,), is the twist of the last goal; `jets_N`, `jet_lags_s`, shape (n,), are
-    thrusts as the jets on their way stand for them, and how they lag behind (None: they do not).
+    of PID and allocator; `goal_nu`, shape (6,), is the twist of the last goal.
     """
 
     tracker: TrackerState
     thrusts_N: Array
     nominal_N: Array
-    jets_N: Array
     backup: ControllerState
     plan: Horizon | None = None
     share: Array | None = None
@@ -71,7 +67,6 @@ class PlanState:
     trouble: str | None = None
     saturated: bool = False
     goal_nu: Array | None = None
-    jet_lags_s: Array | None = None
 
     def __post_init__(self) -> None:
         freeze(self, thrusts_N=(None,), nominal_N=(None,))
@@ -88,7 +83,6 @@ class PlanningController:
     guard: Guard
     tracker: Tracker
     backup: TrackingController
-    hold_s: float
     tube: Tube = field(default_factory=Tube)
 
     @property
@@ -104,7 +98,6 @@ class PlanningController:
             thrusts_N=np.zeros(n),
             nominal_N=np.zeros(n),
             backup=self.backup.init(),
-            jets_N=np.zeros(n),
         )
 
     def expected(self, state: PlanState) -> Array | None:
@@ -115,13 +108,11 @@ class PlanningController:
         """Decide the thrusts for the next `dt_s` seconds."""
         trouble = self._unusable(estimate, goal)
         if trouble is not None:
-            thrusts = state.thrusts_N * np.exp(-dt_s / self.hold_s)
+            thrusts = state.thrusts_N * np.exp(-dt_s / HOLD_S)
             state = replace(state, plan=None, thrusts_N=thrusts, nominal_N=thrusts, trouble=None)
             return state, Command(thrusts_N=thrusts, wrench_B=np.zeros(6), fallback=trouble)
         change_B = self._change(state, dt_s, goal)
-        if state.jet_lags_s is not None:
-            state = _blown_on(state, state.jet_lags_s, dt_s)
-        if state.plan is None or state.age_s >= 1.0 / self.model.settings.plan_hz - 1e-6:
+        if state.plan is None or state.age_s >= PLAN_EVERY_S - 1e-6:
             state = self._replan(state, estimate, goal, change_B)
         if state.plan is None or state.share is None:
             return self._fall_back(replace(state, goal_nu=goal.nu_B), dt_s, estimate, goal)
@@ -164,19 +155,14 @@ class PlanningController:
                     "off the path", f"off the planned path by {away:.2f} m: planned anew from the estimate"
                 )
 
-        lags_s = self._jet_lags_s(nominal, state.jets_N)
-
         def make() -> PlanProblem:
             return PlanProblem(
                 state=nominal,
                 thrusts_N=thrusts,
                 command_N=before,
                 reference=reference_of(goal, settings.stages, settings.stage_s, change_B),
-                quiet=quiet_stages(settings, goal.exposure_in_s, self._delay_s(nominal, thrusts)),
                 force_W_N=estimate.X_WB.R @ estimate.load_B[:3],
                 moment_B_Nm=estimate.load_B[3:],
-                jets_N=state.jets_N,
-                jet_lags_s=lags_s,
             )
 
         found = self.guard.ask(make, state.plan, state.age_s)
@@ -192,26 +178,7 @@ class PlanningController:
             age_s=0.0,
             nominal_N=thrusts,
             trouble=None,
-            jet_lags_s=lags_s,
         )
-
-    def _delay_s(self, nominal: Array, thrusts_N: Array) -> float:
-        """Time that wash needs to the middle of the region, with the lever `travel`; else 0."""
-        if not self.model.settings.travel:
-            return 0.0
-        table = self.model.wake_table
-        distance_m = float(np.linalg.norm(table.middle - nominal[:3]))
-        thrust_N = max(float(np.sqrt(np.mean(thrusts_N**2))), IDLE_N)
-        return float(arrival_time_s(distance_m, thrust_N, float(np.mean(table.areas)), "steady"))
-
-    def _jet_lags_s(self, nominal: Array, jets_N: Array) -> Array | None:
-        """Lags of the jets, shape (n,), with the lever `persistence`: so many times distance over speed; else None."""
-        share, table = self.model.settings.persistence, self.model.wake_table
-        if share == 0.0:
-            return None
-        distance_m = np.linalg.norm(Pose(nominal[:3], nominal[3:7]).apply(table.positions) - table.middle, axis=1)
-        thrust_N = np.maximum(np.abs(jets_N), IDLE_N)
-        return np.asarray(share * arrival_time_s(distance_m, thrust_N, table.areas, "steady"))
 
     def _nominal_thrusts(self, state: PlanState) -> Array:
         """What the planned commands alone would make the thrusters give now."""
@@ -275,27 +242,11 @@ class PlanningController:
         return state, replace(command, fallback=words or None)
 
 
-def _blown_on(state: PlanState, lags_s: Array, dt_s: float) -> PlanState:
-    """Let the jets follow what the thrusters were last told."""
-    keep = np.exp(-dt_s / lags_s)
-    return replace(state, jets_N=keep * state.jets_N + (1.0 - keep) * state.thrusts_N)
-
-
-def quiet_stages(settings: PlanSettings, exposure_in_s: float, delay_s: float = 0.0) -> Array:
-    """Factor of w_D per stage, shape (N,): `quiet_gain` where its wash, `delay_s` later, meets the exposure, else 1."""
-    quiet = np.ones(settings.stages)
-    if settings.quiet_gain > 1.0 and np.isfinite(exposure_in_s):
-        starts = delay_s + settings.stage_s * np.arange(settings.stages)
-        ends = starts + settings.stage_s
-        quiet[(ends > exposure_in_s) & (starts < exposure_in_s + settings.exposure_s)] = settings.quiet_gain
-    return quiet
-
-
 def correction_share(model: PlanModel, plan: Horizon) -> Array:
     """Thrusts per unit of correcting wrench, shape (n, 6), of least cost in the plan's model of its first stage."""
     table = model.table
     alive = table.upper > table.lower
-    effort = 2.0 * table.stage_s * max(model.settings.w_effort, 1e-4)
+    effort = 2.0 * table.stage_s * max(model.terms.w_effort, 1e-4)
     weight = plan.curvature[np.ix_(alive, alive)] + effort * np.eye(int(alive.sum()))
     B = table.allocation[:, alive]
     easy = np.linalg.solve(weight, B.T)
@@ -320,33 +271,43 @@ def planning_controller(
     region: Region,
     wake: WakeModel,
     settings: ControlSettings,
-    plan: PlanSettings | None = None,
     *,
-    name: str = "planner",
-    solver: Callable[[PlanModel], Planner] = Planner,
+    name: str = "wake-aware",
     surroundings: Surroundings | None = None,
     lower_N: Array | None = None,
     upper_N: Array | None = None,
     clock: Callable[[], float] = time.thread_time,
     enforce: bool = False,
 ) -> PlanningController:
-    """`planner`: receding-horizon planner, tracking loop, guard.
+    """Receding-horizon planner, tracking loop, guard; no levers.
 
-    `PlanSettings(w_disturbance=0)` makes it `unaware`; the same with `w_change` makes it `smooth`. Arguments as for
-    `compile_plan`; `clock` and `enforce` (the deadline, for a world that does not wait) as for `Guard`; `solver` is
-    `Planner` or `PaperPlanner`. The first plan is made here, since it compiles.
+    Settings with `w_disturbance` 0 make it `unaware`; the same with `plan.w_change` makes it `smooth`. Arguments as for
+    `compile_plan`; `clock` and `enforce` (the deadline, for a world that does not wait) as for `Guard`. The first plan
+    is made here, since it compiles.
     """
-    chosen = plan or PlanSettings()
-    model = compile_plan(
-        vehicle, region, wake, chosen, surroundings or around_target(region), lower_N=lower_N, upper_N=upper_N
+    terms = PlanTerms(
+        w_disturbance=settings.w_disturbance,
+        w_effort=settings.w_effort,
+        superposition=plan_superposition(wake, settings),
     )
+    around = surroundings or around_target(region)
+    model = compile_plan(vehicle, region, wake, settings.plan, around, terms, lower_N=lower_N, upper_N=upper_N)
     return PlanningController(
         name=name,
-        guard=Guard(planner=warmed(solver(model)), deadline_s=chosen.deadline_s, clock=clock, enforce=enforce),
+        guard=Guard(planner=warmed(Planner(model)), deadline_s=PLAN_EVERY_S, clock=clock, enforce=enforce),
         tracker=make_tracker(vehicle, settings),
         backup=instant_allocator(vehicle, region, model.wake, settings),
-        hold_s=settings.hold_s,
     )
+
+
+def plan_superposition(wake: WakeModel, settings: ControlSettings) -> Superposition:
+    """How a plan adds jets up: as `control.superposition` says, but always as squares if its wake model has a floor.
+
+    Wall jets that cancel on paper give the coherent sum many minima within 3 % of one another, and plans jump between
+    them (docs/decisions/0014); the sum of squares is convex, and plans stay. The exact allocators find the least of
+    all minima, and need no such care.
+    """
+    return "incoherent" if isinstance(wake, FloorJet) else settings.superposition
 
 
 def warmed(planner: Planner) -> Planner:
@@ -360,7 +321,6 @@ def warmed(planner: Planner) -> Planner:
         thrusts_N=np.zeros(n),
         command_N=np.zeros(n),
         reference=reference_of(Goal(X_WB=body.X_WB), N, model.settings.stage_s),
-        quiet=np.ones(N),
     )
     planner.plan(problem, np.zeros((N, n)))
     return planner

@@ -21,7 +21,7 @@ import numpy as np
 from wakewise.allocation.allocate import Allocation, Layout, Weights, gentle_allocation
 from wakewise.arrays import Array, IntArray
 from wakewise.control.loop import vehicle_layout
-from wakewise.control.settings import ControlSettings
+from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Command, Controller, Goal, WakeModel
 from wakewise.targets import Region
@@ -182,7 +182,9 @@ class Respared:
             missing = command.wrench_B - self.layout.B @ state.thrusts_N
             thrusts = state.thrusts_N + self.layout.inverse @ missing
             if np.all((thrusts >= self.layout.lower_N) & (thrusts <= self.layout.upper_N)):
-                held = SpareState(inner, thrusts, state.age_s + dt_s, state.disturbance, state.free_age_s)
+                held = SpareState(
+                    flown_by(inner, thrusts), thrusts, state.age_s + dt_s, state.disturbance, state.free_age_s
+                )
                 return held, replace(command, thrusts_N=thrusts, disturbance=state.disturbance)
         G = self.view.gram(estimate.X_WB)
         if not np.isfinite(G).all():
@@ -195,7 +197,7 @@ class Respared:
             free_age_s = 0.0
             if self._cost(anew) < (1.0 - WORTH) * self._cost(found):
                 found = anew
-        new = SpareState(inner, found.thrusts_N, dt_s, found.disturbance, free_age_s)
+        new = SpareState(flown_by(inner, found.thrusts_N), found.thrusts_N, dt_s, found.disturbance, free_age_s)
         return new, replace(command, thrusts_N=found.thrusts_N, disturbance=found.disturbance)
 
     def _cost(self, found: Allocation) -> float:
@@ -204,27 +206,31 @@ class Respared:
         return self.weights.disturbance * D + self.weights.effort * float(found.thrusts_N @ found.thrusts_N)
 
 
+def flown_by(state: Any, thrusts_N: Array) -> Any:
+    """The state of a controller whose thrusts were exchanged, told what was flown, if it keeps count of that.
+
+    Else what it falls back on (the last thrusts, fading; the PID's allocator) would begin at thrusts never sent.
+    """
+    return replace(state, thrusts_N=thrusts_N) if hasattr(state, "thrusts_N") else state
+
+
 def respared(
     controller: Controller[Any], vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings
 ) -> Respared:
-    """A planning controller whose wrenches are shared out anew, with the weights of its plan.
+    """A planning controller whose wrenches are shared out anew, with the same weights.
 
     Arguments as for `make_controller`; `region` with what the levers add, `wake` with the floor if it is to count.
     """
     layout = vehicle_layout(vehicle)
-    levers, plan = settings.levers, settings.plan
-    incoherent = levers.incoherent or settings.wake.sum == "incoherent"
-    view = WakeView.of(vehicle, region, wake, "incoherent" if incoherent else "coherent")
-    effort = max(plan.w_effort, 1e-4)
+    view = WakeView.of(vehicle, region, wake, settings.superposition)
     return Respared(
         name=controller.name,
         inner=controller,
         layout=layout,
-        view=meeting_view(view, layout) if levers.meet else view,
+        view=meeting_view(view, layout) if settings.levers.meet else view,
         weights=Weights(
-            disturbance=plan.w_disturbance / view.total_weight,
-            effort=effort,
-            # As for the allocators of one instant: thrusts relax with the thrusters' own lag (`ControlSettings`).
-            previous=effort * settings.w_previous / settings.w_effort,
+            disturbance=settings.w_disturbance / view.total_weight,
+            effort=settings.w_effort,
+            previous=PREVIOUS_SHARE * settings.w_effort,
         ),
     )

@@ -16,6 +16,17 @@ from wakewise.vehicles import RigidBody, Vehicle, compile_body, coriolis_wrench,
 _NO_FEED = np.zeros(6)
 
 
+ESTIMATOR_LAG_S = 0.08
+"""Delay of position and velocity that the margins allow for: the 35 ms that the filter lives behind the present and as
+much for what it smooths; the whole loop, filter included, then withstands twice the gain and 30 deg of delay in flight
+on two vehicles (tests of `estimation`)."""
+GYRO_LAG_S = 0.04
+"""Delay of attitude and rate, which come from a gyro: at most two samples."""
+INTEGRAL_SHARE = 0.25
+"""Most that the integral may ask, as a share of what the thrusters can do. Steady loads are fed forward from the
+estimator; the integral is for what that misses."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TrackerState:
     """Integral part: force in the *world* (currents and trim do not turn with the vehicle), moment in the body.
@@ -125,10 +136,10 @@ def make_tracker(vehicle: Vehicle, settings: ControlSettings) -> Tracker:
     """
     dt_s = 1.0 / settings.rate_hz
     forces = Gains(kp=settings.kp_N_m, kd=settings.kd_N_s_m, ki=settings.ki_N_m_s)
-    scale = stable_gain_scale(vehicle, forces, dt_s, settings.estimator_lag_s, settings.gyro_lag_s)
+    scale = stable_gain_scale(vehicle, forces, dt_s, ESTIMATOR_LAG_S, GYRO_LAG_S)
     gains = [g.slowed(float(s)) for g, s in zip(wished_gains(vehicle_axes(vehicle), forces), scale, strict=True)]
     reach = np.minimum(-vehicle.thrust_lower_N, vehicle.thrust_upper_N)
-    limit = settings.integral_share * (np.abs(vehicle.allocation_matrix) @ reach)
+    limit = INTEGRAL_SHARE * (np.abs(vehicle.allocation_matrix) @ reach)
     # The force integral lives in the world, where any body axis may have to supply it.
     limit[:3] = np.min(limit[:3][limit[:3] > 0.0], initial=np.inf) if np.any(limit[:3] > 0.0) else 0.0
     return Tracker(

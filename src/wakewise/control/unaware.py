@@ -25,8 +25,8 @@ def unaware(
     around: Surroundings | None = None,
 ) -> Controller[Any]:
     """`unaware`: the planner without a disturbance term."""
-    plan = settings.plan.model_copy(update={"w_disturbance": 0.0})
-    return planning_controller(vehicle, region, free_jet(wake), settings, plan, name="unaware", surroundings=around)
+    careless = settings.model_copy(update={"w_disturbance": 0.0})
+    return planning_controller(vehicle, region, free_jet(wake), careless, name="unaware", surroundings=around)
 
 
 def smooth(
@@ -38,5 +38,6 @@ def smooth(
 ) -> Controller[Any]:
     """`smooth`: the planner without a disturbance term and with a price on change of thrust."""
     change = max(settings.plan.w_change, W_CHANGE_PER_N2)
-    plan = settings.plan.model_copy(update={"w_disturbance": 0.0, "w_change": change})
-    return planning_controller(vehicle, region, free_jet(wake), settings, plan, name="smooth", surroundings=around)
+    plan = settings.plan.model_copy(update={"w_change": change})
+    careless = settings.model_copy(update={"w_disturbance": 0.0, "plan": plan})
+    return planning_controller(vehicle, region, free_jet(wake), careless, name="smooth", surroundings=around)

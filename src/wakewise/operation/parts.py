@@ -11,7 +11,8 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from wakewise.control import make_controller
+from wakewise.control import ControlSettings, make_controller
+from wakewise.control.settings import told
 from wakewise.estimation import ErrorStateFilter
 from wakewise.importers import any_vehicle
 from wakewise.interfaces import BodyState, Controller, Estimator, Pilot, WakeModel, World
@@ -23,6 +24,7 @@ from wakewise.operation.seeds import Seeds
 from wakewise.operation.surroundings import surroundings_of, tank_bounds
 from wakewise.operation.worlds import make_world
 from wakewise.planning import Surroundings
+from wakewise.tank.ambient import mean_current_m_s
 from wakewise.targets import Region, Target, delicacy, find_target, sample_region
 from wakewise.vehicles import Vehicle
 from wakewise.wake import wake_model
@@ -141,6 +143,11 @@ class Parts:
         """Where goals come from: by default the route, by the clock."""
         return make_pilot(self)
 
+    @cached_property
+    def control(self) -> ControlSettings:
+        """What the controllers are told: the scenario's settings with the current as measured before the flight."""
+        return told(self.scenario.control, mean_current_m_s(self.scenario.tank, self.route.duration_s))
+
     @part
     def wake(self) -> WakeModel:
         """What the controller believes its jets do."""
@@ -155,7 +162,7 @@ class Parts:
     def controller(self) -> Controller[Any]:
         """From an estimate and a goal to thrusts."""
         return make_controller(
-            self.scenario.method, self.vehicle, self.region, self.wake, self.scenario.control, self.surroundings
+            self.scenario.method, self.vehicle, self.region, self.wake, self.control, self.surroundings
         )
 
     @part

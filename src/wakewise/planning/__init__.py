@@ -12,14 +12,12 @@ plan is flown: see `wakewise.control`.
 """
 
 from wakewise.planning.guard import check_start
-from wakewise.planning.paper_planner import PaperPlanner
 from wakewise.planning.planner import Planner
 from wakewise.planning.problem import Horizon, PlanProblem, PlanSettings, state_of
 from wakewise.planning.surroundings import Surroundings, covering_spheres
 
 __all__ = [
     "Horizon",
-    "PaperPlanner",
     "PlanProblem",
     "PlanSettings",
     "Planner",

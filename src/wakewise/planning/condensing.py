@@ -29,8 +29,6 @@ class Condensed(NamedTuple):
     next_W: Array
     V: Array
     lag: Array
-    by_jets: Array
-    jet_lag: Array
 
 
 def condensed_room(stages: int, thrusters: int) -> Condensed:
@@ -44,8 +42,6 @@ def condensed_room(stages: int, thrusters: int) -> Condensed:
         next_W=np.zeros((12, size)),
         V=np.zeros((thrusters, size)),
         lag=np.zeros((thrusters, size)),
-        by_jets=np.zeros(size),
-        jet_lag=np.zeros((thrusters, size)),
     )
 
 
@@ -66,12 +62,11 @@ def _mix3(out, c0, c1, c2, X, first, count):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def condense(table, case, work, room):  # type: ignore[no-untyped-def]
+def condense(table, work, room):  # type: ignore[no-untyped-def]
     """Fill room.H (lower) and room.g from the stage blocks of `work`; commands' own cost is added by `add_commands`."""
     N, n = work.T.shape
     G, W, fresh, V, lag = room.G, room.W, room.next_W, room.V, room.lag
-    A, B, M, jet_map = work.A, work.B, table.mean_map, case.jet_map
-    by_jets, jet_lag = room.by_jets, room.jet_lag
+    A, B, M = work.A, work.B, table.mean_map
     for k in range(N):
         done = n * k
         for r in range(12):
@@ -90,7 +85,6 @@ def condense(table, case, work, room):  # type: ignore[no-untyped-def]
                     row[s * n + i] += b[i] * M[k, s * n + i]
     twist = 2.0 * table.stage_s * table.weights[W_TWIST]
     lag[:, :] = 0.0
-    jet_lag[:, :] = 0.0
     for k in range(N, -1, -1):
         # fresh = W_k for columns of stages before k, with W = W_k+1 for columns up to k.
         if k < N:
@@ -103,23 +97,12 @@ def condense(table, case, work, room):  # type: ignore[no-untyped-def]
                 _mix6(row, b[0, i], b[1, i], b[2, i], b[3, i], b[4, i], b[5, i], W, 0, count)
                 _mix6(row, b[6, i], b[7, i], b[8, i], b[9, i], b[10, i], b[11, i], W, 6, count)
                 s = work.S[k, i]
-                jet_mean, jet_keep = case.jet_mean[i], case.jet_keep[i]
-                # Without a lag of the jets, what the jets do is what the thrusts do.
-                blown = by_jets if jet_keep > 0.0 else row
-                if jet_keep > 0.0:
-                    for j in range(count):
-                        blown[j] = 0.0
                 if k:
-                    _mix6(blown, s[0], s[1], s[2], s[3], s[4], s[5], G[k], 0, n * k)
+                    _mix6(row, s[0], s[1], s[2], s[3], s[4], s[5], G[k], 0, n * k)
                 curved = work.R[k, i]
                 for t in range(k + 1):
                     for c in range(n):
-                        blown[t * n + c] += curved[c] * jet_map[k, t * n + c]
-                if jet_keep > 0.0:
-                    later = jet_lag[i]
-                    for j in range(count):
-                        row[j] += (1.0 - jet_mean) * blown[j] + (1.0 - jet_keep) * later[j]
-                        later[j] = jet_keep * later[j] + jet_mean * blown[j]
+                        row[t * n + c] += curved[c] * M[k, t * n + c]
                 mean, keep = table.mean[i], table.keep[i]
                 out, memory = room.H[n * k + i], lag[i]
                 for j in range(count):
@@ -138,7 +121,7 @@ def condense(table, case, work, room):  # type: ignore[no-untyped-def]
                 if k < N:
                     for t in range(k):
                         for i in range(n):
-                            row[t * n + i] += work.S[k, i, r] * jet_map[k, t * n + i]
+                            row[t * n + i] += work.S[k, i, r] * M[k, t * n + i]
             else:
                 for j in range(count):
                     row[j] = twist * G[k, r, j]
@@ -153,19 +136,17 @@ def condense(table, case, work, room):  # type: ignore[no-untyped-def]
         for r in range(12):
             for j in range(count):
                 W[r, j] = fresh[r, j]
-    motion_gradient(table, case, work, room.g)
+    motion_gradient(table, work, room.g)
 
 
 @njit(cache=True, error_model="numpy")
-def motion_gradient(table, case, work, g):  # type: ignore[no-untyped-def]
-    """Exact gradient by the commands, backwards through motion and lags."""
+def motion_gradient(table, work, g):  # type: ignore[no-untyped-def]
+    """Exact gradient by the commands, backwards through motion and lag."""
     N, n = work.T.shape
-    costate, fresh, memory, jet_memory = work.gx[N].copy(), np.empty(12), np.zeros(n), np.zeros(n)
+    costate, fresh, memory = work.gx[N].copy(), np.empty(12), np.zeros(n)
     for k in range(N - 1, -1, -1):
         for i in range(n):
-            by_jet, keep, mean = work.gT[k, i], case.jet_keep[i], case.jet_mean[i]
-            by_thrust = (1.0 - mean) * by_jet + (1.0 - keep) * jet_memory[i]
-            jet_memory[i] = keep * jet_memory[i] + mean * by_jet
+            by_thrust = work.gT[k, i]
             for r in range(12):
                 by_thrust += work.B[k, r, i] * costate[r]
             g[k * n + i] = (1.0 - table.mean[i]) * by_thrust + (1.0 - table.keep[i]) * memory[i]

@@ -8,8 +8,7 @@ Thruster lag, tau T' = u - T, is exact per stage: with a = exp(-h / tau) and b =
 
     T_k+1 = a T_k + (1 - a) u_k,    mean over the stage = b T_k + (1 - b) u_k,
 
-and the mean is what pushes and what blows during the stage. Jets that take their time are a second lag of the same
-kind behind it, from mean thrusts to mean jets; without one they are the mean thrusts themselves.
+and the mean is what pushes and what blows during the stage.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ class PlanTable(NamedTuple):
     """What stays the same from plan to plan.
 
     packed : (20, 6) vehicle; allocation : (6, n); keep, mean : (n,), a and b of the lag; mean_map : (N, N n), mean
-    thrusts by commands; half_size : (3,); planes, spheres : (p, 4), (s, 4); weights : (10,), see
+    thrusts by commands; half_size : (3,); planes, spheres : (p, 4), (s, 4); weights : (12,), see
     `planner.compile_plan`.
     """
 
@@ -49,11 +48,7 @@ class PlanTable(NamedTuple):
 
 
 class PlanCase(NamedTuple):
-    """One question, in writable arrays: see `PlanProblem`.
-
-    quiet is w_D per stage, barrier (2,) is mu and reach; jets, jet_keep, jet_mean : (n,), jets now and a and b of their
-    lag (0, 0 for none); jet_map : (N, N n), mean jets by commands.
-    """
+    """One question, in writable arrays: see `PlanProblem`; barrier (2,) is mu and reach."""
 
     state: Array
     thrusts: Array
@@ -62,25 +57,18 @@ class PlanCase(NamedTuple):
     moment_B: Array
     current_W: Array
     reference: Array
-    quiet: Array
     barrier: Array
-    jets: Array
-    jet_keep: Array
-    jet_mean: Array
-    jet_map: Array
 
 
 class PlanWork(NamedTuple):
     """Results of `horizon`, and room to work in.
 
-    X : (N + 1, 13); T, jets : (N, n), mean thrusts and mean jets; A : (N, 12, 12), B : (N, 12, n), step by error state
-    and mean thrusts; Q : (N + 1, 6, 6) by pose, S : (N, n, 6), R : (N, n, n), gx : (N + 1, 12), gT : (N, n) of the
-    cost, S, R and gT by the jets.
+    X : (N + 1, 13); T : (N, n), mean thrusts; A : (N, 12, 12), B : (N, 12, n), step by error state and mean thrusts;
+    Q : (N + 1, 6, 6) by pose, S : (N, n, 6), R : (N, n, n), gx : (N + 1, 12), gT : (N, n) of the cost.
     """
 
     X: Array
     T: Array
-    jets: Array
     A: Array
     B: Array
     Q: Array
@@ -92,7 +80,9 @@ class PlanWork(NamedTuple):
     parts: Array
 
 
-W_EFFORT, W_CHANGE, W_TRACK, W_PATH, W_ATTITUDE, W_TWIST, TOLERANCE, RATE_N, RHO, REACH, LEAST = range(11)
+W_EFFORT, W_CHANGE, W_TRACK, W_PATH, W_ATTITUDE, W_TWIST, TOLERANCE, RATE_N, RHO, REACH, LEAST, W_DISTURBANCE = range(
+    12
+)
 """Places in `PlanTable.weights`."""
 
 
@@ -106,7 +96,6 @@ def plan_work(stages: int, thrusters: int) -> PlanWork:
     return PlanWork(
         X=np.zeros((N + 1, 13)),
         T=np.zeros((N, n)),
-        jets=np.zeros((N, n)),
         A=np.zeros((N, 12, 12)),
         B=np.zeros((N, 12, n)),
         Q=np.zeros((N + 1, 6, 6)),
@@ -172,7 +161,7 @@ def horizon(table, wake, scratch, case, U, work, slopes):  # type: ignore[no-unt
     N, n = U.shape
     h, weights = table.stage_s, table.weights
     X, parts = work.X, work.parts
-    R, inputs, thrust, jet = np.empty((3, 3)), np.empty(9), case.thrusts.copy(), case.jets.copy()
+    R, inputs, thrust = np.empty((3, 3)), np.empty(9), case.thrusts.copy()
     Bw, force = np.empty((12, 6)), np.empty(3)
     g, H = np.zeros(6 + n), np.zeros((6 + n, 6 + n))
     state = case.state.copy()
@@ -189,12 +178,10 @@ def horizon(table, wake, scratch, case, U, work, slopes):  # type: ignore[no-unt
             for i in range(n):
                 work.T[k, i] = table.mean[i] * thrust[i] + (1.0 - table.mean[i]) * U[k, i]
                 thrust[i] = table.keep[i] * thrust[i] + (1.0 - table.keep[i]) * U[k, i]
-                work.jets[k, i] = case.jet_mean[i] * jet[i] + (1.0 - case.jet_mean[i]) * work.T[k, i]
-                jet[i] = case.jet_keep[i] * jet[i] + (1.0 - case.jet_keep[i]) * work.T[k, i]
-            weight = h * case.quiet[k]
+            weight = h * weights[W_DISTURBANCE]
             work.D[k] = 0.0
             if weight > 0.0:
-                D = stage_disturbance(wake, scratch, state[:3], state[3:7], R, work.jets[k], slopes, g, H)
+                D = stage_disturbance(wake, scratch, state[:3], state[3:7], R, work.T[k], slopes, g, H)
                 work.D[k] = D
                 parts[0] += weight * D
                 if slopes:
@@ -286,24 +273,6 @@ def command_cost(table, before, U):  # type: ignore[no-untyped-def]
             total += table.stage_s * weights[W_EFFORT] * U[k, i] ** 2
             total += weights[W_CHANGE] * step * step + weights[RHO] * over * over
     return total
-
-
-@njit(cache=True, error_model="numpy")
-def lag_jets(table, case, lags):  # type: ignore[no-untyped-def]
-    """Set a, b and the map of the jets in `case` from lags in s, (n,); lags of 0 leave the thrusts as they are."""
-    N, size = case.jet_map.shape
-    n = lags.shape[0]
-    for i in range(n):
-        share = lags[i] / table.stage_s
-        case.jet_keep[i] = np.exp(-1.0 / share) if share > 1e-3 else 0.0
-        case.jet_mean[i] = (1.0 - case.jet_keep[i]) * share if share > 1e-3 else 0.0
-    before = np.zeros(size)
-    for k in range(N):
-        for j in range(size):
-            i = j % n
-            mean = table.mean_map[k, j]
-            case.jet_map[k, j] = case.jet_mean[i] * before[j] + (1.0 - case.jet_mean[i]) * mean
-            before[j] = case.jet_keep[i] * before[j] + (1.0 - case.jet_keep[i]) * mean
 
 
 @njit(cache=True, error_model="numpy")

@@ -20,8 +20,18 @@ from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.interfaces import WakeModel
 from wakewise.planning.condensing import add_commands, add_rate_gradient, condense, condensed_room, motion_gradient
-from wakewise.planning.kernels import CLOSEST, RATE_N, PlanCase, PlanTable, horizon, lag_jets, plan_work, set_reach
-from wakewise.planning.problem import Horizon, PlanProblem, PlanSettings
+from wakewise.planning.kernels import CLOSEST, RATE_N, PlanCase, PlanTable, horizon, plan_work, set_reach
+from wakewise.planning.problem import (
+    BARRIER_REACH_M,
+    EDGE_DEG,
+    RATE_LIMIT_N_S,
+    RATE_PENALTY,
+    SMOOTH_N,
+    Horizon,
+    PlanProblem,
+    PlanSettings,
+    PlanTerms,
+)
 from wakewise.planning.qp import BoxQP
 from wakewise.planning.surroundings import Surroundings
 from wakewise.targets import Region
@@ -42,6 +52,7 @@ class PlanModel:
     region: Region
     wake: WakeModel
     settings: PlanSettings
+    terms: PlanTerms
     table: PlanTable
     wake_table: WakeTable
     layout: Layout
@@ -58,6 +69,7 @@ def compile_plan(
     wake: WakeModel,
     settings: PlanSettings,
     surroundings: Surroundings | None = None,
+    terms: PlanTerms | None = None,
     *,
     lower_N: Array | None = None,
     upper_N: Array | None = None,
@@ -84,7 +96,7 @@ def compile_plan(
         raise InputError(
             f"thruster {worst + 1}: limits {lower[worst]:g} to {upper[worst]:g} N, the least must not exceed the most"
         )
-    around = surroundings or Surroundings()
+    around, terms = surroundings or Surroundings(), terms or PlanTerms()
     tau = np.maximum(vehicle.time_constants_s, 1e-6)
     keep = np.exp(-h / tau)
     mean = (1.0 - keep) * tau / h
@@ -94,17 +106,18 @@ def compile_plan(
         for j in range(k):
             mean_map[k, j] = mean * keep ** (k - 1 - j) * (1.0 - keep)
     weights = [
-        settings.w_effort,
+        terms.w_effort,
         settings.w_change,
         settings.w_track,
         settings.w_path,
         settings.w_attitude,
         settings.w_twist,
         settings.attitude_tolerance_rad,
-        settings.rate_limit_N_s * h,
-        settings.rho,
-        settings.barrier_reach_m,
+        RATE_LIMIT_N_S * h,
+        RATE_PENALTY,
+        BARRIER_REACH_M,
         settings.clearance_m,
+        terms.w_disturbance,
     ]
     table = PlanTable(
         packed=np.array(compile_body(vehicle).packed),
@@ -121,7 +134,7 @@ def compile_plan(
         stage_s=h,
         majorise=majorise,
     )
-    smooth = with_smooth_edge(wake, float(np.radians(settings.edge_width_deg)))
+    smooth = with_smooth_edge(wake, float(np.radians(EDGE_DEG)))
     view = wake_table(
         smooth,
         region.points_W_m,
@@ -129,11 +142,11 @@ def compile_plan(
         vehicle.thruster_positions_B_m,
         vehicle.thruster_axes_B,
         vehicle.disk_areas_m2,
-        superposition=settings.superposition,
-        smooth_N=settings.smooth_N,
+        superposition=terms.superposition,
+        smooth_N=SMOOTH_N,
     )
     layout = compile_layout(vehicle.allocation_matrix, np.minimum(lower, 0.0), np.maximum(upper, 0.0))
-    return PlanModel(vehicle, region, smooth, settings, table, view, layout)
+    return PlanModel(vehicle, region, smooth, settings, terms, table, view, layout)
 
 
 class Planner:
@@ -146,7 +159,7 @@ class Planner:
         self._work = plan_work(N, n)
         self._room = condensed_room(N, n)
         self._steps = np.zeros(N * n)
-        self._qp = BoxQP(N * n, n, float(model.table.weights[RATE_N]), model.settings.rho)
+        self._qp = BoxQP(N * n, n, float(model.table.weights[RATE_N]), RATE_PENALTY)
         self._case = PlanCase(
             state=np.zeros(13),
             thrusts=np.zeros(n),
@@ -155,18 +168,12 @@ class Planner:
             moment_B=np.zeros(3),
             current_W=np.zeros(3),
             reference=np.zeros((N + 1, 13)),
-            quiet=np.zeros(N),
-            barrier=np.array([BARRIER_RANGE[0], model.settings.barrier_reach_m]),
-            jets=np.zeros(n),
-            jet_keep=np.zeros(n),
-            jet_mean=np.zeros(n),
-            jet_map=np.array(model.table.mean_map),
+            barrier=np.array([BARRIER_RANGE[0], BARRIER_REACH_M]),
         )
-        self._jet_lags = np.zeros(n)
         self._lower = np.tile(model.table.lower, N)
         self._upper = np.tile(model.table.upper, N)
         self._predicted: Array | None = None
-        self._since_second = model.settings.second_start_every
+        self._since_second = model.terms.second_start_every
         self._late: Callable[[], bool] = lambda: False
 
     def cost(self, U: Array) -> float:
@@ -178,7 +185,7 @@ class Planner:
         """Gradient of the objective, shape (N n,), a view that the next call overwrites."""
         table = self.model.table
         horizon(table, self.model.wake_table, self._scratch, self._case, U, self._work, True)
-        motion_gradient(table, self._case, self._work, self._room.g)
+        motion_gradient(table, self._work, self._room.g)
         add_commands(table, self._case.command, U, self._room, self._steps)
         add_rate_gradient(table, self._steps, U.shape[1], self._room.g)
         return self._room.g
@@ -188,7 +195,7 @@ class Planner:
         table = self.model.table
         self._predicted = U
         J = horizon(table, self.model.wake_table, self._scratch, self._case, U, self._work, True)
-        condense(table, self._case, self._work, self._room)
+        condense(table, self._work, self._room)
         add_commands(table, self._case.command, U, self._room, self._steps)
         return float(J), self._room.g, self._room.H
 
@@ -197,7 +204,7 @@ class Planner:
         case, settings = self._case, self.model.settings
         if problem.reference.shape != case.reference.shape or problem.thrusts_N.shape != case.thrusts.shape:
             raise InputError(
-                f"plan: {len(problem.quiet)} stages and {len(problem.thrusts_N)} thrusters, "
+                f"plan: {len(problem.reference) - 1} stages and {len(problem.thrusts_N)} thrusters, "
                 f"allowed: {settings.stages} and {self.model.thrusters}"
             )
         case.state[:] = problem.state
@@ -207,14 +214,7 @@ class Planner:
         case.moment_B[:] = problem.moment_B_Nm
         case.current_W[:] = problem.current_W_m_s
         case.reference[:] = problem.reference
-        np.multiply(problem.quiet, settings.w_disturbance, out=case.quiet)
         set_reach(self.model.table, case)
-        lagged = problem.jets_N is not None and problem.jet_lags_s is not None
-        case.jets[:] = problem.jets_N if lagged else problem.thrusts_N
-        lags = problem.jet_lags_s if lagged else 0.0
-        if np.any(self._jet_lags != lags):
-            self._jet_lags[:] = lags
-            lag_jets(self.model.table, case, self._jet_lags)
 
     def plan(
         self,
@@ -248,14 +248,14 @@ class Planner:
         the load, where the plan would touch something: it is caught behind the target, as no push of the barrier's
         brings it back through.
         """
-        settings = self.model.settings
-        if settings.second_start_every == 0 or settings.iterations == 1 or self._late():
+        settings, every = self.model.settings, self.model.terms.second_start_every
+        if every == 0 or settings.iterations == 1 or self._late():
             return
         if self._predicted is not U:
             self.cost(U)
         if self._work.parts[CLOSEST] < 0.0:
             yield np.tile(holding_thrusts(self.model, problem), (settings.stages, 1)), max(settings.iterations, 3)
-        elif self._since_second >= settings.second_start_every and done + 2 <= settings.iterations:
+        elif self._since_second >= every and done + 2 <= settings.iterations:
             self._since_second = 0
             other = self._other_pattern(U)
             if other is not None and self.cost(other) < 2.0 * J:
@@ -263,7 +263,7 @@ class Planner:
 
     def _descend(self, U: Array, iterations: int, rival: float = float("inf")) -> tuple[Array, float, int, bool, str]:
         """Iterate from U; gives up where an iteration leaves it a fifth worse than a `rival` cost."""
-        settings, solver = self.model.settings, "none"
+        tolerance, solver = self.model.terms.tolerance, "none"
         J, g, H = self.derivatives(U)
         converged = False
         for done in range(1, iterations + 1):
@@ -274,16 +274,16 @@ class Planner:
                 return U, J, done, False, solver
             step = answer.z.reshape(U.shape)
             promise = answer.promise
-            if done > 1 and promise <= settings.tolerance * J * 0.1:
+            if done > 1 and promise <= tolerance * J * 0.1:
                 return U, J, done, True, solver
             last = done == iterations
             trial, J_trial, H_fresh = self._search(U, step, J, promise, last)
             fell = J - J_trial
             if fell <= 0.0:
-                return U, J, done, promise <= settings.tolerance * J, solver
+                return U, J, done, promise <= tolerance * J, solver
             U, J = trial, J_trial
             # A short step that gains little is not convergence while the model still promises much.
-            converged = (fell <= settings.tolerance * J and promise <= 10.0 * settings.tolerance * J) or iterations == 1
+            converged = (fell <= tolerance * J and promise <= 10.0 * tolerance * J) or iterations == 1
             if converged or last or self._late() or 1.2 * rival < J:
                 return U, J, done, converged, solver
             if not H_fresh:
@@ -310,12 +310,12 @@ class Planner:
     def _other_pattern(self, U: Array) -> Array | None:
         """The same wrenches by the spare thrusts that are best stage by stage; None if that is no news."""
         model = self.model
-        if model.layout.k == 0 or model.settings.w_disturbance == 0.0:
+        if model.layout.k == 0 or model.terms.w_disturbance == 0.0:
             return None
         if self._predicted is not U:
             self.cost(U)
         vehicle, null = model.vehicle, model.layout.null
-        weights = Weights(disturbance=model.settings.w_disturbance, effort=max(model.settings.w_effort, 1e-6))
+        weights = Weights(disturbance=model.terms.w_disturbance, effort=max(model.terms.w_effort, 1e-6))
         shifts, before = np.zeros_like(U), None
         for k, mean in enumerate(np.array(self._work.T)):
             # Every fourth stage is enough: poses of neighbours are alike.
@@ -330,12 +330,12 @@ class Planner:
                 X_WB.apply(vehicle.thruster_positions_B_m),
                 vehicle.thruster_axes_B @ X_WB.R.T,
                 vehicle.disk_areas_m2,
-                model.settings.superposition,
+                model.terms.superposition,
             )
             best = gentle_allocation(model.layout, vehicle.allocation_matrix @ mean, G, weights, before)
             before = best.thrusts_N
             shifts[k] = null @ (null.T @ (best.thrusts_N - mean))
-        if np.abs(shifts).max() < 0.2 * model.settings.smooth_N:
+        if np.abs(shifts).max() < 0.2 * SMOOTH_N:
             return None
         return np.asarray(np.clip(U + shifts, model.table.lower, model.table.upper))
 
@@ -354,8 +354,7 @@ class Planner:
             iterations=done,
             converged=converged,
             solver=solver,
-            # Of a passing correction the jets of this stage see only what their lag lets through.
-            curvature=self._work.R[0] * np.outer(1.0 - self._case.jet_mean, 1.0 - self._case.jet_mean),
+            curvature=self._work.R[0].copy(),
         )
 
 

@@ -19,14 +19,14 @@ from typing import Any
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.control import ControlSettings, PlanningController, make_controller
+from wakewise.control import ControlSettings, LeverSettings, PlanningController, make_controller
 from wakewise.control.intent import Intent, goal_of, moved_on, obeying, slewed
 from wakewise.interfaces import BodyState, Command, Controller, Goal, Witness
 from wakewise.missions import open_route
 from wakewise.operation import Scenario, fly
 from wakewise.operation.instant_water import InstantWorld, paper_jets
 from wakewise.operation.loop import Step
-from wakewise.studies.gentle.flight import WAKE_OF, paper_place
+from wakewise.studies.gentle.flight import OFF, WAKE_OF, paper_place
 from wakewise.tank import TankSettings
 from wakewise.trials.timing import BenchOptions
 from wakewise.vehicles import load_vehicle, perturbed
@@ -173,7 +173,7 @@ def fly_course(course: Course, method: str, w_track: float, seed: int) -> Flown:
     """One flight by one method."""
     vehicle, tank = load_vehicle("paper"), TankSettings()
     target, region = paper_place(tank.size_m[2])
-    base = ControlSettings(wake=WakeSettings(**WAKE_OF["paper"]))
+    base = ControlSettings(wake=WakeSettings(**WAKE_OF["paper"]), levers=LeverSettings(**OFF))
     control = base.model_copy(update={"plan": obeying(base.plan, w_track)})
     plant_rng, _ = np.random.default_rng([seed, 13]).spawn(2)
     trim_N = float(plant_rng.uniform(-tank.trim_range_N, tank.trim_range_N))

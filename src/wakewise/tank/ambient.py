@@ -11,6 +11,7 @@ from wakewise.errors import InputError
 from wakewise.interfaces import Current
 from wakewise.tank.settings import TankSettings
 from wakewise.water import AiryWave, AmbientSum, BackgroundTurbulence, PumpJet, SteadyCurrent, read_current_series
+from wakewise.water.current_series import CurrentSeries
 
 
 def build_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSum:
@@ -24,15 +25,7 @@ def build_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSu
     length, width, depth = settings.size_m
     parts: list[Current] = []
     if settings.current_file is not None:
-        parts.append(
-            read_current_series(
-                Path(settings.current_file).expanduser(),
-                start_s=settings.current_file_from_s,
-                stop_s=settings.current_file_to_s,
-                gain=settings.current_file_gain,
-                longest_gap_s=settings.current_file_gap_s,
-            )
-        )
+        parts.append(_series(settings))
     elif any(settings.current_m_s):
         parts.append(SteadyCurrent(velocity_W_m_s=np.array(settings.current_m_s)))
     if settings.wave_amplitude_m > 0.0:
@@ -63,3 +56,26 @@ def build_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSu
     if settings.background_m_s > 0.0:
         parts.append(BackgroundTurbulence.drawn(settings.background_m_s, settings.background_length_m, rng))
     return AmbientSum(parts=tuple(parts))
+
+
+def mean_current_m_s(settings: TankSettings, duration_s: float) -> tuple[float, float, float]:
+    """Mean current of a flight from its start, north, east and down: what a crew measures before it.
+
+    A series is looked at four times a second, for as long as it lasts. Waves, pump and turbulence do not count.
+    """
+    if settings.current_file is None:
+        return settings.current_m_s
+    series = _series(settings)
+    times = np.arange(0.0, min(duration_s, series.end_s), 0.25)
+    north, east, down = np.mean([series.velocity(np.zeros((1, 3)), float(t))[0] for t in times], axis=0)
+    return float(north), float(east), float(down)
+
+
+def _series(settings: TankSettings) -> CurrentSeries:
+    return read_current_series(
+        Path(settings.current_file or "").expanduser(),
+        start_s=settings.current_file_from_s,
+        stop_s=settings.current_file_to_s,
+        gain=settings.current_file_gain,
+        longest_gap_s=settings.current_file_gap_s,
+    )

@@ -60,7 +60,7 @@ def sharing_figures(parts: Parts, steps: pl.DataFrame, instants: int = INSTANTS)
     known = np.isfinite(np.column_stack([thrusts, p, q])).all(axis=1)
     if not known.any():
         raise InputError("steps: no step has both a command and an estimate")
-    view = WakeView.of(vehicle, parts.region, parts.wake, parts.scenario.control.wake.sum)
+    view = WakeView.of(vehicle, parts.region, parts.wake, parts.scenario.control.superposition)
     layout = vehicle_layout(vehicle)
     flown, least = [], []
     for T, place, turn in zip(thrusts[known], p[known], q[known], strict=True):

@@ -78,11 +78,7 @@ class WakeSettings(Settings):
     """
 
     model: ModelName = Field(default="jet", description="wake model that the controller believes in")
-    sum: Literal["coherent", "incoherent"] = Field(
-        default="coherent",
-        description="how jets that meet add up: velocities (the paper's), or squares of speed (convex, cannot cancel)",
-    )
-    floor: bool = Field(default=False, description="add the wall jets that spread along the bed where jets strike it")
+    floor: bool = Field(default=True, description="add the wall jets that spread along the bed where jets strike it")
     edge_width_deg: float = Field(
         default=0.0, description="width of the smooth edge of a cone (deg), 0 is the sharp edge", ge=0.0, le=40.0
     )

@@ -31,10 +31,13 @@ STANDOFF_M, ARC_SPEED_M_S, TRANSIT_SPEED_M_S, ACCELERATION_M_S2 = 0.5, 0.06, 0.1
 EXPOSURE_EVERY_S = 3.0
 WATER_EVERY_S = 0.25
 WAKE_OF: dict[str, dict[str, Any]] = {
-    "parcels": {"model": "jet"},
-    "paper": {"model": "paper-calibrated", "edge_width_deg": 3.0},
+    "parcels": {"model": "jet", "floor": False},
+    "paper": {"model": "paper-calibrated", "edge_width_deg": 3.0, "floor": False},
 }
 """What the controllers believe: the default, and in the paper's world the paper's model with a smooth edge."""
+
+OFF = {"spare": False, "meet": False, "drift": False}
+"""Levers that a scenario has on; here each is added by name."""
 
 FIGURES = (
     "target_speed_mean_m_s",
@@ -89,8 +92,8 @@ class Trial:
 
 
 def scenario_of(trial: Trial) -> Scenario:
-    """Everything at its default but for the method, the seed and what the trial changes."""
-    control: dict[str, Any] = {"wake": dict(WAKE_OF[trial.world])}
+    """Everything at its default but for the levers, which are off, the method, the seed and what the trial changes."""
+    control: dict[str, Any] = {"wake": dict(WAKE_OF[trial.world]), "levers": dict(OFF)}
     for name, value in trial.control:
         branch = control
         *parents, leaf = name.split(".")

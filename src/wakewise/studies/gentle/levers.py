@@ -18,24 +18,17 @@ Settings = dict[str, Any]
 
 CONE: Settings = {"wake.model": "paper-calibrated", "wake.edge_width_deg": 3.0}
 """Belief in the paper's cone, much wider than a jet: it stands for where a jet's water may go later."""
-CURRENT_M_S = (0.03, 0.02, 0.0)
-"""The tank's default mean current, as a survey before the flight would tell it."""
 
 PARTS: dict[str, Settings] = {
-    "drift": {"levers.drift": True, "levers.drift_m_s": CURRENT_M_S},
+    "drift": {"levers.drift": True},
     "jets that meet": {"levers.spare": True, "levers.meet": True},
     "floor": {"wake.floor": True, "levers.spare": True},
     "bed points": {"wake.floor": True, "levers.bed": True, "levers.spare": True},
-    "nearer to level": {"levers.level_deg": 10.0},
     "wide cone": CONE,
-    "halo": {"levers.halo": True},
-    "quiet windows": {"levers.quiet": True},
-    "travel time": {"levers.quiet": True, "plan.travel": True},
-    "attitude freedom": {"levers.tilt_deg": 10.0},
-    "persistence": {"plan.persistence": 1.0},
-    "incoherent sum": {"levers.incoherent": True},
+    "attitude freedom": {"plan.attitude_tolerance_rad": 0.17},
+    "incoherent sum": {"superposition": "incoherent"},
 }
-"""Settings of control of each lever, all of them off by default."""
+"""Settings of control of each lever; a flight that names none has the paper's cost (`flight.OFF`)."""
 
 GENTLE: tuple[str, ...] = ("drift", "jets that meet", "floor")
 """Levers that are on in the bench's `wake-aware`."""
@@ -62,7 +55,7 @@ MISSIONS: dict[str, Settings] = {
 }
 """Fields of `Trial` of each change of vehicle or mission."""
 
-IN_PAPER = ("quiet windows", "attitude freedom", "nearer to level", "incoherent sum", "jets that meet")
+IN_PAPER = ("attitude freedom", "incoherent sum", "jets that meet")
 """Levers that the paper's world can answer: it has neither bed nor memory nor current that carries wakes."""
 
 

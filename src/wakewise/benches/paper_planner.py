@@ -23,7 +23,7 @@ from wakewise.arrays import Array
 from wakewise.planning.condensing import add_commands, condense
 from wakewise.planning.kernels import RATE_N, horizon, rotation
 from wakewise.planning.planner import PlanModel, Planner
-from wakewise.planning.problem import Horizon, PlanProblem
+from wakewise.planning.problem import RATE_PENALTY, Horizon, PlanProblem
 from wakewise.wake.plan_disturbance import stage_disturbance
 
 SQP_STEPS, QP_ITERATIONS, TOLERANCE = 5, 50, 1e-4
@@ -129,36 +129,36 @@ class PaperPlanner(Planner):
         table, work, case = self.model.table, self._work, self._case
         horizon(table, self.model.wake_table, self._scratch, case, U, work, True)
         if self._well_coded:
-            taylor_blocks(self.model.wake_table, self._scratch, work.X, work.jets, self._blocks)
+            taylor_blocks(self.model.wake_table, self._scratch, work.X, work.T, self._blocks)
         else:
             for k in range(len(U)):
-                taylor_block(self.model.wake_table, self._scratch, work.X[k], work.jets[k], True, self._blocks[k])
+                taylor_block(self.model.wake_table, self._scratch, work.X[k], work.T[k], True, self._blocks[k])
         blocks = 0.5 * (self._blocks + np.swapaxes(self._blocks, 1, 2))
         values, vectors = np.linalg.eigh(blocks)
         blocks = (vectors * np.maximum(values, 0.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
-        blocks *= (table.stage_s * case.quiet)[:, None, None]
+        weight = table.stage_s * self.model.terms.w_disturbance
+        blocks *= weight
         # `horizon` left Gauss-Newton (and tracking) in the pose blocks: exchange the part that is D's.
-        self._exchange(blocks)
-        condense(table, case, work, self._room)
+        self._exchange(blocks, weight)
+        condense(table, work, self._room)
         add_commands(table, case.command, U, self._room, self._steps)
         return self._room.H, self._room.g
 
-    def _exchange(self, blocks: Array) -> None:
-        work, case, table = self._work, self._case, self.model.table
+    def _exchange(self, blocks: Array, weight: float) -> None:
+        work = self._work
         n = self.model.thrusters
         R, g, H = np.empty((3, 3)), np.zeros(6 + n), np.zeros((6 + n, 6 + n))
+        if weight == 0.0:
+            return
         for k in range(len(blocks)):
-            if case.quiet[k] > 0.0:
-                state = work.X[k]
-                rotation(state, R)
-                stage_disturbance(
-                    self.model.wake_table, self._scratch, state[:3], state[3:7], R, work.jets[k], True, g, H
-                )
-                work.Q[k] += blocks[k, :6, :6] - table.stage_s * case.quiet[k] * H[:6, :6]
-                work.S[k], work.R[k] = blocks[k, 6:, :6], blocks[k, 6:, 6:]
+            state = work.X[k]
+            rotation(state, R)
+            stage_disturbance(self.model.wake_table, self._scratch, state[:3], state[3:7], R, work.T[k], True, g, H)
+            work.Q[k] += blocks[k, :6, :6] - weight * H[:6, :6]
+            work.S[k], work.R[k] = blocks[k, 6:, :6], blocks[k, 6:, 6:]
 
     def _osqp(self, H: Array, g: Array, U: Array) -> tuple[Array, bool]:
-        size, table, rho = U.size, self.model.table, self.model.settings.rho
+        size, table, rho = U.size, self.model.table, RATE_PENALTY
         limit = float(table.weights[RATE_N])
         q = np.concatenate([g, np.zeros(size)])
         flat = U.reshape(-1)
