@@ -11,3 +11,7 @@ class InputError(WakewiseError):
 
 class StageError(WakewiseError):
     """A stage of a trial could not finish on valid input, such as photographs that do not register."""
+
+
+class MissingExtra(WakewiseError, ImportError):  # noqa: N818  (it is what is missing, as pip names it)
+    """A package is needed that is no part of the core: the message says by whom, which, and how it is installed."""

@@ -59,6 +59,9 @@ def scan(
 
     Stages that are done are skipped, so running the same command again continues where it stopped.
     """
+    from wakewise.extras import need
+
+    need("wakewise scan", "photos", "reports", "logs")
     from wakewise.operation import load_scenario
     from wakewise.reports import write_report
     from wakewise.trials import run_trial

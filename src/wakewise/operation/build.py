@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from wakewise.control import make_controller
 from wakewise.errors import InputError
 from wakewise.estimation import ErrorStateFilter
 from wakewise.geometry import Pose, quat_from_rotvec, quat_multiply
-from wakewise.imaging import LensCamera, Panels, PinholeCamera, Scene
 from wakewise.interfaces import BodyState, Controller, Estimator, ScalarGrid
 from wakewise.missions import Route, RoutePilot, TankBounds, check_clearance, plan_route
 from wakewise.operation.loop import Truth, WaterTruth
@@ -27,6 +26,9 @@ from wakewise.tank.fitting import check_fit
 from wakewise.targets import Region, Target, coral, coral_kinds, delicacy, load_mesh, place_on_bed, sample_region
 from wakewise.vehicles import Vehicle, load_vehicle, perturbed
 from wakewise.wake import wake_model
+
+if TYPE_CHECKING:
+    from wakewise.imaging import LensCamera, PinholeCamera, Scene
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -244,6 +246,8 @@ def build_camera(scenario: Scenario) -> PinholeCamera | LensCamera:
 
 def build_scene(scenario: Scenario, target: Target) -> Scene:
     """The target on its bed, textured, as the camera finds it."""
+    from wakewise.imaging import Panels, Scene
+
     length, width, _ = scenario.tank.size_m
     return Scene.build(target, scenario.target.seed, panels=Panels.over_tank(length, width))
 

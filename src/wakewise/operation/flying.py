@@ -1,4 +1,4 @@
-"""Flies a scenario in the tank and leaves steps.parquet, exposures.npz, timings.parquet and log.mcap."""
+"""Flies a scenario in the tank and leaves steps.parquet, exposures.npz, timings.parquet and, if it can, log.mcap."""
 
 from __future__ import annotations
 
@@ -6,18 +6,20 @@ from collections.abc import Callable
 from pathlib import Path
 
 from wakewise.errors import StageError
+from wakewise.extras import has
 from wakewise.interfaces import no_progress
 from wakewise.operation.build import Mission, build_flight
 from wakewise.operation.loop import fly
 from wakewise.operation.recorder import FlightRecorder
 from wakewise.operation.scenario import Scenario
-from wakewise.operation.telemetry import write_mcap
 
 
 def fly_mission(
     scenario: Scenario, mission: Mission, folder: Path, progress: Callable[..., None] = no_progress
 ) -> None:
     """Fly the mission once. steps.parquet is written last: where it is, the flight is whole.
+
+    log.mcap, for viewers, is written where the extra `logs` is installed; a trial asks for it beforehand.
 
     Raises
     ------
@@ -51,5 +53,8 @@ def fly_mission(
     )
     if len(recorder.exposures) != len(mission.route.exposures_s):
         raise StageError(f"{len(recorder.exposures)} of {len(mission.route.exposures_s)} exposures were made")
-    write_mcap(recorder.frame(), folder / "log.mcap")
+    if has("logs"):
+        from wakewise.operation.telemetry import write_mcap
+
+        write_mcap(recorder.frame(), folder / "log.mcap")
     recorder.write(folder)

@@ -1,10 +1,10 @@
 """The first face that a ray meets: a tree of boxes over a mesh, and a test of triangles that lets nothing through.
 
 Faces are halved again and again across the longest side of their box and held, a few each, by the leaves of a complete
-binary tree, whose node i has the children 2 i + 1 and 2 i + 2. The test is that of S. Woop, C. Benthin and I. Wald (Watertight Ray/Triangle
-Intersection, Journal of Computer Graphics Techniques 2 (2013) 65): faces that share an edge compute the very same
-number there, so that a ray that strikes an edge strikes one of them. All in double precision and one order, so that
-the answers are the same bytes on any machine and any number of threads. Photographs, which cast many more rays, take
+binary tree, whose node i has the children 2 i + 1 and 2 i + 2. The test is that of S. Woop, C. Benthin and I. Wald
+(Watertight Ray/Triangle Intersection, Journal of Computer Graphics Techniques 2 (2013) 65): faces that share an edge
+compute the very same number there, so that a ray that strikes an edge strikes one of them. All in double precision and
+one order, so that the answers are the same bytes on any number of threads. Photographs, which cast far more rays, take
 Embree's (see `wakewise.imaging`).
 """
 

@@ -18,6 +18,7 @@ import polars as pl
 from wakewise import __version__
 from wakewise.errors import InputError, StageError
 from wakewise.evaluation import Crop, evaluate_surface, flight_figures
+from wakewise.extras import need
 from wakewise.files import write_json, write_text
 from wakewise.geometry import matrix_from_quat
 from wakewise.likeness.textured import write_textured
@@ -67,7 +68,10 @@ def run_trial(scenario: Scenario, folder: Path, watch: Watch | None = None) -> F
     ------
     InputError
         If the scenario cannot be flown, or the folder holds another trial.
+    MissingExtra
+        Without the extras `photos` and `logs`.
     """
+    need("a trial", "photos", "logs")
     watch = watch or Quiet()
     mission = build_mission(scenario)
     claim(folder, scenario)
