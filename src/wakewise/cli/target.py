@@ -66,8 +66,8 @@ def show(
 
     if out is not None and out.suffix.lower() not in (".html", ".svg", ".ply"):
         raise InputError(f"--out {out}: suffix '{out.suffix}', allowed: .html, .svg, .ply")
-    if out is not None and out.suffix.lower() != ".ply":
-        need("a target's page", "reports", "photos", only=("matplotlib", "cv2", "embreex"))
+    if out is not None:
+        need("--out", "reports", "photos", only=("matplotlib", "cv2", "embreex"))
     given = read_marks(marks) if marks is not None else None
     if target in coral_kinds():
         name, mesh, scores = target, coral(target, seed), None
