@@ -177,12 +177,20 @@ HEAVY = ("numpy", "scipy", "numba", "polars", "pydantic", "yaml", "rich", "matpl
 
 
 @pytest.mark.parametrize(
-    "script", ["import wakewise", "from wakewise.cli.main import run\nassert run(['--help']) == 0"]
+    ("script", "heavy"),
+    [
+        ("import wakewise", HEAVY),
+        ("from wakewise.cli.main import run\nassert run(['--help']) == 0", HEAVY),
+        (
+            "from wakewise.operation import load_scenario\nload_scenario('quick', None, {})",
+            ("polars", "rich", "cv2", "embreex", "pycolmap", "trimesh", "networkx", "skimage", "scipy.stats", "osqp"),
+        ),
+    ],
 )
-def test_the_front_door_and_the_help_import_nothing_heavy(script, tmp_path):
-    """What takes its time is imported by the command that needs it."""
+def test_what_takes_long_to_import_is_imported_when_it_is_needed(script, heavy, tmp_path):
+    """The front door, the help of all commands, and a scenario read and checked."""
     found = subprocess.run(
-        [sys.executable, "-c", f"import sys\n{script}\nprint('HEAVY', sorted(set({HEAVY}) & sys.modules.keys()))"],
+        [sys.executable, "-c", f"import sys\n{script}\nprint('HEAVY', sorted(set({heavy}) & sys.modules.keys()))"],
         cwd=tmp_path,
         capture_output=True,
         text=True,
