@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 .PHONY: help setup scan test check bench docs lock clean
 
 help:
-	@echo "make setup   virtual environment in .venv with every extra but 'nerf' and 'film', and the tools for tests"
+	@echo "make setup   virtual environment in .venv: core, extras photos, reports, logs and piv (GPL), tools for tests"
 	@echo "make scan    fly, photograph, reconstruct and judge a coral; leaves runs/quick/report.html"
 	@echo "make test    ruff, mypy, the import contract and the tests"
 	@echo "make check   the same without the tests"
