@@ -17,7 +17,9 @@ def test_names_give_models_and_a_wrong_name_is_told_the_right_ones():
     assert [type(wake_model(name)) for name in model_names()] == [
         PaperJet, PowerJet, PowerJet, PowerJet, RoundJet, GaussianJet,
     ]  # fmt: skip
-    with pytest.raises(InputError, match="'swirl': unknown, allowed: paper, paper-calibrated, fitted, linear, jet, jet-fitted"):
+    with pytest.raises(
+        InputError, match="'swirl': unknown, allowed: paper, paper-calibrated, fitted, linear, jet, jet-fitted"
+    ):
         wake_model("swirl")
 
 

@@ -1,4 +1,7 @@
-"""What a person sees: a bar per stage with time left on standard error, tables or JSON on standard output."""
+"""What a person sees: a bar per stage with time left on standard error, tables or JSON on standard output.
+
+Rich is imported when something is drawn, since every command imports this page and `--help` is to be quick.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +11,19 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from rich.table import Table
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
 
-stderr = Console(stderr=True, highlight=False)
+
+@cache
+def _stderr() -> Console:
+    from rich.console import Console
+
+    return Console(stderr=True, highlight=False)
 
 
 class Bars:
@@ -26,6 +35,9 @@ class Bars:
     @contextmanager
     def stage(self, name: str) -> Iterator[Callable[..., None]]:
         """Show a bar while the block runs."""
+        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+        stderr = _stderr()
         columns = (
             SpinnerColumn(),
             TextColumn("{task.description:<12}"),
@@ -49,7 +61,7 @@ class Bars:
 
     def skipped(self, name: str) -> None:
         """Say that a stage was already done."""
-        stderr.print(f"[green]✓[/] {name:<12} [dim]already done")
+        _stderr().print(f"[green]✓[/] {name:<12} [dim]already done")
 
 
 def print_json(value: Any) -> None:
@@ -60,6 +72,8 @@ def print_json(value: Any) -> None:
 
 def print_table(table: Table) -> None:
     """Print a table on standard output."""
+    from rich.console import Console
+
     console = Console(highlight=False)
     # A pipe or a file has no width to fit into.
     Console(highlight=False, width=console.width if console.is_terminal else 140).print(table)

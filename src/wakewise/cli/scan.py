@@ -66,6 +66,9 @@ def scan(
 
     Stages that are done are skipped, so running the same command again continues where it stopped.
     """
+    from wakewise.extras import need
+
+    need("wakewise scan", "photos", "reports", "logs")
     from wakewise.api import trial
     from wakewise.operation import load_scenario
 

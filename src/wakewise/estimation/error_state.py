@@ -32,7 +32,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from wakewise.arrays import Array, freeze
 from wakewise.estimation.kernels import GAINS, GYRO, correct, felt, predict, turn_between, turned_by, unexplained
@@ -121,7 +121,8 @@ class ErrorStateFilter:
                 s.accelerometer_bias_walk_m_s3,
             ]
         )
-        self._gate = {n: float(chi2.isf(s.gate, n)) if s.gate > 0.0 else np.inf for n in (1, 3, 6)}
+        # chdtri is the inverse of chi-squared's upper tail.
+        self._gate = {n: float(chdtri(n, s.gate)) if s.gate > 0.0 else np.inf for n in (1, 3, 6)}
         spread = (
             s.start_std_m,
             s.start_std_rad,

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-import numpy as np
 from pydantic import Field
 
-from wakewise.imaging.camera import FlatPort, LensCamera, PinholeCamera
-from wakewise.imaging.optics import WaterOptics, water_optics
-from wakewise.imaging.renderer import Lights
 from wakewise.settings import Settings
+
+if TYPE_CHECKING:
+    from wakewise.imaging.camera import LensCamera, PinholeCamera
+    from wakewise.imaging.optics import WaterOptics
+    from wakewise.imaging.renderer import Lights
 
 WaterType = Literal["I", "IB", "II", "III", "1C", "3C", "5C"]
 
@@ -59,6 +60,8 @@ class ImagingSettings(Settings):
         InputError
             If the lens cannot show the field of view.
         """
+        from wakewise.imaging.camera import FlatPort, LensCamera, PinholeCamera
+
         fov_rad = math.radians(self.fov_deg)
         if self.port_air_m is None and not any(self.distortion):
             return PinholeCamera(self.width, self.height, fov_rad)
@@ -69,6 +72,10 @@ class ImagingSettings(Settings):
 
     def lights(self) -> Lights:
         """Sky, panels, and two lamps level with the lens, a little above it."""
+        import numpy as np
+
+        from wakewise.imaging.renderer import Lights
+
         x = self.lamp_offset_m
         return Lights(
             ambient=self.ambient,
@@ -79,4 +86,6 @@ class ImagingSettings(Settings):
 
     def water(self) -> WaterOptics:
         """Clear water of the chosen type."""
+        from wakewise.imaging.optics import water_optics
+
         return water_optics(self.water_type)

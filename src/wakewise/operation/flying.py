@@ -12,6 +12,7 @@ import polars as pl
 
 from wakewise.errors import StageError, WakewiseError
 from wakewise.evaluation import flight_figures
+from wakewise.extras import has
 from wakewise.interfaces import Witness, no_progress
 from wakewise.missions import SETTLING
 from wakewise.operation.loop import Step, run_loop
@@ -19,7 +20,6 @@ from wakewise.operation.parts import Parts
 from wakewise.operation.preflight import check_begin
 from wakewise.operation.recorder import FlightRecorder
 from wakewise.operation.scenario import Scenario
-from wakewise.operation.telemetry import write_mcap
 
 WATER_EVERY_S = 0.1
 """How often the water is asked about; in between the last answer stands."""
@@ -48,8 +48,14 @@ class Flight:
         return {"method": self.parts.method, "seed": self.parts.scenario.seed, **flight_figures(frame)}
 
     def write(self, folder: Path) -> None:
-        """Write log.mcap, exposures.npz, timings.parquet; last steps.parquet, which says that the flight is whole."""
-        write_mcap(self.steps, folder / "log.mcap")
+        """Write exposures.npz, timings.parquet; last steps.parquet, which says that the flight is whole.
+
+        log.mcap, for viewers, is written where the extra `logs` is installed; a trial asks for it beforehand.
+        """
+        if has("logs"):
+            from wakewise.operation.telemetry import write_mcap
+
+            write_mcap(self.steps, folder / "log.mcap")
         self.recorder.write(folder)
 
 
@@ -150,6 +156,8 @@ def fly(
 
 def fly_trial(parts: Parts, folder: Path, progress: Callable[..., None] = no_progress) -> None:
     """Fly the mission once and leave its record. steps.parquet is written last: where it is, the flight is whole.
+
+    log.mcap, for viewers, is written where the extra `logs` is installed; a trial asks for it beforehand.
 
     Raises
     ------
