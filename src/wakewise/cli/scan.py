@@ -82,7 +82,11 @@ def scan(
     for key in _HEADLINES:
         table.add_row(key, shown(figures[key]), figures["units"][key])
     print_table(table)
+    # Many figures fail for one reason, which is said once.
+    failed: dict[str, list[str]] = {}
     for key, reason in figures["why"].items():
         if key in _HEADLINES:
-            typer.echo(f"{key}: {reason}")
+            failed.setdefault(reason, []).append(key)
+    for reason, keys in failed.items():
+        typer.echo(f"{', '.join(keys)}: {reason}")
     typer.echo(f"report: {report}")
