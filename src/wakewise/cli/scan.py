@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wakewise.cli.console import Bars, print_json, print_table, shown
+from wakewise.cli.console import Bars, print_json, print_table, reasons_once, shown
 from wakewise.cli.options import (
     Json,
     Out,
@@ -82,11 +82,6 @@ def scan(
     for key in _HEADLINES:
         table.add_row(key, shown(figures[key]), figures["units"][key])
     print_table(table)
-    # Many figures fail for one reason, which is said once.
-    failed: dict[str, list[str]] = {}
-    for key, reason in figures["why"].items():
-        if key in _HEADLINES:
-            failed.setdefault(reason, []).append(key)
-    for reason, keys in failed.items():
-        typer.echo(f"{', '.join(keys)}: {reason}")
+    for line in reasons_once(figures["why"], _HEADLINES):
+        typer.echo(line)
     typer.echo(f"report: {report}")
