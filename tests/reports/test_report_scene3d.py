@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import shutil
+import socket
 from pathlib import Path
 from unittest.mock import MagicMock, patch
 
@@ -102,6 +103,20 @@ def test_the_bed_has_the_tanks_size_whatever_the_target_is_scaled_to(made_up: Pa
     _, server = layers(read_trial(folder), None)
     grid = server.scene.add_grid.call_args.kwargs
     assert (grid["width"], grid["height"]) == (4.0, 7.0)
+
+
+def test_no_port_is_opened_for_a_scene(made_up: Path) -> None:
+    """Neither on the network nor on this machine: nothing is bound while the page is made."""
+    bound: list[object] = []
+    bind = socket.socket.bind
+
+    def told(sock: socket.socket, address: object) -> None:
+        bound.append(address)
+        bind(sock, address)
+
+    with patch("socket.socket.bind", told):
+        assert scene_html(read_trial(made_up), None) is not None
+    assert bound == []
 
 
 def test_a_trial_without_places_has_no_scene(made_up: Path) -> None:
