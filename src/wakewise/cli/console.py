@@ -9,7 +9,7 @@ import json
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -90,3 +90,12 @@ def shown(value: Any) -> str:
             return f"{value:.2g}"
         return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}" if abs(value) < 10 else f"{value:.1f}"
     return str(value)
+
+
+def reasons_once(why: Mapping[str, str], keys: Sequence[str]) -> list[str]:
+    """A line for every reason that one of these figures is missing for; figures that share a reason share the line."""
+    shared: dict[str, list[str]] = {}
+    for key in keys:
+        if key in why:
+            shared.setdefault(why[key], []).append(key)
+    return [f"{', '.join(failed)}: {reason}" for reason, failed in shared.items()]

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wakewise.cli.console import Bars, print_json, print_table, shown
+from wakewise.cli.console import Bars, print_json, print_table, reasons_once, shown
 from wakewise.cli.options import (
     Json,
     Out,
@@ -89,7 +89,6 @@ def scan(
     for key in _HEADLINES:
         table.add_row(key, shown(figures[key]), figures["units"][key])
     print_table(table)
-    for key, reason in figures["why"].items():
-        if key in _HEADLINES:
-            typer.echo(f"{key}: {reason}")
+    for line in reasons_once(figures["why"], _HEADLINES):
+        typer.echo(line)
     typer.echo(f"report: {report}")
