@@ -9,7 +9,7 @@ import polars as pl
 
 from wakewise.errors import StageError
 from wakewise.evaluation import Crop, evaluate_surface
-from wakewise.experiments.trial import REGION_SHARE
+from wakewise.experiments.photo_model import REGION_SHARE
 from wakewise.files import write_json
 from wakewise.interfaces import Progress
 from wakewise.operation import build_mission, read_scenario

@@ -19,6 +19,7 @@ from wakewise import __version__
 from wakewise.errors import InputError, StageError
 from wakewise.evaluation import Crop, evaluate_surface, flight_figures
 from wakewise.experiments.metrics import Figures, Gathering, comparison
+from wakewise.experiments.photo_model import REGION_SHARE
 from wakewise.experiments.stages import Ledger, Quiet, Watch, of_the_computer
 from wakewise.experiments.textured import write_textured
 from wakewise.files import write_json, write_text
@@ -57,8 +58,6 @@ _SURFACE_FIGURES = (
     "outside_pct",
 )
 _MODEL_FIGURES = ("reprojection_px", "cameras_rmse_mm", "features_per_image", "inlier_matches")
-# What is reconstructed is a little more than the target: estimated cameras put it some millimetres off its place.
-REGION_SHARE = 1.25
 
 
 def run_trial(scenario: Scenario, folder: Path, watch: Watch | None = None) -> Figures:

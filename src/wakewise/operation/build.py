@@ -21,7 +21,7 @@ from wakewise.interfaces import BodyState, Controller, Estimator, ScalarGrid
 from wakewise.missions import Route, RoutePilot, TankBounds, check_clearance, plan_route
 from wakewise.operation.loop import Truth, WaterTruth
 from wakewise.operation.scenario import Scenario, TargetSettings
-from wakewise.tank import Holding, Tank, build_ambient, holding
+from wakewise.tank import Holding, Tank, holding, tank_ambient
 from wakewise.tank.fitting import check_fit
 from wakewise.targets import Region, Target, coral, coral_kinds, delicacy, load_mesh, place_on_bed, sample_region
 from wakewise.vehicles import Vehicle, load_vehicle, perturbed
@@ -182,7 +182,7 @@ def check_current(scenario: Scenario, vehicle: Vehicle, route: Route, looks: int
         If it cannot stay on the route, with the figures, or the current's series is shorter than the flight.
     """
     tank = scenario.tank
-    ambient = build_ambient(tank, np.random.default_rng(scenario.seed))
+    ambient = tank_ambient(tank, Seeds.of(scenario.seed).tank)
     if ambient.end_s < route.duration_s:
         raise InputError(
             f"tank.current_file: {ambient.end_s:.0f} s of series are left, the flight takes {route.duration_s:.0f} s"

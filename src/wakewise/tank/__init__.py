@@ -21,12 +21,13 @@ from wakewise.tank.grains import (
     threshold_stress_Pa,
 )
 from wakewise.tank.holding import Holding, holding
+from wakewise.tank.instant import Ambient
 from wakewise.tank.measuring import WaterMeasure
 from wakewise.tank.plant import VehiclePlant
 from wakewise.tank.sediment import Silt, SiltLaws
 from wakewise.tank.sensors import Sensors
 from wakewise.tank.settings import TankSettings, ThrusterFailure
-from wakewise.tank.tank import Tank
+from wakewise.tank.tank import Tank, tank_ambient
 from wakewise.tank.tether import Tether
 from wakewise.tank.water import Water, WaterCounts
 
@@ -57,5 +58,6 @@ __all__ = [
     "holding",
     "read_current_series",
     "settling_speed_m_s",
+    "tank_ambient",
     "threshold_stress_Pa",
 ]

@@ -12,7 +12,7 @@ from wakewise.errors import InputError
 from wakewise.interfaces import BodyState, Measurement, ScalarGrid
 from wakewise.tank.blockage import Blockage
 from wakewise.tank.closure import PLAIN, SWIRLING
-from wakewise.tank.currents import build_ambient
+from wakewise.tank.currents import AmbientSum, build_ambient
 from wakewise.tank.grains import speed_at_stress_m_s
 from wakewise.tank.induction import impulse_velocity
 from wakewise.tank.measuring import TargetProbes, WaterMeasure
@@ -68,7 +68,7 @@ class Tank:
             raise InputError(
                 f"target {target.name}: stands on a bed at {target.bed_z_m:g} m, tank.size_m has {depth:g}"
             )
-        water_rng, silt_rng, sensor_rng, probe_rng, current_rng = rng.spawn(5)
+        water_rng, silt_rng, sensor_rng, probe_rng, current_rng = _streams(rng)
         self.settings = settings
         self.target = target
         self.ambient = build_ambient(settings, current_rng)
@@ -246,6 +246,16 @@ class Tank:
         now = self.water.now
         circles = np.concatenate([now.stirred_bed(self._stirring_speed), self.ambient.stirred_bed()])
         self.silt.step(now, circles, self._silt_every * self.settings.flow_step_s)
+
+
+def tank_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSum:
+    """The water's own motion in a tank that is made with a generator like this one; the same draws."""
+    return build_ambient(settings, _streams(rng)[-1])
+
+
+def _streams(rng: np.random.Generator) -> list[np.random.Generator]:
+    """Generators of water, silt, sensors, probes and the water's own motion."""
+    return rng.spawn(5)
 
 
 def _tether(settings: TankSettings) -> Tether | None:
