@@ -143,7 +143,7 @@ def allocate(
         print_json(figures)
         return
     _show(chosen, gentle, least, figures)
-    if max(gentle.disturbance, least.disturbance) < _STILL_M2_S2:
+    if max(gentle.disturbance or 0.0, least.disturbance or 0.0) < _STILL_M2_S2:
         typer.echo(_nobody_near(chosen, X_WB, places[weights > 0.0], gentle, least))
 
 

@@ -21,6 +21,7 @@ from wakewise.experiments.oracle import grid_convergence_pct, oracle_jets
 from wakewise.experiments.real_jet import read_air_jet
 from wakewise.experiments.wake_piv import RealPairs, RoundTrip, ShearFlow, piv_samples, process_real_pairs, round_trip
 from wakewise.interfaces import Progress, no_progress
+from wakewise.physics import FRESH_WATER_KG_M3
 from wakewise.wake.calibration import Calibration, Split, calibrate, split_samples
 from wakewise.wake.families import FAMILIES, Family
 from wakewise.wake.fit_file import fit_figures
@@ -299,7 +300,7 @@ def axial_decay(samples: JetSamples, half_width_m: float = 6e-3) -> tuple[Array,
 
 def exit_speeds(samples: JetSamples) -> Array:
     """Exit speed sqrt(T / (rho A)) of every row, shape (n,)."""
-    return np.asarray(np.sqrt(samples.thrust_N / (998.0 * samples.disk_area_m2)))
+    return np.asarray(np.sqrt(samples.thrust_N / (FRESH_WATER_KG_M3 * samples.disk_area_m2)))
 
 
 def find_flow(result: WakeValidation, name: str) -> MeasuredFlow:

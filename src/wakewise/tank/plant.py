@@ -11,6 +11,7 @@ from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, matrix_from_quat
 from wakewise.interfaces import BodyState
+from wakewise.physics import GRAVITY_M_S2
 from wakewise.tank.contact import Surroundings
 from wakewise.tank.currents import AmbientSum
 from wakewise.tank.settings import ThrusterFailure
@@ -20,7 +21,7 @@ from wakewise.vehicles import Vehicle, compile_body, saturate, thruster_lag
 from wakewise.vehicles.kernels import rotate
 from wakewise.vehicles.runge_kutta import rk4_kernel
 
-_GRAVITY_W_M_S2 = np.array([0.0, 0.0, 9.80665])
+_GRAVITY_W_M_S2 = np.array([0.0, 0.0, GRAVITY_M_S2])
 
 
 class VehiclePlant:

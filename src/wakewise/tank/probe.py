@@ -10,6 +10,7 @@ import numpy as np
 from wakewise.arrays import Array, BoolArray, freeze
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
+from wakewise.physics import TRIM_WATER_KG_M3
 from wakewise.tank.blockage import Blockage
 from wakewise.tank.closure import PLAIN, SWIRLING
 from wakewise.tank.contact import Surroundings
@@ -66,7 +67,7 @@ def probe(
     flow: str = "parcels",
     turbulence: float = 0.0,
     swirl: bool = False,
-    density_kg_m3: float = 1000.0,
+    density_kg_m3: float = TRIM_WATER_KG_M3,
     seed: int = 0,
 ) -> Probed:
     """Find the flow of a vehicle that is held at one pose while its thrusters push as told, in water at rest before.

@@ -7,13 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from wakewise.arrays import Array
+from wakewise.physics import GRAVITY_M_S2
 from wakewise.vehicles.importers.bodies import inertia_matrix
 from wakewise.vehicles.importers.found import Found
 from wakewise.vehicles.importers.water import store
 from wakewise.vehicles.importers.xml import PlacedError
 from wakewise.vehicles.importers.yamls import Item
-
-GRAVITY_M_S2 = 9.81
 
 Entries = list[tuple[tuple[str, ...], Item]]
 """Every item of a file with the keys that lead to it."""
