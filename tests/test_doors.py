@@ -1,4 +1,4 @@
-"""A room's exports are imported when they are asked for, and are what a plain `__init__` would give."""
+"""Every room's door opens; a lazy one imports its exports when asked, and gives what a plain one would."""
 
 import importlib
 import pkgutil
@@ -46,3 +46,19 @@ def test_a_module_below_a_room_does_not_hide_the_export_of_its_name():
     )
     found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert found.returncode == 0, found.stderr
+
+
+EVERY = [
+    module.name
+    for module in pkgutil.walk_packages(wakewise.__path__, "wakewise.")
+    if module.ispkg and not module.name.startswith("wakewise.reconstruction.nerf")
+]
+
+
+@pytest.mark.parametrize("room", ["wakewise", *EVERY])
+def test_all_that_a_room_offers_is_there(room: str) -> None:
+    """`from room import *` works, and no name is offered twice."""
+    door = importlib.import_module(room)
+    offered = list(getattr(door, "__all__", ()))
+    assert [name for name in offered if not hasattr(door, name)] == []
+    assert len(offered) == len(set(offered))

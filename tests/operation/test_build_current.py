@@ -1,9 +1,10 @@
 """Said before the flight: a current too fast to hold, a series too short for the flight."""
 
+import numpy as np
 import pytest
 
 from wakewise.errors import InputError
-from wakewise.operation import load_scenario
+from wakewise.operation import load_scenario, preflight
 from wakewise.operation.preflight import check_current
 from wakewise.vehicles import load_vehicle
 
@@ -32,3 +33,19 @@ def test_a_series_shorter_than_the_flight_is_refused(tmp_path):
     path.write_text("time_s,u,v\n0,0.1,0\n10,0.1,0\n")
     with pytest.raises(InputError, match="10 s of series are left, the flight takes"):
         _check(current_file=str(path))
+
+
+@pytest.mark.parametrize("seed", [1, 7])
+def test_the_water_that_is_checked_is_the_water_that_is_flown(seed, monkeypatch):
+    """Background turbulence included: what passed the vehicle in the check is what the tank's own water does there."""
+    scenario = load_scenario("quick", None, {"method": "dp", "seed": seed, "tank.background_m_s": 0.05})
+    passed = []
+    monkeypatch.setattr(preflight, "holding", lambda vehicle, passing, *_: passed.append(np.array(passing)))
+    parts = scenario.parts()
+    preflight.check_current(parts)
+    ambient = parts.world.tank().ambient
+    route, X_BC = parts.route, parts.vehicle.X_BC
+    for row, time_s in zip(passed[0], np.linspace(0.0, route.duration_s, len(passed[0])), strict=True):
+        wished = route.body(float(time_s), X_BC)
+        current = ambient.velocity(wished.X_WB.p_m[None], float(time_s))[0]
+        np.testing.assert_allclose(row, current @ wished.X_WB.R - wished.nu_B[:3], atol=1e-12)

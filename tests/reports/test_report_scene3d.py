@@ -12,8 +12,8 @@ import numpy as np
 import trimesh
 import yaml
 
-from wakewise.experiments.textured import standing
 from wakewise.geometry import matrix_from_quat
+from wakewise.likeness.textured import standing
 from wakewise.reports.errors import ModelErrors, model_errors
 from wakewise.reports.scene3d import Q_UW, R_UW, lightened, scene_html, upright
 from wakewise.reports.trial import Surface, Trial, read_trial

@@ -9,6 +9,7 @@ import typer
 
 from wakewise.cli.console import print_json
 from wakewise.cli.options import Json
+from wakewise.physics import TRIM_WATER_KG_M3
 
 if TYPE_CHECKING:
     from wakewise.arrays import Array
@@ -84,7 +85,7 @@ def probe_command(
     seed: ProbeSeed = 0,
     turbulence: Turbulence = False,
     swirl: Swirl = False,
-    density: Density = 1000.0,
+    density: Density = TRIM_WATER_KG_M3,
     out: ProbeOut = None,
     json: Json = False,
 ) -> None:

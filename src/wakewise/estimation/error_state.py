@@ -39,9 +39,9 @@ from wakewise.estimation.kernels import GAINS, GYRO, correct, felt, predict, tur
 from wakewise.estimation.settings import FilterSettings
 from wakewise.geometry import Pose, matrix_from_quat
 from wakewise.interfaces import BodyState, Measurement
+from wakewise.physics import GRAVITY_M_S2
 from wakewise.vehicles import Vehicle, compile_body
 
-_GRAVITY_M_S2 = 9.80665
 _TICK_S = 1e-9
 _MEMORY = 15  # poses that the mean of innovations goes back, a quarter of a second at 62 Hz
 _CHANCE = 9.0 / (2 * _MEMORY - 1)  # square of three sigmas of that mean for a filter whose noise is right
@@ -274,7 +274,7 @@ class ErrorStateFilter:
         """
         mean = walk.mean
         R_WB = matrix_from_quat(mean[3:7])
-        down_B = R_WB.T @ np.array([0.0, 0.0, _GRAVITY_M_S2])
+        down_B = R_WB.T @ np.array([0.0, 0.0, GRAVITY_M_S2])
         H = np.empty((3, self._errors))
         expected = felt(self._packed, self._B, mean, walk.thrusts_N, walk.rest_q, down_B, H)
         period_s = max(time_s - walk.force_s, 1e-3) if walk.force_s is not None else 0.02

@@ -11,7 +11,7 @@ from wakewise.errors import InputError
 from wakewise.missions import check_clearance
 from wakewise.operation.surroundings import surroundings_of
 from wakewise.planning import check_start, state_of
-from wakewise.tank import Holding, build_ambient, holding
+from wakewise.tank import Holding, holding, tank_ambient
 from wakewise.tank.fitting import check_fit
 
 if TYPE_CHECKING:
@@ -88,8 +88,7 @@ def check_current(parts: Parts, looks: int = 200) -> Holding | None:
         If it cannot stay on the route, with the figures, or the current's series is shorter than the flight.
     """
     tank, vehicle, route = parts.scenario.tank, parts.vehicle, parts.route
-    # The draw of the tank's own current: the turbulence looked at is the one that is flown in.
-    ambient = build_ambient(tank, parts.seeds.tank().spawn(5)[4])
+    ambient = tank_ambient(tank, parts.seeds.tank())
     if ambient.end_s < route.duration_s:
         raise InputError(
             f"tank.current_file: {ambient.end_s:.0f} s of series are left, the flight takes {route.duration_s:.0f} s"

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
+from wakewise.physics import GRAVITY_M_S2
 
-GRAVITY_M_S2 = 9.80665
 VISCOSITY_M2_S = 1.0e-6  # of fresh water at 20 degrees
 VON_KARMAN = 0.40
 SAND_M = 62.5e-6  # from here on grains are sand (Wentworth 1922), which van Rijn's law is for

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from wakewise.physics import TRIM_WATER_KG_M3
 from wakewise.settings import Settings
 
 Length = Annotated[float, Field(gt=0.3, le=100.0)]
@@ -53,7 +54,9 @@ class TankSettings(Settings):
     """
 
     size_m: tuple[Length, Length, Length] = Field((6.0, 5.0, 1.5), description="length, width and depth of the water")
-    density_kg_m3: float = Field(1000.0, gt=900.0, lt=1100.0, description="of the water; vehicles are trimmed in 1000")
+    density_kg_m3: float = Field(
+        TRIM_WATER_KG_M3, gt=900.0, lt=1100.0, description="of the water; vehicles are trimmed in 1000"
+    )
     current_m_s: tuple[Speed, Speed, Speed] = Field((0.03, 0.02, 0.0), description="steady current: north, east, down")
     current_file: str | None = Field(
         None, min_length=1, description="series in place of current_m_s: CSV (time_s,u,v[,w] in m/s) or NOAA's JSON"

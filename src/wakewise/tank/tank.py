@@ -22,6 +22,7 @@ from wakewise.tank.tether import Tether
 from wakewise.targets import Target
 from wakewise.thrusters import electrical_power_W
 from wakewise.vehicles import Vehicle
+from wakewise.water import AmbientSum
 from wakewise.water.blockage import Blockage
 from wakewise.water.closure import PLAIN, SWIRLING
 from wakewise.water.induction import impulse_velocity
@@ -69,7 +70,7 @@ class Tank:
             raise InputError(
                 f"target {target.name}: stands on a bed at {target.bed_z_m:g} m, tank.size_m has {depth:g}"
             )
-        water_rng, silt_rng, sensor_rng, probe_rng, current_rng = rng.spawn(5)
+        water_rng, silt_rng, sensor_rng, probe_rng, current_rng = _streams(rng)
         self.settings = settings
         self.target = target
         self.ambient = build_ambient(settings, current_rng)
@@ -252,6 +253,16 @@ class Tank:
         now = self.water.now
         circles = np.concatenate([now.stirred_bed(self._stirring_speed), self.ambient.stirred_bed()])
         self.silt.step(now, circles, self._silt_every * self.settings.flow_step_s)
+
+
+def tank_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSum:
+    """The water's own motion in a tank that is made with a generator like this one; the same draws."""
+    return build_ambient(settings, _streams(rng)[-1])
+
+
+def _streams(rng: np.random.Generator) -> list[np.random.Generator]:
+    """Generators of water, silt, sensors, probes and the water's own motion."""
+    return rng.spawn(5)
 
 
 def _tether(settings: TankSettings) -> Tether | None:

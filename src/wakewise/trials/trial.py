@@ -57,8 +57,9 @@ _SURFACE_FIGURES = (
     "outside_pct",
 )
 _MODEL_FIGURES = ("reprojection_px", "cameras_rmse_mm", "features_per_image", "inlier_matches")
-# What is reconstructed is a little more than the target: estimated cameras put it some millimetres off its place.
+
 REGION_SHARE = 1.25
+"""What is reconstructed is a little more than the target: estimated cameras put it some millimetres off its place."""
 
 
 def run_trial(flight: Parts | Scenario, folder: Path, watch: Watch | None = None) -> Figures:

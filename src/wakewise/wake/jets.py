@@ -16,10 +16,8 @@ from numpy.typing import ArrayLike
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
+from wakewise.physics import FRESH_WATER_KG_M3
 from wakewise.wake import kernels
-
-FRESH_WATER_KG_M3 = 998.0
-"""Fresh water at 20-21 deg C, the density of the paper (CRC Handbook of Chemistry and Physics: 998.2 at 20 deg C)."""
 
 
 class Law(NamedTuple):

@@ -22,7 +22,8 @@ from numpy.typing import ArrayLike
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
-from wakewise.wake.jets import FRESH_WATER_KG_M3, RoundJet
+from wakewise.physics import FRESH_WATER_KG_M3
+from wakewise.wake.jets import RoundJet
 
 Arrival = Literal["front", "steady"]
 FRONT = 2.57
