@@ -20,14 +20,14 @@ def _check(vehicle="bluerov2-heavy", **tank):
 def test_a_current_too_fast_is_refused_with_its_margin():
     """One line with speed, drag, what the thrusters hold, and how much is missing."""
     with pytest.raises(InputError, match=r"cannot hold its route.*1\.\d\d m/s.*N in.*margin -\d+ %"):
-        _check(current_m_s=[0.9, 0.5, 0.0])
+        _check(**{"current.velocity_m_s": [0.9, 0.5, 0.0]})
 
 
 def test_a_gentle_current_leaves_a_margin():
     """The default current is no burden; faster water leaves less."""
-    gentle, fast = _check(), _check(current_m_s=[0.4, 0.0, 0.0])
+    gentle, fast = _check(), _check(**{"current.velocity_m_s": [0.4, 0.0, 0.0]})
     assert gentle.margin_pct > fast.margin_pct > 0.0
-    assert _check(wave_amplitude_m=0.1, wave_period_s=2.0).margin_pct < gentle.margin_pct
+    assert _check(**{"waves.amplitude_m": 0.1, "waves.period_s": 2.0}).margin_pct < gentle.margin_pct
 
 
 def test_a_series_shorter_than_the_flight_is_refused(tmp_path):
@@ -35,4 +35,4 @@ def test_a_series_shorter_than_the_flight_is_refused(tmp_path):
     path = tmp_path / "c.csv"
     path.write_text("time_s,u,v\n0,0.1,0\n10,0.1,0\n")
     with pytest.raises(InputError, match="10 s of series are left, the flight takes"):
-        _check(current_file=str(path))
+        _check(**{"current.file": str(path)})

@@ -31,21 +31,24 @@ def test_overrides_lie_over_files_and_files_over_presets(tmp_path: Path) -> None
     assert scenario.mission.views == (20, 16, 12)
 
 
-def test_a_kind_of_water_replaces_what_lies_below_and_yields_to_what_lies_beside_and_above(tmp_path: Path) -> None:
-    """Over a scenario that spells out silt and grains, --set tank.water sets them anew, unless they are set, too."""
+def test_a_kind_of_silt_replaces_what_lies_below_and_yields_to_what_lies_beside_and_above(tmp_path: Path) -> None:
+    """Over a scenario that spells out load and grains, a kind of silt sets them anew, unless they are set, too."""
     path = tmp_path / "scenario.yaml"
-    path.write_text(dump_scenario(load_scenario("quick", None, {"tank.water": "caco3-50mg"})))
-    assert load_scenario(None, path, {}).tank.grain_m == 3e-4
-    clear = load_scenario(None, path, {"tank.water": "clear"}).tank
-    assert (clear.silt, clear.suspended_mg_l) == (0.0, 0.0)
-    silty = load_scenario(None, path, {"tank.water": "silt"}).tank
-    assert (silty.silt, silty.suspended_mg_l, silty.grain_m) == (0.1, 0.0, 20e-6)
-    for changes in ({"tank.silt": 0.4, "tank.water": "silt"}, {"tank.water": "silt", "tank.silt": 0.4}):
-        assert load_scenario(None, path, changes).tank.silt == 0.4
-    assert load_scenario(None, path, {"tank.silt": 0.3}).tank.suspended_mg_l == 50.0
-    path.write_text("tank: {water: clear, silt: 0.2}\n")
-    assert load_scenario(None, path, {}).tank.silt == 0.2
-    assert load_scenario(None, path, {"tank": {"water": "caco3-50mg"}}).tank.silt == 0.0
+    path.write_text(dump_scenario(load_scenario("quick", None, {"tank.silt.kind": "caco3-50mg"})))
+    assert load_scenario(None, path, {}).tank.silt.grain_m == 3e-4
+    clear = load_scenario(None, path, {"tank.silt.kind": "clear"}).tank.silt
+    assert (clear.load_kg_m2, clear.suspended_mg_l) == (0.0, 0.0)
+    silty = load_scenario(None, path, {"tank.silt.kind": "silt"}).tank.silt
+    assert (silty.load_kg_m2, silty.suspended_mg_l, silty.grain_m) == (0.1, 0.0, 20e-6)
+    for changes in (
+        {"tank.silt.load_kg_m2": 0.4, "tank.silt.kind": "silt"},
+        {"tank.silt.kind": "silt", "tank.silt.load_kg_m2": 0.4},
+    ):
+        assert load_scenario(None, path, changes).tank.silt.load_kg_m2 == 0.4
+    assert load_scenario(None, path, {"tank.silt.load_kg_m2": 0.3}).tank.silt.suspended_mg_l == 50.0
+    path.write_text("tank: {silt: {kind: clear, load_kg_m2: 0.2}}\n")
+    assert load_scenario(None, path, {}).tank.silt.load_kg_m2 == 0.2
+    assert load_scenario(None, path, {"tank": {"silt": {"kind": "caco3-50mg"}}}).tank.silt.load_kg_m2 == 0.0
 
 
 @pytest.mark.parametrize(
@@ -56,7 +59,7 @@ def test_a_kind_of_water_replaces_what_lies_below_and_yields_to_what_lies_beside
         ({"mission.standoff_m": -0.5}, ["mission.standoff_m", "-0.5", "greater than 0"]),
         ({"mission.views": [20]}, ["mission", "one count per orbit"]),
         ({"tank.failures": [{"thruster": 1, "att_s": 3}]}, ["tank.failures.0.att_s", "at_s"]),
-        ({"tank.water": "mud"}, ["tank.water", "caco3-50mg"]),
+        ({"tank.silt.kind": "mud"}, ["tank.silt.kind", "caco3-50mg"]),
         ({"method": "magic"}, ["method", "magic", "dp", "wake-aware"]),
         ({"seed": float("nan")}, ["seed"]),
         ({"mission": 3}, ["mission"]),
@@ -103,11 +106,13 @@ def test_random_bytes_never_end_in_anything_but_an_input_error(data: bytes) -> N
 
 def test_overrides_are_yaml_values() -> None:
     """Numbers, lists, words and null keep their kind; what is no pair is refused."""
-    assert parse_overrides(["tank.silt=0", "mission.views=[8, 8, 8]", "vehicle=paper", "tank.trim_N=null"]) == {
-        "tank.silt": 0,
+    assert parse_overrides(
+        ["tank.silt.load_kg_m2=0", "mission.views=[8, 8, 8]", "vehicle=paper", "tank.mismatch.trim_N=null"]
+    ) == {
+        "tank.size_m": 0,
         "mission.views": [8, 8, 8],
         "vehicle": "paper",
-        "tank.trim_N": None,
+        "tank.mismatch.trim_N": None,
     }
     for bad in ("silt", "=3", "a=[1"):
         with pytest.raises(InputError, match="--set"):

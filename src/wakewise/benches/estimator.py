@@ -86,9 +86,10 @@ def _loss(scenario: Scenario, mission: Mission, options: BenchOptions) -> dict[s
 
     The water is clean and moves in steps of 0.1 s, which is cheaper and which neither vehicle nor sensors notice.
     """
-    blind = scenario.tank.model_copy(
-        update={"pose_outages_s": (LOSS_S,), "tracking_rate_hz": 0.0, "silt": 0.0, "flow_step_s": 0.1}
-    )
+    tank = scenario.tank
+    sensors = tank.sensors.model_copy(update={"pose_outages_s": (LOSS_S,), "tracking_rate_hz": 0.0})
+    clean = tank.silt.model_copy(update={"load_kg_m2": 0.0})
+    blind = tank.model_copy(update={"sensors": sensors, "silt": clean, "flow_step_s": 0.1})
     rate_hz = scenario.control.rate_hz
     begin, middle, end = (round(t * rate_hz) - 1 for t in (LOSS_S[0], sum(LOSS_S) / 2, LOSS_S[1]))
     nees, worst_m, at_end, claimed, after = [], 0.0, [], [], []

@@ -182,7 +182,9 @@ class Respared:
             missing = command.wrench_B - self.layout.B @ state.thrusts_N
             thrusts = state.thrusts_N + self.layout.inverse @ missing
             if np.all((thrusts >= self.layout.lower_N) & (thrusts <= self.layout.upper_N)):
-                held = SpareState(flown_by(inner, thrusts), thrusts, state.age_s + dt_s, state.disturbance, state.free_age_s)
+                held = SpareState(
+                    flown_by(inner, thrusts), thrusts, state.age_s + dt_s, state.disturbance, state.free_age_s
+                )
                 return held, replace(command, thrusts_N=thrusts, disturbance=state.disturbance)
         G = self.view.gram(estimate.X_WB)
         if not np.isfinite(G).all():

@@ -188,14 +188,15 @@ def check_current(scenario: Scenario, vehicle: Vehicle, route: Route, looks: int
     ambient = build_ambient(tank, np.random.default_rng(scenario.seed))
     if ambient.end_s < route.duration_s:
         raise InputError(
-            f"tank.current_file: {ambient.end_s:.0f} s of series are left, the flight takes {route.duration_s:.0f} s"
+            f"tank.current.file: {ambient.end_s:.0f} s of series are left, the flight takes {route.duration_s:.0f} s"
         )
     passing = []
     for time_s in np.linspace(0.0, route.duration_s, looks):
         wished = route.body(float(time_s), vehicle.X_BC)
         current = ambient.velocity(wished.X_WB.p_m[None], float(time_s))[0]
         passing.append(current @ wished.X_WB.R - wished.nu_B[:3])
-    trim_N = tank.trim_range_N if tank.trim_N is None else tank.trim_N
+    apart = tank.mismatch
+    trim_N = apart.trim_range_N if apart.trim_N is None else apart.trim_N
     found = holding(vehicle, np.array(passing), tank.density_kg_m3, trim_N)
     if found is not None and found.share < 1.0:
         raise InputError(f"tank: {vehicle.name} cannot hold its route, {found.said()}")
@@ -206,16 +207,17 @@ def build_flight(scenario: Scenario, mission: Mission) -> Flight:
     """Put controller and tank side by side; they share nothing but the interfaces."""
     seeds, tank_settings = Seeds.of(scenario.seed), scenario.tank
     believed = mission.vehicle
-    trim_N = tank_settings.trim_N
+    apart = tank_settings.mismatch
+    trim_N = apart.trim_N
     if trim_N is None:
-        trim_N = float(seeds.plant.uniform(-tank_settings.trim_range_N, tank_settings.trim_range_N))
+        trim_N = float(seeds.plant.uniform(-apart.trim_range_N, apart.trim_range_N))
     true_vehicle = perturbed(
         believed,
         seeds.plant,
-        mass_pct=tank_settings.mass_pct,
-        damping_pct=tank_settings.damping_pct,
-        added_mass_pct=tank_settings.added_mass_pct,
-        thrust_pct=tank_settings.thrust_pct,
+        mass_pct=apart.mass_pct,
+        damping_pct=apart.damping_pct,
+        added_mass_pct=apart.added_mass_pct,
+        thrust_pct=apart.thrust_pct,
         trim_N=trim_N,
         water_density_kg_m3=tank_settings.density_kg_m3,
     )

@@ -19,7 +19,7 @@ from wakewise.missions import MissionSettings
 from wakewise.reconstruction import ReconstructionSettings
 from wakewise.settings import Settings
 from wakewise.tank import TankSettings
-from wakewise.tank.settings import WATERS
+from wakewise.tank.settings import SILTS
 from wakewise.targets import coral_kinds
 
 PRESETS = ("quick", "standard")
@@ -63,7 +63,7 @@ class Scenario(Settings):
 def load_scenario(preset: str | None, path: Path | None, overrides: dict[str, Any]) -> Scenario:
     """Lay a scenario file over a preset and the overrides over both, then check the whole.
 
-    A kind of water (`tank.water`) sets silt and grains: they replace those of the layers below it, where a scenario
+    A kind of silt (`tank.silt.kind`) sets load and grains: they replace those of the layers below it, where a scenario
     that a trial left behind spells them out, and yield to what its own layer, or one above, says of them.
 
     Parameters
@@ -73,7 +73,7 @@ def load_scenario(preset: str | None, path: Path | None, overrides: dict[str, An
     path : Path or None
         A scenario YAML file, which may hold any part of a scenario.
     overrides : dict
-        Dotted field names to values, such as ``{"tank.silt": 0}``.
+        Dotted field names to values, such as ``{"mission.standoff_m": 0.6}``.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def load_scenario(preset: str | None, path: Path | None, overrides: dict[str, An
         changes = _merged(changes, _nested(name, value))
     tree: dict[str, Any] = {}
     for layer in (*layers, changes):
-        tree = _merged(tree, _with_water(layer))
+        tree = _merged(tree, _with_silt(layer))
     return check_scenario(tree, source)
 
 
@@ -136,7 +136,7 @@ def parse_overrides(items: list[str]) -> dict[str, Any]:
     for item in items:
         name, equals, text = item.partition("=")
         if not equals or not name.strip():
-            raise InputError(f"--set: '{item}', must be FIELD=VALUE such as tank.silt=0")
+            raise InputError(f"--set: '{item}', must be FIELD=VALUE such as mission.standoff_m=0.6")
         try:
             overrides[name.strip()] = yaml.safe_load(text)
         except yaml.YAMLError:
@@ -188,12 +188,13 @@ def _read_yaml(path: Path) -> dict[str, Any]:
     return tree
 
 
-def _with_water(layer: dict[str, Any]) -> dict[str, Any]:
-    """The layer with what its kind of water says and it does not, so that this replaces what lies below."""
+def _with_silt(layer: dict[str, Any]) -> dict[str, Any]:
+    """The layer with what its kind of silt says and it does not, so that this replaces what lies below."""
     tank = layer.get("tank")
-    if not isinstance(tank, dict) or not isinstance(tank.get("water"), str):
+    silt = tank.get("silt") if isinstance(tank, dict) else None
+    if not isinstance(tank, dict) or not isinstance(silt, dict) or not isinstance(silt.get("kind"), str):
         return layer
-    return layer | {"tank": WATERS.get(tank["water"], {}) | tank}
+    return layer | {"tank": tank | {"silt": SILTS.get(silt["kind"], {}) | silt}}
 
 
 def _nested(dotted: str, value: Any) -> dict[str, Any]:
