@@ -7,6 +7,7 @@ from wakewise.errors import InputError
 from wakewise.missions import plan_route
 from wakewise.operation import load_scenario
 from wakewise.operation.build import check_current
+from wakewise.tank.ambient import mean_current_m_s
 from wakewise.vehicles import load_vehicle
 
 CENTRE_W_M = np.array([0.0, 0.0, 1.4])
@@ -36,3 +37,31 @@ def test_a_series_shorter_than_the_flight_is_refused(tmp_path):
     path.write_text("time_s,u,v\n0,0.1,0\n10,0.1,0\n")
     with pytest.raises(InputError, match="10 s of series are left, the flight takes"):
         _check(**{"current.file": str(path)})
+
+
+def test_the_levers_know_the_current_that_the_tank_has(tmp_path):
+    """Change the tank's current and drift points follow: upstream of the target."""
+    from wakewise.operation import build_flight, build_mission
+
+    def upstream_m(**changes):
+        scenario = load_scenario("quick", None, {"method": "instant", **changes})
+        mission = build_mission(scenario)
+        points = build_flight(scenario, mission).controller.view.points_W_m[len(mission.region.weights) :]
+        return points.mean(axis=0)[:2] - mission.target.centre_W_m[:2] if len(points) else None
+
+    east = upstream_m(**{"tank.current.velocity_m_s": [0.0, 0.05, 0.0]})
+    assert east[1] < -0.3 and abs(east[0]) < 0.1
+    assert upstream_m(**{"tank.current.velocity_m_s": [0.0, 0.0, 0.0]}) is None
+    wrong = {"tank.current.velocity_m_s": [0.0, 0.05, 0.0], "control.levers.drift_m_s": [0.0, -0.05, 0.0]}
+    assert upstream_m(**wrong)[1] > 0.3, "a current that is named is believed"
+
+
+def test_the_mean_current_is_that_of_the_flight(tmp_path):
+    """A steady one is itself; of a series it is the mean from the start to the flight's end, gain included."""
+    path = tmp_path / "c.csv"
+    path.write_text("time_s,u,v\n0,0.0,0.1\n10,0.1,0.1\n20,0.1,0.1\n30,0.9,0.1\n")
+    tank = load_scenario(
+        None, None, {"tank.current.file": str(path), "tank.current.gain": 0.5, "tank.current.gap_s": 20}
+    )
+    assert mean_current_m_s(tank.tank, 20.0) == pytest.approx((0.0375, 0.05, 0.0), abs=1e-3)
+    assert mean_current_m_s(load_scenario(None, None, {}).tank, 20.0) == (0.03, 0.02, 0.0)

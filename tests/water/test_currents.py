@@ -126,5 +126,5 @@ def test_a_pump_outside_the_water_is_refused():
     """Its outlet must be in the tank, and blow somewhere."""
     with pytest.raises(InputError, match=r"pump\.at_m"):
         _built(pump={"speed_m_s": 1.0, "at_m": (0.0, 0.0, 2.0)})
-    with pytest.raises(InputError, match="pump_towards"):
+    with pytest.raises(InputError, match=r"pump\.towards"):
         _built(pump={"speed_m_s": 1.0, "towards": (0.0, 0.0, 0.0)})

@@ -16,6 +16,7 @@ from wakewise.estimation import FilterSettings
 from wakewise.files import write_text
 from wakewise.imaging import ImagingSettings
 from wakewise.missions import MissionSettings
+from wakewise.operation.renamed import became
 from wakewise.reconstruction import ReconstructionSettings
 from wakewise.settings import Settings
 from wakewise.tank import TankSettings
@@ -108,8 +109,15 @@ def check_scenario(tree: dict[str, Any], source: str) -> Scenario:
 
 
 def describe_fault(fault: ValidationError, model: type[BaseModel]) -> str:
-    """Say in one line which field of `model` is wrong, what was found and what is allowed (the first fault only)."""
-    first = fault.errors(include_url=False)[0]
+    """Say in one line which field of `model` is wrong, what was found and what is allowed (the first fault only).
+
+    Names of an older scenario are told all at once, each with what became of it.
+    """
+    faults = fault.errors(include_url=False)
+    old = [(dotted, became(dotted, one["input"])) for one in faults for dotted in (".".join(map(str, one["loc"])),)]
+    if any(words for _, words in old):
+        return "; ".join(f"{dotted}: {words}" for dotted, words in old if words)
+    first = faults[0]
     where = ".".join(str(part) for part in first["loc"]) or "scenario"
     if first["type"] == "extra_forbidden":
         *parents, unknown = [str(part) for part in first["loc"]]
