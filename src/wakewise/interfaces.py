@@ -188,28 +188,6 @@ class Pilot(Protocol):
         ...
 
 
-class Camera(Protocol):
-    """Maps between points before the camera and pixels, with pixel centres at +0.5 as COLMAP has them."""
-
-    @property
-    def width(self) -> int:
-        """Image width in pixels."""
-        ...
-
-    @property
-    def height(self) -> int:
-        """Image height in pixels."""
-        ...
-
-    def project(self, points_C_m: Array) -> Array:
-        """Pixels, shape (n, 2), of points, shape (n, 3), in the camera frame."""
-        ...
-
-    def rays(self, pixels: Array) -> Array:
-        """Directions with unit z, shape (n, 3), in the camera frame, of pixels, shape (n, 2)."""
-        ...
-
-
 Progress = Callable[..., None]
 """A callable `(done, total, note)` that a long stage calls now and then; see `no_progress`."""
 

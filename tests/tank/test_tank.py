@@ -72,7 +72,6 @@ def test_downwash_stirs_the_bed_and_clouds_the_water():
     assert clean.concentration_grid().values.max() == 0.0
     assert silty.silt.total_kg == pytest.approx(mass, rel=1e-9)
     assert silty.concentration_grid().values.shape == (33, 33, 21)
-    assert tank.bed_speed_m_s([[0.2, 0.0]]).shape == (1,)
 
 
 def test_the_same_seed_gives_the_same_record():

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from wakewise.arrays import Array
-from wakewise.estimation import dead_reckoned, local_north_east_down
+from wakewise.benches.dead_reckoning import dead_reckoned, local_north_east_down
 from wakewise.geometry import quat_conjugate, quat_from_euler, quat_multiply, rotvec_from_quat
 from wakewise.operation import Scenario
 from wakewise.operation.build import Mission, build_flight, build_mission

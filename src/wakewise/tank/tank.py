@@ -187,13 +187,6 @@ class Tank:
         """Velocity of the water less that of the same water without thrusters, shape (n, 3)."""
         return self.water.excess_velocity(points_W_m)
 
-    def bed_speed_m_s(self, xy_W_m: Array) -> Array:
-        """Excess speed, shape (n,), 1.5 cm above the bed at horizontal places, shape (n, 2)."""
-        xy = np.atleast_2d(np.asarray(xy_W_m, dtype=np.float64))
-        points = np.concatenate([xy, np.full((len(xy), 1), self.settings.size_m[2] - 0.015)], axis=1)
-        speed: Array = np.linalg.norm(self.excess_velocity(points), axis=1)
-        return speed
-
     def concentration_grid(self) -> ScalarGrid:
         """Silt in kg/m3 over 1.6 x 1.6 m about the target's foot, from the bed up to 1 m or the surface."""
         centre, depth = self.target.centre_W_m, self.settings.size_m[2]
