@@ -115,7 +115,7 @@ def probe_command(
         floor_z_m=floor,
         target=_target(target, floor),
         flow=flow,
-        turbulence=TankSettings().turbulence if turbulence else 0.0,
+        turbulence=TankSettings().jets.turbulence if turbulence else 0.0,
         swirl=swirl,
         density_kg_m3=density,
         seed=seed,

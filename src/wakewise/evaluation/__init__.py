@@ -1,4 +1,4 @@
-"""How good a flight and a model were: alignment, accuracy and completeness, trajectory error, flight figures.
+"""How good a flight and a model were: alignment, accuracy and completeness, flight figures.
 
 Pure functions whose results carry their unit in their name.
 """
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
         suspicious_scale,
         thin,
     )
-    from wakewise.evaluation.trajectory import TrajectoryError, paired_instants, read_tum, trajectory_error
 
 __all__ = [
     "DEPTH_DEFINITIONS",
@@ -44,22 +43,18 @@ __all__ = [
     "Similarity",
     "Surface",
     "SurfaceScore",
-    "TrajectoryError",
     "compare_depths",
     "compare_surface",
     "count_views",
     "error_colours",
     "evaluate_surface",
     "flight_figures",
-    "paired_instants",
     "read_depth_views",
-    "read_tum",
     "refine_icp",
     "robust_similarity",
     "sample_surface",
     "suspicious_scale",
     "thin",
-    "trajectory_error",
     "umeyama",
 ]
 

@@ -23,6 +23,7 @@ from wakewise.planning.condensing import add_commands, add_rate_gradient, conden
 from wakewise.planning.kernels import CLOSEST, RATE_N, W_DISTURBANCE, PlanCase, PlanTable, horizon, plan_work, set_reach
 from wakewise.planning.problem import (
     BARRIER_REACH_M,
+    CLEARANCE_M,
     EDGE_DEG,
     RATE_LIMIT_N_S,
     RATE_PENALTY,
@@ -117,7 +118,7 @@ def compile_plan(
         RATE_LIMIT_N_S * h,
         RATE_PENALTY,
         BARRIER_REACH_M,
-        settings.clearance_m,
+        CLEARANCE_M,
         terms.w_disturbance,
     ]
     table = PlanTable(
@@ -384,7 +385,7 @@ class Planner:
         if self._predicted is not U:
             self.cost(U)
         closest, mu = self._work.parts[CLOSEST], self._case.barrier
-        factor = 4.0 if closest < self.model.settings.clearance_m else 0.7
+        factor = 4.0 if closest < CLEARANCE_M else 0.7
         mu[0] = min(max(factor * mu[0], BARRIER_RANGE[0]), BARRIER_RANGE[1])
         return Horizon(
             states=self._work.X.copy(),

@@ -149,7 +149,7 @@ def against_grains(trial: Trial) -> Yardstick | None:
     over = _share_over(trial, moves)
     grains = "The bed's grains"
     if trial.settings is not None:
-        grains = f"The bed's grains, {number(1e6 * trial.settings.tank.grain_m)} µm across,"
+        grains = f"The bed's grains, {number(1e6 * trial.settings.tank.silt.grain_m)} µm across,"
     words = (
         f"{grains} move from a pull of {number(moves)} Pa on; where the water pulls hardest near the target (one place "
         f"in twenty) it is {number(pull)} Pa on average, {_share(pull / moves)} of that."

@@ -24,37 +24,37 @@ def build_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSu
     """
     length, width, depth = settings.size_m
     parts: list[Current] = []
-    if settings.current_file is not None:
+    if settings.current.file is not None:
         parts.append(_series(settings))
-    elif any(settings.current_m_s):
-        parts.append(SteadyCurrent(velocity_W_m_s=np.array(settings.current_m_s)))
-    if settings.wave_amplitude_m > 0.0:
+    elif any(settings.current.velocity_m_s):
+        parts.append(SteadyCurrent(velocity_W_m_s=np.array(settings.current.velocity_m_s)))
+    if settings.waves.amplitude_m > 0.0:
         parts.append(
             AiryWave(
-                amplitude_m=settings.wave_amplitude_m,
-                period_s=settings.wave_period_s,
-                heading_rad=math.radians(settings.wave_heading_deg),
+                amplitude_m=settings.waves.amplitude_m,
+                period_s=settings.waves.period_s,
+                heading_rad=math.radians(settings.waves.heading_deg),
                 depth_m=depth,
             )
         )
-    if settings.pump_speed_m_s > 0.0:
-        x, y, z = settings.pump_at_m
+    if settings.pump.speed_m_s > 0.0:
+        x, y, z = settings.pump.at_m
         if abs(x) > length / 2 or abs(y) > width / 2 or not 0.0 <= z <= depth:
             raise InputError(
-                f"tank.pump_at_m: ({x:g}, {y:g}, {z:g}) m is outside the water of {length:g} x {width:g} x {depth:g} m"
+                f"tank.pump.at_m: ({x:g}, {y:g}, {z:g}) m is outside the water of {length:g} x {width:g} x {depth:g} m"
             )
         parts.append(
             PumpJet(
-                outlet_W_m=np.array(settings.pump_at_m),
-                towards_W=np.array(settings.pump_towards),
-                speed_m_s=settings.pump_speed_m_s,
-                diameter_m=settings.pump_diameter_m,
+                outlet_W_m=np.array(settings.pump.at_m),
+                towards_W=np.array(settings.pump.towards),
+                speed_m_s=settings.pump.speed_m_s,
+                diameter_m=settings.pump.diameter_m,
                 bed_z_m=depth,
                 reach_m=math.hypot(length, width),
             )
         )
-    if settings.background_m_s > 0.0:
-        parts.append(BackgroundTurbulence.drawn(settings.background_m_s, settings.background_length_m, rng))
+    if settings.current.turbulence_m_s > 0.0:
+        parts.append(BackgroundTurbulence.drawn(settings.current.turbulence_m_s, settings.current.eddy_m, rng))
     return AmbientSum(parts=tuple(parts))
 
 
@@ -63,8 +63,8 @@ def mean_current_m_s(settings: TankSettings, duration_s: float) -> tuple[float, 
 
     A series is looked at four times a second, for as long as it lasts. Waves, pump and turbulence do not count.
     """
-    if settings.current_file is None:
-        return settings.current_m_s
+    if settings.current.file is None:
+        return settings.current.velocity_m_s
     series = _series(settings)
     times = np.arange(0.0, min(duration_s, series.end_s), 0.25)
     north, east, down = np.mean([series.velocity(np.zeros((1, 3)), float(t))[0] for t in times], axis=0)
@@ -73,9 +73,9 @@ def mean_current_m_s(settings: TankSettings, duration_s: float) -> tuple[float, 
 
 def _series(settings: TankSettings) -> CurrentSeries:
     return read_current_series(
-        Path(settings.current_file or "").expanduser(),
-        start_s=settings.current_file_from_s,
-        stop_s=settings.current_file_to_s,
-        gain=settings.current_file_gain,
-        longest_gap_s=settings.current_file_gap_s,
+        Path(settings.current.file or "").expanduser(),
+        start_s=settings.current.from_s,
+        stop_s=settings.current.to_s,
+        gain=settings.current.gain,
+        longest_gap_s=settings.current.gap_s,
     )

@@ -105,7 +105,7 @@ class PumpJet:
         freeze(self, outlet_W_m=(3,), towards_W=(3,))
         length = float(np.linalg.norm(self.towards_W))
         if length < 1e-9:
-            raise InputError("tank.pump_towards: a direction of no length, must point somewhere")
+            raise InputError("tank.pump.towards: a direction of no length, must point somewhere")
         momentum = 0.25 * math.pi * self.diameter_m**2 * self.speed_m_s**2
         core_m = PLAIN.core_D * self.diameter_m
         x, places, sigmas, impulses = 0.0, [], [], []
