@@ -85,8 +85,10 @@ class PumpSettings(Settings):
 
 
 class JetSettings(Settings):
-    """What the thrusters' jets are like. A turbulence of 0.25 is that of round jets on the axis (0.24 to 0.28;
-    Hussein, Capp and George 1994, doi 10.1017/S002211209400323X).
+    """What the thrusters' jets are like.
+
+    A turbulence of 0.25 is that of round jets on the axis (0.24 to 0.28; Hussein, Capp and George 1994, doi
+    10.1017/S002211209400323X).
     """
 
     turbulence: float = Field(0.25, ge=0.0, le=0.5, description="fluctuation on a jet's axis over its mean speed")
@@ -95,9 +97,11 @@ class JetSettings(Settings):
 
 
 class SiltSettings(Settings):
-    """Fine silt on the bed and in the water. A load of 0.1 kg/m2 lies just below the mean of all sediment on mid-shelf
-    reefs (0.127; inner shelf 0.864 kg/m2; Tebbett, Goatley and Bellwood 2017, doi 10.1371/journal.pone.0170854), of
-    which part is as fine as the silt here: a silty bed, not an average one.
+    """Fine silt on the bed and in the water.
+
+    A load of 0.1 kg/m2 lies just below the mean of all sediment on mid-shelf reefs (0.127; inner shelf 0.864 kg/m2;
+    Tebbett, Goatley and Bellwood 2017, doi 10.1371/journal.pone.0170854), of which part is as fine as the silt here: a
+    silty bed, not an average one.
     """
 
     kind: Literal["clear", "silt", "caco3-50mg"] = Field(
@@ -135,8 +139,9 @@ class TetherSettings(Settings):
 
 
 class SensorSettings(Settings):
-    """What the vehicle senses. Figures are typical of small vehicles' parts and of a camera-based pose at one metre,
-    not of one product.
+    """What the vehicle senses.
+
+    Figures are typical of small vehicles' parts and of a camera-based pose at one metre, not of one product.
     """
 
     pose_rate_hz: float = Field(62.0, gt=0.0, le=500.0, description="rate of the camera-based pose")
