@@ -43,9 +43,13 @@ class Flight:
 
     @cached_property
     def figures(self) -> dict[str, Any]:
-        """What the flight is judged by, from the first leg on: wash at the target, errors, energy."""
+        """What the flight is judged by, from the first leg on: wash at the target, errors, energy.
+
+        A flight that was ended before its first leg is judged by all of it.
+        """
         frame = self.steps.filter(pl.col("leg") != SETTLING)
-        return {"method": self.parts.method, "seed": self.parts.scenario.seed, **flight_figures(frame)}
+        judged = frame if frame.height else self.steps
+        return {"method": self.parts.method, "seed": self.parts.scenario.seed, **flight_figures(judged)}
 
     def write(self, folder: Path) -> None:
         """Write exposures.npz, timings.parquet; last steps.parquet, which says that the flight is whole.

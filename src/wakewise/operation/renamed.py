@@ -69,7 +69,6 @@ RENAMED: Mapping[str, str] = {
         current_file_gain="gain",
         current_file_gap_s="gap_s",
         background_m_s="turbulence_m_s",
-        background_length_m="eddy_m",
     ),
     **_moved("waves", wave_amplitude_m="amplitude_m", wave_period_s="period_s", wave_heading_deg="heading_deg"),
     **_moved(
@@ -108,6 +107,7 @@ RENAMED: Mapping[str, str] = {
 """Dotted names of older scenarios, and the fields that say the same now."""
 
 GONE: Mapping[str, str] = {
+    "tank.background_length_m": f"{_CONSTANT} (wakewise.tank.settings)",
     **dict.fromkeys((f"control.levers.{name}" for name in ("quiet", "quiet_gain", "quiet_lead_s")), _EVIDENCE),
     **dict.fromkeys((f"control.plan.{name}" for name in ("quiet_gain", "travel", "persistence")), _EVIDENCE),
     "control.levers.level_deg": "gone, 4 % for a camera 30 mm off its place (docs/decisions/0014)",
@@ -188,6 +188,7 @@ GONE: Mapping[str, str] = {
 """Dotted names of older scenarios that nothing says any more, and why."""
 
 METHODS_GONE: Mapping[str, str] = {
+    "tank.background_length_m": f"{_CONSTANT} (wakewise.tank.settings)",
     "planner": "gone: `wake-aware` with control.levers off",
     "planner-paper": "gone: `wakewise bench planner` has the paper's recipe",
 }

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from wakewise.errors import InputError
 from wakewise.interfaces import Current
-from wakewise.tank.settings import TankSettings
+from wakewise.plugins import find, offered
+from wakewise.tank.settings import EDDY_M, TankSettings
 from wakewise.water import AiryWave, AmbientSum, BackgroundTurbulence, PumpJet, SteadyCurrent, read_current_series
 from wakewise.water.current_series import CurrentSeries
 
@@ -25,7 +27,7 @@ def build_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSu
     length, width, depth = settings.size_m
     parts: list[Current] = []
     if settings.current.file is not None:
-        parts.append(_series(settings))
+        parts.append(_current(settings))
     elif any(settings.current.velocity_m_s):
         parts.append(SteadyCurrent(velocity_W_m_s=np.array(settings.current.velocity_m_s)))
     if settings.waves.amplitude_m > 0.0:
@@ -54,7 +56,7 @@ def build_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSu
             )
         )
     if settings.current.turbulence_m_s > 0.0:
-        parts.append(BackgroundTurbulence.drawn(settings.current.turbulence_m_s, settings.current.eddy_m, rng))
+        parts.append(BackgroundTurbulence.drawn(settings.current.turbulence_m_s, EDDY_M, rng))
     return AmbientSum(parts=tuple(parts))
 
 
@@ -65,10 +67,19 @@ def mean_current_m_s(settings: TankSettings, duration_s: float) -> tuple[float, 
     """
     if settings.current.file is None:
         return settings.current.velocity_m_s
-    series = _series(settings)
-    times = np.arange(0.0, min(duration_s, series.end_s), 0.25)
+    series = _current(settings)
+    times = np.arange(0.0, min(duration_s, float(getattr(series, "end_s", math.inf))), 0.25)
     north, east, down = np.mean([series.velocity(np.zeros((1, 3)), float(t))[0] for t in times], axis=0)
     return float(north), float(east), float(down)
+
+
+def _current(settings: TankSettings) -> Current:
+    """What the settings name in place of a steady current: a series' file, or a current from outside."""
+    named = settings.current.file or ""
+    if not Path(named).expanduser().exists() and (named in offered("current") or ":" in named):
+        make: Callable[[], Current] = find("current", named, {}).maker
+        return make()
+    return _series(settings)
 
 
 def _series(settings: TankSettings) -> CurrentSeries:

@@ -23,6 +23,8 @@ SILTS: dict[str, dict[str, float]] = {
 """Fields that a kind of silt sets, unless they are given as well."""
 PLANT_STEP_S = 0.005
 """Longest time step of the vehicle: a twentieth of a thruster's lag."""
+EDDY_M = 0.2
+"""Length of the energetic eddies of turbulence that no thruster made: near half a vehicle."""
 MAX_PARCELS = 4096
 """Above this the jets are made coarser, and it is logged: what two cores step as fast as a flight lasts."""
 MAX_SILT_PARTICLES = 4000
@@ -53,7 +55,9 @@ class CurrentSettings(Settings):
 
     velocity_m_s: tuple[Speed, Speed, Speed] = Field((0.03, 0.02, 0.0), description="steady current: north, east, down")
     file: str | None = Field(
-        None, min_length=1, description="series in place of velocity_m_s: CSV (time_s,u,v[,w] in m/s) or NOAA's JSON"
+        None,
+        min_length=1,
+        description="in place of velocity_m_s: a series (CSV time_s,u,v[,w], m/s; NOAA's JSON) or package.module:make",
     )
     from_s: float = Field(0.0, ge=0.0, description="where in the series the trial starts")
     to_s: float | None = Field(None, gt=0.0, description="where the part used ends, null for all")
@@ -64,7 +68,6 @@ class CurrentSettings(Settings):
     turbulence_m_s: float = Field(
         0.0, ge=0.0, le=0.3, description="rms per axis of turbulence that no thruster made, 0 for none"
     )
-    eddy_m: float = Field(0.2, ge=0.02, le=5.0, description="length of its energetic eddies")
 
 
 class WaveSettings(Settings):

@@ -117,6 +117,9 @@ class WakeSettings(Settings):
         return self
 
 
+OWN_MODELS: tuple[str, ...] = tuple(_RECIPES)
+"""Names of our own models."""
+
 _FOREIGN = _Recipe(PaperJet, {})
 """What a model from outside takes from the settings: nothing; it brings its own numbers, and its own floor."""
 
