@@ -159,7 +159,7 @@ assert issubclass(MissingExtra, WakewiseError) and issubclass(MissingExtra, Impo
 lines = []
 for room, name in (
     ("imaging", "Scene"), ("reconstruction", "reconstruct"), ("reports", "write_report"), ("trials", "run_trial"),
-    ("operation", "photograph_flight"), ("reports.film", "write_film"),
+    ("operation", "photograph_flight"), ("film", "write_film"),
 ):
     try:
         exec(f"from wakewise.{room} import {name}")

@@ -31,15 +31,15 @@ if TYPE_CHECKING:
         disturbance,
         evaluate,
         load_target,
-        load_vehicle,
         methods,
         reconstruct,
         trial,
-        wake_model,
     )
     from wakewise.geometry import Pose
+    from wakewise.importers import any_vehicle as load_vehicle
     from wakewise.interfaces import BodyState, Command, Goal
     from wakewise.operation import Parts, Scenario, fly
+    from wakewise.wake import wake_model
 
 __all__ = [
     "BodyState",

@@ -18,7 +18,6 @@ from wakewise.arrays import Array, frozen
 from wakewise.control import MAKERS
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_from_euler
-from wakewise.importers import any_vehicle as load_vehicle
 from wakewise.interfaces import WakeModel
 from wakewise.plugins import names
 from wakewise.targets import Region, find_target
@@ -32,20 +31,6 @@ if TYPE_CHECKING:
     from wakewise.targets import Mesh, Target
     from wakewise.trials import Watch
     from wakewise.vehicles import Vehicle
-
-__all__ = [
-    "Result",
-    "allocate",
-    "compare",
-    "disturbance",
-    "evaluate",
-    "load_target",
-    "load_vehicle",
-    "methods",
-    "reconstruct",
-    "trial",
-    "wake_model",
-]
 
 PoseLike = Pose | Sequence[float] | Array
 """A pose of the body in the world, or its x, y, z (m), roll, pitch, yaw (rad)."""

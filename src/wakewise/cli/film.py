@@ -59,8 +59,8 @@ def film(
     from wakewise.extras import need
 
     need("wakewise film", "photos", "reports")
+    from wakewise.film import VIEWS, compared_trials, write_film, write_rows
     from wakewise.reports import write_comparison, write_report
-    from wakewise.reports.film import VIEWS, compared_trials, write_film, write_rows
     from wakewise.reports.looks import FILMS
 
     if (trial is None) == (rows is None):

@@ -1,7 +1,9 @@
 """Estimation: from camera poses, tracking, an inertial unit and depth to where the vehicle is, how it moves, how sure.
 
-`ErrorStateFilter` is an error-state Kalman filter on the nominal vehicle's equations; `FilterSettings` states the noise
-of the sensors that it assumes, `Priors` in `settings.py` what it takes for granted.
+Start reading in `error_state.py`: `ErrorStateFilter` is an error-state extended Kalman filter (EKF) on the nominal
+vehicle's equations; `FilterSettings` states the noise of the sensors that it assumes, `Priors` in `settings.py` what
+it takes for granted. `kernels.py` is compiled prediction and correction, `resting.py` what a vehicle at rest tells of
+its biases.
 """
 
 from wakewise.estimation.error_state import ErrorStateFilter, FilterState

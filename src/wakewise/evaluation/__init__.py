@@ -1,6 +1,8 @@
 """How good a flight and a model were: alignment, accuracy and completeness, flight figures.
 
-Pure functions whose results carry their unit in their name.
+Pure functions whose results carry their unit in their name. Start reading in `surface.py` (a cloud against the true
+surface) and `flight.py` (a flight's figures from its steps). `alignment.py` brings a model into the truth's frame
+(Umeyama, ICP), `depth_maps.py` judges against laser scans, `definitions.py` says what each figure is.
 """
 
 from typing import TYPE_CHECKING

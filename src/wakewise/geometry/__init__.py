@@ -1,4 +1,7 @@
-"""Rotations and poses; NumPy only. World W is NED, body B is FRD, camera C has OpenCV axes."""
+"""Rotations and poses; NumPy only. World W is NED, body B is FRD, camera C has OpenCV axes.
+
+`poses.py` has `Pose` (X_WB), `rotations.py` quaternions (w, x, y, z), Euler angles and rotation vectors.
+"""
 
 from wakewise.geometry.poses import Pose, look_at
 from wakewise.geometry.rotations import (

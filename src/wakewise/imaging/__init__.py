@@ -1,8 +1,13 @@
 """What the camera would have seen: a lit and textured scene, the water between, motion blur and sensor noise.
 
 `Scene.build` sets the target on its bed, `render` draws it as if there were no water, and `photograph` adds water,
-silt, flakes, the camera's motion while the shutter is open and the sensor. Everything is a function of the true poses,
-the true silt and a seed.
+silt, flakes, the camera's motion while the shutter is open and the sensor. Everything is a function of the true
+poses, the true silt and a seed.
+
+Start reading in `photograph.py` (one photograph, step by step) and `scene.py` (what stands there). `camera.py`,
+`lens.py` and `camera_model.py` are the camera, also behind a flat port; `renderer.py`, `shading.py`, `texture.py`,
+`lighting.py`, `panels.py` and `daylight.py` the picture without water, `bed_view.py`, `height_field.py` and
+`nearby.py` what makes it fast; `optics.py` and `particles.py` the water, `blur.py` and `sensor.py` the exposure.
 """
 
 from typing import TYPE_CHECKING

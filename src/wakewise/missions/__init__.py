@@ -1,4 +1,8 @@
-"""What to look at, from where, in what order and when: viewpoints, layered orbits, timed routes."""
+"""What to look at, from where, in what order and when: viewpoints, layered orbits, timed routes.
+
+Start reading in `route.py` (legs, shutter, the pilot that follows them) and `orbit.py` (viewpoints on layered
+hemispheres); `clearance.py` refuses what would touch, `settings.py` is what a user may say.
+"""
 
 from wakewise.missions.clearance import TankBounds, check_clearance
 from wakewise.missions.orbit import Orbit, layered_orbits

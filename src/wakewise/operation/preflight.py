@@ -12,7 +12,7 @@ from wakewise.missions import check_clearance
 from wakewise.operation.surroundings import surroundings_of
 from wakewise.planning import check_start, state_of
 from wakewise.tank import Holding, holding, tank_ambient
-from wakewise.tank.fitting import check_fit
+from wakewise.tank.preflight import check_fit
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts

@@ -21,6 +21,7 @@ from wakewise.geometry import Pose
 from wakewise.interfaces import WakeModel
 from wakewise.planning.condensing import add_commands, add_rate_gradient, condense, condensed_room, motion_gradient
 from wakewise.planning.kernels import CLOSEST, RATE_N, W_DISTURBANCE, PlanCase, PlanTable, horizon, plan_work, set_reach
+from wakewise.planning.numeric import add_numeric, numeric_wake
 from wakewise.planning.problem import (
     BARRIER_REACH_M,
     CLEARANCE_M,
@@ -38,7 +39,7 @@ from wakewise.planning.surroundings import Surroundings
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle, compile_body
 from wakewise.wake import PaperJet, gram
-from wakewise.wake.numeric import NumericWake, thinned
+from wakewise.wake.numeric import NumericWake
 from wakewise.wake.plan_disturbance import wake_scratch
 from wakewise.wake.table import WakeTable, is_compiled, wake_table, with_smooth_edge
 
@@ -137,7 +138,7 @@ def compile_plan(
         majorise=majorise,
     )
     smooth = with_smooth_edge(wake, float(np.radians(EDGE_DEG)))
-    numeric = None if is_compiled(smooth) else _numeric(smooth, region, vehicle, terms)
+    numeric = None if is_compiled(smooth) else numeric_wake(smooth, region, vehicle, terms)
     if numeric is not None:
         # The kernels leave D out; `Planner` adds it stage by stage.
         table.weights[W_DISTURBANCE] = 0.0
@@ -153,21 +154,6 @@ def compile_plan(
     )
     layout = compile_layout(vehicle.allocation_matrix, np.minimum(lower, 0.0), np.maximum(upper, 0.0))
     return PlanModel(vehicle, region, smooth, settings, terms, table, view, layout, numeric)
-
-
-def _numeric(wake: WakeModel, region: Region, vehicle: Vehicle, terms: PlanTerms) -> NumericWake:
-    """A wake model without kernels, over some of the region's points; weights add up to 1 as in `wake_table`."""
-    points, weights = thinned(region.points_W_m, region.weights)
-    return NumericWake(
-        model=wake,
-        points_W_m=points,
-        weights=weights / float(weights.sum()),
-        positions_B_m=vehicle.thruster_positions_B_m,
-        axes_B=vehicle.thruster_axes_B,
-        areas_m2=vehicle.disk_areas_m2,
-        coherent=terms.superposition == "coherent",
-        smooth_N=SMOOTH_N,
-    )
 
 
 class Planner:
@@ -227,19 +213,7 @@ class Planner:
         if model.numeric is None or model.terms.w_disturbance == 0.0:
             return J
         weight = model.table.stage_s * model.terms.w_disturbance
-        for k in range(len(U)):
-            X_WB = Pose(work.X[k, :3], work.X[k, 3:7])
-            if slopes:
-                work.D[k], gradient, H = model.numeric.stage(X_WB, work.T[k])
-                work.gx[k, :6] += weight * gradient[:6]
-                work.gT[k] += weight * gradient[6:]
-                work.Q[k] += weight * H[:6, :6]
-                work.S[k] += weight * H[6:, :6]
-                work.R[k] += model.table.majorise * weight * H[6:, 6:]
-            else:
-                work.D[k] = model.numeric.value(X_WB, work.T[k])
-        work.parts[0] += weight * float(work.D.sum())
-        return J + weight * float(work.D.sum())
+        return J + add_numeric(model.numeric, weight, model.table.majorise, work, slopes=slopes)
 
     def load(self, problem: PlanProblem) -> None:
         """Take a problem in."""

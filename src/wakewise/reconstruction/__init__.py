@@ -1,4 +1,12 @@
-"""Photographs to a 3D model with COLMAP and semi-global stereo, in stages that take files and leave files."""
+"""Photogrammetry: photographs to a 3D model with COLMAP and semi-global stereo, in stages that take files and leave
+files.
+
+Start reading in `pipeline.py` (the stages in order). `photos.py`, `lenses.py`, `references.py` and `calibration.py`
+are what comes in; `features.py`, `sift.py` and `pairs.py` match, `mapping.py` and `colmap.py` find cameras (structure
+from motion), `stereo.py`, `dense.py`, `fusion.py` and `cells.py` make the cloud, `meshing.py` the surface
+(`clouds.py` and `views.py` are what they share), `patchmatch.py` is COLMAP's own dense stereo where CUDA is;
+`stages.py` skips what is done. `nerf/` is a neural radiance field from the same photographs.
+"""
 
 from typing import TYPE_CHECKING
 

@@ -21,10 +21,10 @@ from wakewise.arrays import Array, IntArray
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_multiply
 from wakewise.reports.errors import ModelErrors
-from wakewise.reports.film.hull import hull_of
 from wakewise.reports.ink import error_colours
 from wakewise.reports.looks import coloured_model
 from wakewise.reports.trial import Photograph, Surface, Trial
+from wakewise.reports.vehicle.hull import hull_of
 from wakewise.reports.views import OUTLOOK
 from wakewise.vehicles import Vehicle, load_vehicle
 

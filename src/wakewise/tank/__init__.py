@@ -3,16 +3,17 @@
 A controller sees only what `Tank.step` returns. Everything else on `Tank` is the truth of a trial, for its record and
 for the photographs; the water itself is the room `wakewise.water`.
 
-Start reading in `tank.py` (the clock) and `settings.py` (what a world is). `plant.py` is the vehicle with
-`tether.py`, `thrust_losses.py` and `contact.py`; `sensors.py` what it senses; `sediment*.py` and `grains.py` silt and
-its laws; `measuring.py` and `probes.py` what a flight is judged by; `preflight.py` what is refused beforehand;
-`probe.py` and `probe_tables.py` the truth for outsiders (`wakewise tank probe`).
+Start reading in `tank.py` (the clock), `settings.py` (what a world is) and `world.py` (how a flight begins in it;
+`ambient.py` is its current). `plant.py` is the vehicle with `tether.py`, `thrust_losses.py` and `contact.py`;
+`sensors.py` what it senses; `sediment*.py` and `grains.py` silt and its laws; `measuring.py` and `probes.py` what a
+flight is judged by; `preflight.py` what is refused beforehand; `probe.py` and `probe_tables.py` the truth for
+outsiders (`wakewise tank probe`).
 """
 
 from wakewise.tank.ambient import build_ambient
 from wakewise.tank.grains import beam_attenuation_per_m
-from wakewise.tank.holding import Holding, holding
 from wakewise.tank.plant import VehiclePlant
+from wakewise.tank.preflight import Holding, holding
 from wakewise.tank.sensors import Sensors
 from wakewise.tank.settings import TankSettings, ThrusterFailure
 from wakewise.tank.tank import Tank, tank_ambient

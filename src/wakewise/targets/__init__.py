@@ -1,6 +1,10 @@
 """What must stay undisturbed: meshes from files, procedural corals, a target on the bed, the region round it.
 
 Delicate features are found from the mesh or marked by a person, and may count more in the region than the rest.
+
+Start reading in `target.py` (a mesh on its bed), `find.py` (a target by name) and `region.py` (points that stand for
+its water). `corals.py` with `fields.py` grows corals, `mesh.py` reads files, `sampling.py` spreads points,
+`distance.py` and `rays.py` measure, `delicate.py` and `marks.py` say what is delicate.
 """
 
 from wakewise.targets.corals import coral, coral_kinds

@@ -2,12 +2,12 @@
 
 Body frame B is FRD. A positive thrust pushes the vehicle along the thruster's axis and sends the jet the other way.
 
-Start reading in `vehicle.py` (the record) and `library.py` with `library_data/` (one file per cited source;
-`vehicle_file.py` and `draft.py` read them). `dynamics.py` has the equations of motion and the steps (`fossen.py` the
-readable matrices, `kernels.py`, `runge_kutta.py`, `semi_implicit.py` the compiled steps, `jacobians.py` their
-derivatives), `check.py` and `mixing.py` rank, null space and wrong signs in shipped matrices, `describe.py` all of it
-in words, `perturbation.py` the vehicle that the tank flies. Thrusters are a room below, files of other projects the
-room `importers`.
+Start reading in `vehicle.py` (the record, with `hydrodynamics.py`) and `library.py` with `library_data/` (one file
+per cited source; `vehicle_file.py` and `draft.py` read them). `dynamics.py` has the equations of motion and the steps
+(`fossen.py` the readable matrices, `kernels.py`, `runge_kutta.py`, `semi_implicit.py` the compiled steps,
+`jacobians.py` their derivatives), `check.py` and `mixing.py` rank, null space and wrong signs in shipped matrices,
+`describe.py` and `parameters.py` all of it in words, `perturbation.py` the vehicle that the tank flies. Thrusters are
+a room below, files of other projects the room `importers`.
 """
 
 from wakewise.vehicles.check import (

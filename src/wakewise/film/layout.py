@@ -12,8 +12,8 @@ from PIL import Image as Pictures
 from PIL import ImageDraw
 
 from wakewise.arrays import Array
-from wakewise.reports.film.outside import FASTEST_M_S, speed_colours
-from wakewise.reports.film.paint import (
+from wakewise.film.outside import FASTEST_M_S, speed_colours
+from wakewise.film.paint import (
     CARD,
     CORAL,
     INK,

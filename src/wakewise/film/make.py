@@ -16,19 +16,19 @@ from numpy.typing import NDArray
 from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.files import whole_file
+from wakewise.film.encode import check_film_name, film_writer
+from wakewise.film.layout import HEIGHT, VIEWS, WIDTH, Moment, Page, Story, View
+from wakewise.film.outside import FOV_RAD, Outside
+from wakewise.film.vantage import vantage
+from wakewise.film.wash import Motion, Tracers, wash_of
 from wakewise.geometry import Pose
 from wakewise.imaging import PinholeCamera, SiltOptics
 from wakewise.interfaces import ScalarGrid, no_progress
 from wakewise.operation import Scenario, read_exposures, read_scenario
 from wakewise.operation.recorder import ExposureRecord
 from wakewise.reports import figures
-from wakewise.reports.film.encode import check_film_name, film_writer
-from wakewise.reports.film.hull import hull_of
-from wakewise.reports.film.layout import HEIGHT, VIEWS, WIDTH, Moment, Page, Story, View
-from wakewise.reports.film.outside import FOV_RAD, Outside
-from wakewise.reports.film.vantage import vantage
-from wakewise.reports.film.wash import Motion, Tracers, wash_of
 from wakewise.reports.trial import Trial, read_trial
+from wakewise.reports.vehicle.hull import hull_of
 from wakewise.targets import coral_kinds
 
 FPS = 12.0

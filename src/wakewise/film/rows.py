@@ -19,18 +19,18 @@ from PIL import ImageDraw
 
 from wakewise.errors import InputError
 from wakewise.files import whole_file
+from wakewise.film.layout import cover
+from wakewise.film.make import silt_at
+from wakewise.film.outside import FOV_RAD, Outside
+from wakewise.film.paint import INK, MUTED, PAPER, paste, write
+from wakewise.film.vantage import vantage
+from wakewise.film.wash import Motion, wash_of
 from wakewise.geometry import Pose
 from wakewise.imaging import PinholeCamera, SiltOptics, photograph
 from wakewise.interfaces import no_progress
 from wakewise.operation import Scenario, read_exposures, read_scenario
-from wakewise.reports.film.hull import hull_of
-from wakewise.reports.film.layout import cover
-from wakewise.reports.film.make import silt_at
-from wakewise.reports.film.outside import FOV_RAD, Outside
-from wakewise.reports.film.paint import INK, MUTED, PAPER, paste, write
-from wakewise.reports.film.vantage import vantage
-from wakewise.reports.film.wash import Motion, wash_of
 from wakewise.reports.trial import Trial, read_trial
+from wakewise.reports.vehicle.hull import hull_of
 from wakewise.reports.words import number
 
 TIMES_S = (0.0, 5.0, 10.0)

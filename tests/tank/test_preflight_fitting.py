@@ -6,7 +6,7 @@ import pytest
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.tank import TankSettings
-from wakewise.tank.fitting import check_fit
+from wakewise.tank.preflight import check_fit
 from wakewise.vehicles import load_vehicle
 
 VEHICLE = load_vehicle("paper")

@@ -20,6 +20,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from wakewise.arrays import Array
+from wakewise.film.wash import LIFE_S, Tracers
 from wakewise.geometry import Pose
 from wakewise.imaging import (
     Lights,
@@ -34,8 +35,7 @@ from wakewise.imaging import (
 )
 from wakewise.imaging.sensor import srgb_encode
 from wakewise.interfaces import ScalarGrid
-from wakewise.reports.film.hull import Hull
-from wakewise.reports.film.wash import LIFE_S, Tracers
+from wakewise.reports.vehicle.hull import Hull
 
 WATER_TYPE = "IB"
 FOV_RAD = math.radians(38.0)

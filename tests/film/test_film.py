@@ -20,19 +20,19 @@ import trimesh
 from PIL import Image as Pictures
 
 from wakewise.errors import InputError
+from wakewise.film import compared_trials, make, write_film, write_rows
+from wakewise.film.encode import film_writer
+from wakewise.film.layout import Moment, Page, Story, cover
+from wakewise.film.make import silt_at
+from wakewise.film.outside import FASTEST_M_S, speed_colours
+from wakewise.film.vantage import vantage
+from wakewise.film.wash import STEP_S, TRAIL, Motion, replay, wash_of
 from wakewise.geometry import Pose, look_at
 from wakewise.imaging import PinholeCamera
 from wakewise.interfaces import ScalarGrid
 from wakewise.operation import load_scenario, write_scenario
 from wakewise.operation.recorder import ExposureRecord, write_exposures
-from wakewise.reports.film import compared_trials, make, write_film, write_rows
-from wakewise.reports.film.encode import film_writer
-from wakewise.reports.film.hull import corner_normals, hull_of
-from wakewise.reports.film.layout import Moment, Page, Story, cover
-from wakewise.reports.film.make import silt_at
-from wakewise.reports.film.outside import FASTEST_M_S, speed_colours
-from wakewise.reports.film.vantage import vantage
-from wakewise.reports.film.wash import STEP_S, TRAIL, Motion, replay, wash_of
+from wakewise.reports.vehicle.hull import corner_normals, hull_of
 from wakewise.vehicles import load_vehicle, vehicle_names
 from wakewise.water import Water
 
@@ -316,7 +316,7 @@ def test_rows_lie_in_the_order_of_the_comparison(flown: Path, tmp_path: Path, mo
         (folder / name).symlink_to(flown)
     (folder / "comparison.json").write_text(json.dumps({"methods": {"b": {}, "a": {}}}), encoding="utf-8")
     assert list(compared_trials(folder)) == ["b", "a"]
-    monkeypatch.setattr("wakewise.reports.film.rows.CELL", (96, 72))
+    monkeypatch.setattr("wakewise.film.rows.CELL", (96, 72))
     (folder / "a").unlink()
     write_rows(folder, folder / "rows.png", times_s=(0.0, 0.5))
     picture = cv2.imread(str(folder / "rows.png"))
