@@ -6,11 +6,12 @@ from pydantic import ValidationError
 
 from wakewise.control import ControlSettings, LeverSettings, make_controller
 from wakewise.control.levers import BED_POINTS, BED_RADIUS_M, BED_WEIGHT, watched, with_bed_points
+from wakewise.control.receding import plan_superposition
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Goal
 from wakewise.targets import Region
 from wakewise.vehicles import load_vehicle
-from wakewise.wake import wake_model
+from wakewise.wake import FloorJet, wake_model
 
 
 def region() -> Region:
@@ -60,3 +61,19 @@ def test_levers_out_of_range_are_refused(field):
     """Bad values do not become settings."""
     with pytest.raises(ValidationError):
         LeverSettings(**field)
+
+
+def test_planner_and_allocator_weigh_alike():
+    """One pair of weights and one superposition reach the plan and the shares of its wrench; a floor in the plan adds
+    squares, whatever the switch says.
+    """
+    vehicle, jet = load_vehicle("paper"), wake_model("jet")
+    for how in ("coherent", "incoherent"):
+        settings = ControlSettings(superposition=how, w_disturbance=70.0, w_effort=2e-3)
+        controller = make_controller("wake-aware", vehicle, region(), jet, settings)
+        terms, weights = controller.inner.model.terms, controller.weights
+        assert (terms.superposition, controller.view.superposition) == (how, how)
+        assert (terms.w_disturbance, terms.w_effort, weights.effort) == (70.0, 2e-3, 2e-3)
+        assert weights.disturbance == pytest.approx(70.0 / controller.view.total_weight)
+        assert plan_superposition(jet, settings) == how
+        assert plan_superposition(FloorJet(jet=jet, bed_z_m=1.5), settings) == "incoherent"
