@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 .PHONY: help setup scan test check bench docs lock clean
 
 help:
-	@echo "make setup   virtual environment in .venv with everything but the 'nerf' extra"
+	@echo "make setup   virtual environment in .venv: core, extras photos, reports, logs and piv (GPL), tools for tests"
 	@echo "make scan    fly, photograph, reconstruct and judge a coral; leaves runs/quick/report.html"
 	@echo "make test    ruff, mypy, the import contract and the tests"
 	@echo "make check   the same without the tests"
@@ -47,7 +47,7 @@ docs: setup
 
 lock:
 	$(BIN)/python -m pip install --quiet uv
-	$(BIN)/uv pip compile pyproject.toml --extra piv --group dev --universal --python-version 3.11 --generate-hashes --no-header --no-annotate -o requirements.lock
+	$(BIN)/uv pip compile pyproject.toml --extra all --extra piv --group dev --universal --python-version 3.11 --generate-hashes --no-header --no-annotate -o requirements.lock
 
 clean:
 	rm -rf $(VENV) runs dist

@@ -1,4 +1,4 @@
-"""Import every compiled dependency once; if a system library is missing, say in one line which package holds it."""
+"""Import every compiled dependency once, extras too; if a system library is missing, say which package holds it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import importlib
 import re
 import sys
 
-MODULES = ("numpy", "scipy", "numba", "cv2", "embreex", "pycolmap", "small_gicp", "polars", "foxglove", "matplotlib")
+MODULES = (
+    *("numpy", "scipy", "numba", "polars", "skimage", "daqp", "piqp", "osqp"),
+    *("cv2", "embreex", "pycolmap", "small_gicp", "matplotlib", "foxglove"),
+)
 # Debian's package for a shared library that a wheel may expect on the system.
 PACKAGES = {
     "libGL.so.1": "libgl1",

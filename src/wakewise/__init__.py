@@ -19,9 +19,10 @@ Rooms below this page are imported when they are first asked for. SI units and r
 
 from __future__ import annotations
 
-from importlib import import_module
-from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from wakewise import numba_cache as numba_cache  # before Numba is imported anywhere
+from wakewise.doors import lazy_door
 
 if TYPE_CHECKING:
     from wakewise.api import (
@@ -60,31 +61,6 @@ __all__ = [
     "wake_model",
 ]
 
-from wakewise import numba_cache as numba_cache  # before Numba is imported anywhere
+__version__ = "0.1.0"
 
-__version__ = version("wakewise")
-
-_ROOMS = {
-    "BodyState": "interfaces",
-    "Command": "interfaces",
-    "Goal": "interfaces",
-    "Pose": "geometry",
-    "Parts": "operation",
-    "Scenario": "operation",
-    "fly": "operation",
-}
-"""Where a name lives that is not in `wakewise.api`."""
-
-
-def __getattr__(name: str) -> Any:
-    """Fetch a name of this page from its room, which is imported now (PEP 562)."""
-    if name not in __all__:
-        raise AttributeError(f"module 'wakewise' has no attribute '{name}'")
-    found = getattr(import_module(f"wakewise.{_ROOMS.get(name, 'api')}"), name)
-    globals()[name] = found
-    return found
-
-
-def __dir__() -> list[str]:
-    """Names of this page."""
-    return sorted([*globals(), *__all__])
+lazy_door(__name__)

@@ -20,6 +20,5 @@ class EnvironmentFailure(WakewiseError):  # noqa: N818  (no error of the program
     """
 
 
-def how_to_install(extra: str) -> str:
-    """What to type for one of the package's extras; it is on no index, so it comes from a clone."""
-    return f"in the project's folder, pip install -e '.[{extra}]'"
+class MissingExtra(WakewiseError, ImportError):  # noqa: N818  (it is what is missing, as pip names it)
+    """A package is needed that is no part of the core: the message says by whom, which, and how it is installed."""

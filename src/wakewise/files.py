@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import shutil
 import tempfile
@@ -56,11 +55,6 @@ def write_text(path: Path, text: str) -> None:
 def write_json(path: Path, value: Any) -> None:
     """Write JSON whole or not at all; NaN and infinity are refused, since JSON has none."""
     write_text(path, json.dumps(value, indent=2, allow_nan=False) + "\n")
-
-
-def finite_or_none(value: float | None) -> float | None:
-    """Turn NaN and infinity into None, which JSON can hold."""
-    return None if value is None or not math.isfinite(value) else float(value)
 
 
 def broken_promise(path: Path) -> str | None:

@@ -40,7 +40,7 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (["--set", "mission.standoff_m=-0.5"], ["mission.standoff_m", "-0.5"]),
         (["--set", "mission.elevations_deg=[2]", "--set", "mission.views=[12]"], ["elevations_deg", "floor"]),
         (["--set", "mission.standoff_m=2.9"], ["mission.standoff_m"]),
-        (["--set", "tank.silt=-1"], ["tank.silt", "-1"]),
+        (["--set", "tank.silt.load_kg_m2=-1"], ["tank.silt.load_kg_m2", "-1"]),
         (["--set", "silt"], ["--set", "FIELD=VALUE"]),
         (["gone.yaml"], ["gone.yaml", "no such file"]),
         (["--nonsense"], ["nonsense"]),

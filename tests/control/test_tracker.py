@@ -1,5 +1,7 @@
 """The tracker's wrench: signs, frames, feed-forward and an integral that does not wind up."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -109,3 +111,34 @@ def test_the_integral_is_clamped():
             state, 5.0, BodyState(X_WB=Pose(np.zeros(3), level)), Goal(X_WB=Pose(np.array([1.0, -1.0, 1.0]), level))
         )
     np.testing.assert_allclose(np.abs(state.force_W_N), TRACKER.integral_limit[:3])
+
+
+@pytest.mark.parametrize("axis", range(6))
+def test_a_goal_that_speeds_up_is_followed_by_what_it_takes(axis):
+    """On a goal whose twist grows at a steady rate, the wrench gives the vehicle that very rate, without any error."""
+    rate = np.zeros(6)
+    rate[axis] = 0.02
+    X, nu, dt = Pose(np.zeros(3), quat_from_euler(0.05, -0.1, 1.0)), np.zeros(6), 0.02
+    state, _ = TRACKER.wrench(TRACKER.init(), dt, BodyState(X_WB=X, nu_B=nu), Goal(X_WB=X, nu_B=nu))
+    after = nu + rate * dt
+    _, wrench = TRACKER.wrench(state, dt, BodyState(X_WB=X, nu_B=after), Goal(X_WB=X, nu_B=after))
+    np.testing.assert_allclose(acceleration(TRACKER.body, X.q, after, wrench, np.zeros(3)), rate, atol=1e-6)
+
+
+def test_a_ramp_needs_no_integral():
+    """Without an integral the lag stays within a tenth of M a / kp, which a ramp leaves without feed-forward."""
+    tracker = replace(TRACKER, ki=np.zeros(6))
+    level, dt, rate = np.array([1.0, 0, 0, 0]), 0.005, 0.05
+    state, x, u, worst = tracker.init(), 0.0, 0.0, 0.0
+    for k in range(1000):
+        t = k * dt
+        goal = Goal(X_WB=Pose(np.array([0.5 * rate * t * t, 0, 0]), level), nu_B=np.array([rate * t, 0, 0, 0, 0, 0]))
+        here = BodyState(X_WB=Pose(np.array([x, 0, 0]), level), nu_B=np.array([u, 0, 0, 0, 0, 0]))
+        worst = max(worst, abs(goal.X_WB.p_m[0] - x))
+        state, wrench = tracker.wrench(state, dt, here, goal)
+        u += dt * acceleration(tracker.body, level, here.nu_B, wrench, np.zeros(3))[0]
+        x += dt * u
+    lag = tracker.body.mass_matrix[0, 0] * rate / tracker.kp[0]
+    assert np.all(state.force_W_N == 0.0)
+    assert lag > 0.005
+    assert worst < 0.1 * lag

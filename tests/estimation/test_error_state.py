@@ -3,8 +3,9 @@
 import numpy as np
 from scipy.stats import chi2
 
-from wakewise.estimation import ErrorStateFilter, FilterSettings
+from wakewise.estimation import ErrorStateFilter
 from wakewise.estimation.kernels import unexplained
+from wakewise.estimation.settings import Priors
 from wakewise.geometry import Pose, matrix_from_quat, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
 from wakewise.interfaces import BodyState, Measurement
 from wakewise.thrusters import thruster_lag
@@ -23,7 +24,7 @@ def record(
     gyro_bias=0.0,
     noise=1.0,
     silent=(np.inf, np.inf),
-    settings=None,
+    priors=None,
     seed=0,
     load_W_N=None,
     outlier_every=0,
@@ -34,7 +35,7 @@ def record(
     the filter; every n-th pose is half a metre off where `outlier_every` says so.
     """
     rng = np.random.default_rng(seed)
-    filter_ = ErrorStateFilter(VEHICLE, settings)
+    filter_ = ErrorStateFilter(VEHICLE, priors=priors)
     p, q, nu = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0, 0, 0]), np.zeros(6)
     start = p + offset_m * np.array([1.0, -1.0, 1.0]) / np.sqrt(3.0)
     state = filter_.init(BodyState(X_WB=Pose(start, q)))
@@ -138,7 +139,7 @@ def test_uncertainty_grows_while_poses_are_missing():
 def test_latency_is_taken_back():
     """Poses 90 ms old, three times the usual, are late for the default wait and harmless for a longer one."""
     fresh, _, _ = record(seconds=8.0, latency_s=0.0)
-    waited, _, state = record(seconds=8.0, latency_s=0.09, settings=FilterSettings(settle_s=0.095))
+    waited, _, state = record(seconds=8.0, latency_s=0.09, priors=Priors(settle_s=0.095))
     _, _, hurried = record(seconds=2.0, latency_s=0.09)
     assert state.late == 0
     assert hurried.late > 80

@@ -178,3 +178,13 @@ def test_every_figure_is_defined():
     """Each field of a score has a unit and a definition, and each definition a field."""
     assert set(SURFACE_DEFINITIONS) == set(SurfaceScore.__dataclass_fields__)
     assert all(text for _, text in SURFACE_DEFINITIONS.values())
+
+
+def test_what_counts_as_seen_is_what_the_definition_says():
+    """The angle in the words of visible_pct is the one at which a far camera stops seeing a ball, nothing being set."""
+    said_deg = float(SURFACE_DEFINITIONS["visible_pct"][1].split("less than ")[1].split(" deg")[0])
+    surface = sample_surface(ball(), Crop(), np.random.default_rng(0), 20_000)
+    seen = count_views(surface, ball(), np.array([[1000.0, 0, 0]])) > 0
+    angle_deg = np.degrees(np.arccos(np.clip(surface.normals[:, 0], -1, 1)))
+    assert angle_deg[seen].max() == pytest.approx(said_deg, abs=1.0)
+    assert seen[angle_deg < said_deg - 1.0].all()

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from trajectory_error import paired_instants, read_tum, trajectory_error
 
 from wakewise.errors import InputError
-from wakewise.evaluation import paired_instants, read_tum, trajectory_error
 from wakewise.geometry import matrix_from_quat, quat_from_rotvec
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[3] / "shared" / "data")) / "trajectories"

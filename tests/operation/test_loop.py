@@ -126,3 +126,56 @@ def test_at_sea_nobody_knows_the_truth() -> None:
     assert not frame["est_x_m"].is_nan().any()
     assert recorder.exposures == []
     assert int(frame["exposing"].sum()) == 4
+
+
+class NeverRead(list):  # type: ignore[type-arg]
+    """A list that may grow and must not be gone through."""
+
+    def __iter__(self):  # type: ignore[no-untyped-def]
+        raise AssertionError("the whole record was read at one step")
+
+
+@dataclass
+class Spy:
+    """An estimator that keeps what it is told, beside one that answers."""
+
+    answers: Perfect
+    told: list[np.ndarray] = field(default_factory=list)
+
+    def init(self, start: BodyState) -> int:
+        return 0
+
+    def step(self, state: int, dt_s: float, measurements: object, thrusts_N: np.ndarray) -> tuple[int, BodyState]:
+        self.told.append(np.array(thrusts_N))
+        return state, self.answers.state
+
+
+def test_the_estimator_is_told_what_was_flown() -> None:
+    """Over fifty steps the thrusts that it hears are the commands that the plant got, in order, none of them zero."""
+    everything = Perfect()
+    spy = Spy(everything)
+    recorder = FlightRecorder(
+        route=ROUTE,
+        X_BC=X_BC,
+        exposure_s=0.01,
+        instants=3,
+        thrusters=2,
+        dt_s=DT_S,
+        witness=None,
+        _exposing=NeverRead(),
+    )
+    run_loop(
+        pilot=RoutePilot(route=ROUTE, X_BC=X_BC, exposure_s=0.01),
+        controller=everything,  # type: ignore[arg-type]
+        estimator=spy,  # type: ignore[arg-type]
+        plant=everything,  # type: ignore[arg-type]
+        witness=None,
+        start=everything.state,
+        thrusters=2,
+        duration_s=50 * DT_S,
+        dt_s=DT_S,
+        record=recorder,
+    )
+    assert len(spy.told) == len(everything.commands) == 50
+    np.testing.assert_array_equal(spy.told, everything.commands)
+    np.testing.assert_array_equal(spy.told, [np.full(2, k + 1.0) for k in range(50)])

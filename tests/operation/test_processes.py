@@ -12,8 +12,8 @@ from pathlib import Path
 from wakewise.operation import fly_trial, load_scenario
 short = {
     "mission.elevations_deg": [40], "mission.views": [3], "mission.speed_m_s": 0.5, "mission.acceleration_m_s2": 0.5,
-    "mission.settle_s": 0.5, "mission.approach_m": 0.0, "tank.wave_amplitude_m": 0.01, "tank.background_m_s": 0.005,
-    "tank.inflow_loss": True, "method": "dp",
+    "mission.settle_s": 0.5, "mission.approach_m": 0.0, "tank.waves.amplitude_m": 0.01,
+    "tank.current.turbulence_m_s": 0.005,    "tank.jets.inflow_loss": True, "method": "dp",
 }
 scenario = load_scenario("quick", None, short)
 fly_trial(scenario.parts(), Path(sys.argv[1]))

@@ -7,10 +7,11 @@ import pytest
 from analytic_sphere import RADIUS, REGION, photograph
 from pydantic import ValidationError
 
+from wakewise import extras
 from wakewise.cli.main import run
 from wakewise.errors import InputError
 from wakewise.reconstruction import read_cloud
-from wakewise.reconstruction.nerf import PROFILES, FieldSettings, backend, build_field, pick_device, profile
+from wakewise.reconstruction.nerf import PROFILES, FieldSettings, build_field, pick_device, profile
 
 SHORT = FieldSettings(
     levels=4,
@@ -60,11 +61,9 @@ def test_gpu_profile_is_the_papers():
 
 def test_missing_torch_is_one_line_with_the_remedy(folder, capsys, monkeypatch):
     """Exit code 2, and what to install."""
-    monkeypatch.setattr(backend.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(extras, "_is_here", lambda module: module != "torch")
     line = said(capsys, 2, "nerf", folder)
-    assert (
-        line == "wakewise: neural field: PyTorch is not installed; in the project's folder, pip install -e '.[nerf]'\n"
-    )
+    assert line.startswith("wakewise: wakewise nerf needs torch, which is not installed: pip install 'wakewise[nerf]'")
 
 
 def test_what_cannot_be_is_one_line(folder, tmp_path, capsys):

@@ -72,7 +72,7 @@ def test_auto_takes_poses_when_it_has_them_and_poses_need_them():
     """With centres and axes auto goes by poses; asked for without positions it is an input error."""
     centres, axes = orbit(24)
     by_name = (dict(zip(names(24), centres, strict=True)), dict(zip(names(24), axes, strict=True)))
-    assert len(choose_pairs(names(24), ReconstructionSettings(pose_neighbours=4), *by_name)) == 48
+    assert choose_pairs(names(24), ReconstructionSettings(), *by_name) == pose_pairs(names(24), centres, axes, 8)
     assert len(choose_pairs(names(24), ReconstructionSettings(), by_name[0])) == 24 * 23 // 2
     with pytest.raises(InputError, match="matching by poses"):
         choose_pairs(names(3), ReconstructionSettings(matching="poses"))

@@ -70,7 +70,7 @@ def test_second_run_skips_and_a_changed_setting_does_not(model):
     again = reconstruct(folder, out, SETTINGS, focal_px=FOCAL, reference_positions=centres, region=REGION)
     assert again.skipped == ("match", "map", "dense", "mesh")
     assert again.dense_points == first.dense_points
-    other = SETTINGS.model_copy(update={"agreement_px": 0.7, "mesh": False})
+    other = SETTINGS.model_copy(update={"dense_px": 600, "mesh": False})
     changed = reconstruct(folder, out, other, focal_px=FOCAL, reference_positions=centres, region=REGION)
     assert changed.skipped == ("match", "map")
     assert changed.mesh_faces is None

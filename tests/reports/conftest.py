@@ -148,7 +148,7 @@ def make_trial(folder: Path, *, seed: int = 7, wash: float = 1.0, method: str = 
         "seed": seed,
         "vehicle": "paper",
         "method": method,
-        "tank": {"silt": 0.02, "size_m": [6, 5, 1.5]},
+        "tank": {"silt": {"load_kg_m2": 0.02}, "size_m": [6, 5, 1.5]},
         "versions": {"wakewise": "0.1.0"},
     }
     (folder / "scenario.yaml").write_text(yaml.safe_dump(scenario, sort_keys=False), encoding="utf-8")

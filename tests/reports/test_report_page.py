@@ -66,6 +66,30 @@ def test_every_photograph_is_inside_and_two_are_marked(report_text: str) -> None
     assert report_text.count('<span class="tag">sharpest') == report_text.count('<span class="tag worst">') == 1
 
 
+def test_every_plot_has_a_drawing_for_a_phone_and_long_parts_can_be_folded(report_text: str) -> None:
+    """Panels side by side would be cut at 390 px; each leg of photographs and each group of figures is a fold."""
+    plots = report_text.count('<figure class="plot">')
+    assert plots >= 4
+    assert report_text.count('class="wide-only"') == report_text.count('class="narrow-only"') == plots
+    legs = re.findall(r'<details class="fold" open><summary>(orbit[^<]+)<', report_text)
+    assert len(legs) == len(set(legs)) == 3
+    assert '<details class="fold" open><summary>The water' in report_text
+
+
+def test_the_scene_has_a_picture_in_its_place_until_it_is_drawn(report_text: str) -> None:
+    """No white box: the model and a word stand there while the scene loads."""
+    stage = report_text[report_text.index('<div class="stage">') : report_text.index("<iframe")]
+    assert "data:image/png;base64," in stage
+    assert "loading" in stage
+
+
+def test_thrusters_have_names_and_D_is_explained_where_it_stands(report_text: str) -> None:
+    """The vehicle's own names beside the numbers; the wake model is named beside its estimate."""
+    water = report_text[report_text.index('id="water"') : report_text.index('id="figures"')]
+    assert "D is no measurement" in water
+    assert "front right horizontal 1" in water
+
+
 def test_the_page_is_of_moderate_size(report_text: str) -> None:
     """A report is mailed around: below 15 MB."""
     assert 0.2e6 < len(report_text) < 15e6

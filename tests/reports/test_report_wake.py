@@ -32,9 +32,32 @@ def test_the_page_names_every_model_and_flow(result, page):
 
 
 def test_the_page_says_that_the_printed_formula_fails(page):
-    """It does so in its headline and flow by flow."""
+    """It does so under its headline and flow by flow."""
     assert "does not describe" in page
     assert "Where the printed formula fails" in page
+
+
+def test_the_headline_says_which_model_to_use(result, page):
+    """The model whose worst R2 over flows and regions is best; other figures, another answer; none good, no advice."""
+    assert "Use jet-fitted." in page[page.index("<h1") : page.index("</h1>")]
+    values = figures(result)
+    for cell in values["models"]["linear"].values():
+        if cell["r2_core"] is not None:
+            cell["r2_core"] = cell["r2_wake"] = 0.9999
+    assert "Use linear." in wake_page(result, values)
+    for cells in values["models"].values():
+        for cell in cells.values():
+            if cell["r2_core"] is not None:
+                cell["r2_core"] = -2.0
+    assert "No model fits every flow" in wake_page(result, values)
+
+
+def test_every_flow_is_explained_where_it_is_first_named(result, page):
+    """The lead of the first table says what each flow is; a hopeless R2 is not spelt out in the head."""
+    lead = page[page.index('id="table"') : page.index("<table")]
+    for flow in figures(result)["flows"].values():
+        assert flow["title"] in lead
+    assert "below −1" in page[: page.index("<main")]
 
 
 def test_a_formula_that_would_hold_is_not_called_a_failure(result):

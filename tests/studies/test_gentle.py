@@ -209,7 +209,7 @@ def test_the_current_helps_where_it_runs_along_the_arc():
 def test_the_papers_world_is_the_papers_model():
     """One thruster at full lag: the water is sqrt(T) times the model's unit velocity; none, and it is still."""
     target = place_on_bed("branching", coral("branching", 0), 1.5)
-    settings = TankSettings(current_m_s=(0.0, 0.0, 0.0))
+    settings = TankSettings(current={"velocity_m_s": (0.0, 0.0, 0.0)})
     start = BodyState(X_WB=Pose(np.array([0.0, 0.0, 0.9])))
     world = InstantWater(paper_jets(), VEHICLE, target, settings, start, np.random.default_rng(0))
     points = np.array([[0.09, 0.14, 1.2], [0.0, 0.0, 1.4]])

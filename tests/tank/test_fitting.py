@@ -11,7 +11,7 @@ from wakewise.vehicles import load_vehicle
 
 VEHICLE = load_vehicle("paper")
 ROUTE = [(0.0, Pose(np.array([0.0, 0.0, 1.0]))), (60.0, Pose(np.array([1.0, 0.0, 1.0])))]
-CABLE = {"tether_diameter_m": 0.005}
+CABLE = {"diameter_m": 0.005}
 
 
 @pytest.mark.parametrize(
@@ -23,9 +23,9 @@ CABLE = {"tether_diameter_m": 0.005}
             {"failures": [{"thruster": 8}, {"thruster": 1, "kind": "stuck", "value": 500.0}]},
             r"failures\.1\.value: stuck at 500 N, .* gives -40 to 51 N",
         ),
-        (CABLE | {"tether_length_m": 3.0}, r"tether_length_m: 3, the route is 3\.64 m from the winch at 60 s"),
+        ({"tether": CABLE | {"length_m": 3.0}}, r"tether\.length_m: 3, the route is 3\.64 m from the winch at 60 s"),
         (
-            CABLE | {"tether_at_B_m": (0.0, 0.9, 0.0)},
+            {"tether": CABLE | {"at_B_m": (0.0, 0.9, 0.0)}},
             r"\(0, 0\.9, 0\) m is not on the hull, .* 0\.225 x 0\.175 x 0\.14 m",
         ),
     ],
@@ -40,8 +40,8 @@ def test_what_does_not_fit_is_refused(fields, message):
     "fields",
     [
         {"failures": [{"thruster": 8, "kind": "stuck", "value": -40.0, "at_s": 60.0}]},
-        CABLE | {"tether_length_m": 3.7, "tether_at_B_m": (-0.3, 0.0, 0.0)},
-        {"tether_length_m": 0.1},
+        {"tether": CABLE | {"length_m": 3.7, "at_B_m": (-0.3, 0.0, 0.0)}},
+        {"tether": {"length_m": 0.1}},
     ],
 )
 def test_what_fits_passes(fields):

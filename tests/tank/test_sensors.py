@@ -5,8 +5,9 @@ import pytest
 
 from wakewise.geometry import Pose, quat_conjugate, quat_from_euler, quat_multiply, rotvec_from_quat
 from wakewise.interfaces import BodyState
-from wakewise.tank import Sensors, TankSettings
+from wakewise.tank import Sensors
 from wakewise.tank.sensors import pose_loss
+from wakewise.tank.settings import SensorSettings
 
 STATE = BodyState(
     X_WB=Pose(np.array([0.1, -0.2, 0.8]), quat_from_euler(0.1, -0.2, 0.7)), nu_B=np.array([0, 0, 0, 0.1, 0.2, -0.3])
@@ -16,7 +17,7 @@ FORCE = np.array([0.3, -0.1, -9.8])
 
 
 def _record(seconds, seed=0, turbidity=0.0, **settings):
-    sensors = Sensors(TankSettings(**settings), np.random.default_rng(seed))
+    sensors = Sensors(SensorSettings(**settings), np.random.default_rng(seed))
     out = []
     while sensors.next_due_s() <= seconds:
         time_s = sensors.next_due_s()

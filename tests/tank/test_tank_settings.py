@@ -13,23 +13,29 @@ from wakewise.water.currents import wave_number_per_m
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
-        ({"wave_amplitude_m": 0.5, "wave_period_s": 1.01}, r"wave_amplitude_m: 0\.5 m, .* breaks above 0\.113 m"),
-        ({"pose_outages_s": [[5.0, 3.0]]}, r"pose_outages_s: from 5 to 3 s"),
-        ({"pose_outages_s": [[-5.0, 3.0]]}, r"pose_outages_s: from -5 to 3 s"),
+        ({"waves": {"amplitude_m": 0.5, "period_s": 1.01}}, r"waves\.amplitude_m: 0\.5 m, .* breaks above 0\.113 m"),
+        ({"sensors": {"pose_outages_s": [[5.0, 3.0]]}}, r"pose_outages_s: from 5 to 3 s"),
+        ({"sensors": {"pose_outages_s": [[-5.0, 3.0]]}}, r"pose_outages_s: from -5 to 3 s"),
         (
-            {"pump_speed_m_s": 1.0, "pump_at_m": [0.0, 2.5, 0.8], "pump_towards": [0.0, 1.0, 0.0]},
-            r"pump_towards: .* wall at y = 2\.5 m",
+            {"pump": {"speed_m_s": 1.0, "at_m": [0.0, 2.5, 0.8], "towards": [0.0, 1.0, 0.0]}},
+            r"pump\.towards: .* wall at y = 2\.5 m",
         ),
-        ({"tether_diameter_m": 0.01, "tether_from_m": [50.0, 0.0, 0.0]}, r"tether_from_m: \(50, 0, 0\) m is outside"),
-        ({"tether_diameter_m": 0.01, "tether_from_m": [0.0, 0.0, 2.0]}, r"tether_from_m: .* below the floor"),
-        ({"grain_m": 0.0}, r"grain_m: found 0\.0, should be greater than or equal to 0\.000001"),
-        ({"grain_m": -1e-5}, r"grain_m: found -1e-05"),
-        ({"pose_dropout": 1.5}, r"pose_dropout: found 1\.5, should be less than or equal to 1"),
-        ({"pose_dropout": -0.1}, r"pose_dropout: found -0\.1"),
+        ({"tether": {"diameter_m": 0.01, "from_m": [50.0, 0.0, 0.0]}}, r"tether\.from_m: \(50, 0, 0\) m is outside"),
+        ({"tether": {"diameter_m": 0.01, "from_m": [0.0, 0.0, 2.0]}}, r"tether\.from_m: .* below the floor"),
+        ({"silt": {"grain_m": 0.0}}, r"grain_m: found 0\.0, should be greater than or equal to 0\.000001"),
+        ({"silt": {"grain_m": -1e-5}}, r"grain_m: found -1e-05"),
+        ({"sensors": {"pose_dropout": 1.5}}, r"pose_dropout: found 1\.5, should be less than or equal to 1"),
+        ({"sensors": {"pose_dropout": -0.1}}, r"pose_dropout: found -0\.1"),
         ({"failures": [{"thruster": 0}]}, r"failures\.0\.thruster: found 0"),
-        ({"current_m_s": [5.0, 0.0, 0.0]}, r"current_m_s\.0: found 5\.0, should be less than or equal to 3"),
-        ({"current_m_s": 0.1}, r"current_m_s: found 0\.1, should be a list in square brackets"),
-        ({"current_file": ""}, r"current_file: found ''"),
+        (
+            {"current": {"velocity_m_s": [5.0, 0.0, 0.0]}},
+            r"velocity_m_s\.0: found 5\.0, should be less than or equal to 3",
+        ),
+        (
+            {"current": {"velocity_m_s": 0.1}},
+            r"current\.velocity_m_s: found 0\.1, should be a list in sq",
+        ),
+        ({"current": {"file": ""}}, r"tank\.current\.file: found ''"),
     ],
 )
 def test_bad_fields_are_named(fields, words):
@@ -45,7 +51,7 @@ def test_waves_may_be_as_steep_as_they_stand():
         k = wave_number_per_m(period_s, depth_m)
         most_m = 0.071 * 2 * math.pi / k * math.tanh(k * depth_m)
         size = (6.0, 5.0, depth_m)
-        kept = TankSettings(size_m=size, wave_period_s=period_s, wave_amplitude_m=0.999 * most_m)
-        assert kept.wave_amplitude_m < most_m
+        kept = TankSettings(size_m=size, waves={"period_s": period_s, "amplitude_m": 0.999 * most_m})
+        assert kept.waves.amplitude_m < most_m
         with pytest.raises(ValueError, match="breaks above"):
-            TankSettings(size_m=size, wave_period_s=period_s, wave_amplitude_m=1.001 * most_m)
+            TankSettings(size_m=size, waves={"period_s": period_s, "amplitude_m": 1.001 * most_m})

@@ -43,5 +43,5 @@ def test_it_pulls_at_its_end_and_no_farther_than_its_length():
     tether = _tether(length_m=0.9, p_BT_m=np.array([0.2, 0.0, 0.0]), winch_W_m=np.array([0.2, 0.0, 0.0]))
     wrench = tether.wrench_B(AT, np.zeros(6), STILL, 0.0)
     assert wrench == pytest.approx([0, 0, -20.0, 0, 4.0, 0], abs=1e-9)
-    with pytest.raises(InputError, match="tether_length_m"):
+    with pytest.raises(InputError, match=r"tether\.length_m"):
         tether.check_reach(AT)

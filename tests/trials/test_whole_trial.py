@@ -29,7 +29,7 @@ SMALL = {
     "imaging.width": 480,
     "imaging.height": 360,
     "target.kind": "brain",
-    "tank.silt": 0.02,
+    "tank.silt.load_kg_m2": 0.02,
     "reconstruction.mesh_depth": 7,
 }
 

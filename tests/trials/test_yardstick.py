@@ -45,20 +45,20 @@ def test_the_waters_own_speed_is_that_of_its_current(parts: Parts) -> None:
     """A steady current has its own speed, still water has none."""
     times = np.linspace(0.0, 60.0, 50)
     assert ambient_speed_m_s(parts, times) == pytest.approx(np.hypot(0.03, 0.02), rel=1e-9)
-    still = load_scenario("quick", None, {"tank.current_m_s": [0, 0, 0]})
+    still = load_scenario("quick", None, {"tank.current.velocity_m_s": [0, 0, 0]})
     assert ambient_speed_m_s(still.parts(), times) == 0.0
 
 
 def test_grains_move_at_the_stress_that_the_tank_takes(parts: Parts) -> None:
     """Soulsby's threshold of 20 um of calcite is 0.063 Pa; a stated one goes first; a clean bed has none."""
     assert grain_threshold_Pa(parts.scenario.tank) == pytest.approx(0.063, abs=0.001)
-    assert grain_threshold_Pa(load_scenario("quick", None, {"tank.erosion_threshold_Pa": 0.2}).tank) == 0.2
-    assert grain_threshold_Pa(load_scenario("quick", None, {"tank.water": "clear"}).tank) is None
+    assert grain_threshold_Pa(load_scenario("quick", None, {"tank.silt.threshold_Pa": 0.2}).tank) == 0.2
+    assert grain_threshold_Pa(load_scenario("quick", None, {"tank.silt.kind": "clear"}).tank) is None
 
 
 def test_what_cannot_be_computed_says_why(parts: Parts) -> None:
     """Without commands no sharing, without grains no threshold; the water's own speed is there all the same."""
-    clear = load_scenario("quick", None, {"tank.water": "clear"})
+    clear = load_scenario("quick", None, {"tank.silt.kind": "clear"})
     gathering = Gathering()
     add_yardsticks(gathering, clear.parts(), pl.DataFrame({"time_s": [0.0, 1.0]}))
     result = gathering.finish()

@@ -5,6 +5,7 @@ energy never grows without thrust | no drag, no loss | balance closes to the int
 
 import numpy as np
 import pytest
+from energy_balance import mechanical_energy, mechanical_power
 from moving_vehicles import ALL_VEHICLES, STILL, fast_state, random_state, vehicle_named, without_drag
 
 from wakewise.arrays import Array
@@ -15,8 +16,6 @@ from wakewise.vehicles import (
     acceleration,
     compile_body,
     fossen,
-    mechanical_energy,
-    mechanical_power,
     step_rk4,
     step_semi_implicit,
 )

@@ -4,13 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from energy_balance import mechanical_energy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from moving_vehicles import ALL_VEHICLES, LEVEL, STILL, neutral, random_state, vehicle_named
 
 from wakewise.arrays import Array
 from wakewise.geometry import matrix_from_quat
-from wakewise.vehicles import Vehicle, compile_body, load_vehicle, mechanical_energy, step_rk4, step_semi_implicit
+from wakewise.vehicles import Vehicle, compile_body, load_vehicle, step_rk4, step_semi_implicit
 
 
 @pytest.fixture(scope="module", params=ALL_VEHICLES)

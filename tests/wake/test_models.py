@@ -17,7 +17,9 @@ def test_names_give_models_and_a_wrong_name_is_told_the_right_ones():
     assert [type(wake_model(name)) for name in model_names()] == [
         PaperJet, PowerJet, PowerJet, PowerJet, RoundJet, GaussianJet,
     ]  # fmt: skip
-    with pytest.raises(InputError, match="'swirl': unknown, allowed: fitted, jet, jet-fitted, linear, paper"):
+    with pytest.raises(
+        InputError, match="'swirl': unknown, allowed: paper, paper-calibrated, fitted, linear, jet, jet-fitted"
+    ):
         wake_model("swirl")
 
 
@@ -43,7 +45,7 @@ def test_settings_carry_numbers():
         ({"model": "paper", "gain": 0.5}, "wake model paper has no gain, allowed: edge_width_deg"),
         ({"model": "paper-calibrated", "decay_power": 1.0}, "has no decay_power, allowed: gain, edge_width_deg"),
         ({"model": "jet", "edge_width_deg": 3.0}, "wake model jet has no edge_width_deg, allowed: half_width_slope"),
-        ({"model": "swirl"}, "Input should be 'paper'"),
+        ({"model": "swirl"}, "'swirl': unknown, allowed: paper"),
         ({"model": "fitted", "gain": -1.0}, "greater than 0"),
         ({"model": "fitted", "twist": 1.0}, "Extra inputs"),
     ],

@@ -10,7 +10,7 @@ from wakewise.tank import TankSettings, build_ambient
 from wakewise.water import AiryWave, BackgroundTurbulence, PumpJet
 from wakewise.water.currents import wave_number_per_m
 
-STILL = {"current_m_s": (0.0, 0.0, 0.0)}
+STILL = {"current": {"velocity_m_s": (0.0, 0.0, 0.0)}}
 
 
 def _built(**settings):
@@ -54,14 +54,16 @@ def test_waves_pump_and_turbulence_are_free_of_divergence():
     """At random points of the water each is so to 1e-4 of its own rate of shear."""
     rng = np.random.default_rng(3)
     points = rng.uniform([-2, -2, 0.1], [2, 2, 1.4], (200, 3))
-    for settings in ({"wave_amplitude_m": 0.05}, {"background_m_s": 0.05}, {"pump_speed_m_s": 1.0}):
+    for settings in (
+        {"waves": {"amplitude_m": 0.05}},
+        {"current": {"velocity_m_s": (0.0, 0.0, 0.0), "turbulence_m_s": 0.05}},
+        {"pump": {"speed_m_s": 1.0}},
+    ):
         ambient = _built(**settings)
         # The pump is summed in single precision: wide steps keep its rounding out.
-        error = _divergence(
-            lambda x, a=ambient: a.velocity(x, 0.4), points, h=5e-3 if "pump_speed_m_s" in settings else 1e-4
-        )
+        error = _divergence(lambda x, a=ambient: a.velocity(x, 0.4), points, h=5e-3 if "pump" in settings else 1e-4)
         fastest = np.linalg.norm(ambient.velocity(points, 0.4), axis=1).max()
-        assert np.abs(error).max() < (2e-2 if "pump_speed_m_s" in settings else 1e-5) * fastest / 0.1
+        assert np.abs(error).max() < (2e-2 if "pump" in settings else 1e-5) * fastest / 0.1
 
 
 def test_a_pump_jet_follows_the_round_jet():
@@ -100,8 +102,8 @@ def test_turbulence_has_the_rms_that_was_asked_for():
 def test_motions_add_up():
     """A current and a wave together are the sum of both; none is still water."""
     points = np.array([[0.2, 0.1, 0.5]])
-    both = _built(current_m_s=(0.1, 0.0, 0.0), wave_amplitude_m=0.02)
-    wave = _built(wave_amplitude_m=0.02)
+    both = _built(current={"velocity_m_s": (0.1, 0.0, 0.0)}, waves={"amplitude_m": 0.02})
+    wave = _built(waves={"amplitude_m": 0.02})
     assert both.velocity(points, 1.0) == pytest.approx(wave.velocity(points, 1.0) + np.array([0.1, 0.0, 0.0]))
     assert not both.steady
     still = _built()
@@ -115,14 +117,14 @@ def test_a_series_takes_the_place_of_the_steady_current(tmp_path):
     """With a file the steady current of the settings is left out."""
     path = tmp_path / "c.csv"
     path.write_text("time_s,u,v\n0,0.1,0\n60,0.1,0\n")
-    ambient = build_ambient(TankSettings(current_file=str(path)), np.random.default_rng(0))
+    ambient = build_ambient(TankSettings(current={"file": str(path)}), np.random.default_rng(0))
     assert ambient.velocity(np.zeros((1, 3)), 3.0).tolist() == [[0.1, 0.0, 0.0]]
     assert ambient.end_s == 60.0
 
 
 def test_a_pump_outside_the_water_is_refused():
     """Its outlet must be in the tank, and blow somewhere."""
-    with pytest.raises(InputError, match="pump_at_m"):
-        _built(pump_speed_m_s=1.0, pump_at_m=(0.0, 0.0, 2.0))
-    with pytest.raises(InputError, match="pump_towards"):
-        _built(pump_speed_m_s=1.0, pump_towards=(0.0, 0.0, 0.0))
+    with pytest.raises(InputError, match=r"pump\.at_m"):
+        _built(pump={"speed_m_s": 1.0, "at_m": (0.0, 0.0, 2.0)})
+    with pytest.raises(InputError, match=r"pump\.towards"):
+        _built(pump={"speed_m_s": 1.0, "towards": (0.0, 0.0, 0.0)})

@@ -13,6 +13,8 @@ from numba import njit
 
 from wakewise.arrays import Array
 from wakewise.geometry import quat_from_euler
+from wakewise.physics import GRAVITY_M_S2
+from wakewise.physics import TRIM_WATER_KG_M3 as RHO_KG_M3
 from wakewise.trials.timing import BenchOptions, timed_us
 from wakewise.vehicles import (
     acceleration,
@@ -28,7 +30,7 @@ from wakewise.vehicles.dynamics import pack
 from wakewise.vehicles.runge_kutta import rk4_jacobian_kernel, rk4_kernel
 from wakewise.vehicles.semi_implicit import semi_implicit_jacobian_kernel, semi_implicit_kernel
 
-DT_S, RHO_KG_M3, GRAVITY_M_S2 = 0.005, 1000.0, 9.80665
+DT_S = 0.005
 ORACLE = "oracle_fossen_bluerov2heavy_200.csv"
 ORACLE_GRAVITY_M_S2 = 9.82
 

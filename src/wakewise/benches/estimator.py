@@ -11,7 +11,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from wakewise.arrays import Array
-from wakewise.estimation import dead_reckoned, local_north_east_down
+from wakewise.benches.dead_reckoning import dead_reckoned, local_north_east_down
 from wakewise.geometry import quat_conjugate, quat_from_euler, quat_multiply, rotvec_from_quat
 from wakewise.interfaces import BodyState, Estimator, Measurement, Witness
 from wakewise.operation import Parts, Scenario, fly
@@ -116,9 +116,10 @@ def _loss(parts: Parts, options: BenchOptions) -> dict[str, Any]:
     The water is clean and moves in steps of 0.1 s, which is cheaper and which neither vehicle nor sensors notice.
     """
     scenario = parts.scenario
-    blind = scenario.tank.model_copy(
-        update={"pose_outages_s": (LOSS_S,), "tracking_rate_hz": 0.0, "silt": 0.0, "flow_step_s": 0.1}
-    )
+    tank = scenario.tank
+    sensors = tank.sensors.model_copy(update={"pose_outages_s": (LOSS_S,), "tracking_rate_hz": 0.0})
+    clean = tank.silt.model_copy(update={"load_kg_m2": 0.0})
+    blind = tank.model_copy(update={"sensors": sensors, "silt": clean, "flow_step_s": 0.1})
     rate_hz = scenario.control.rate_hz
     begin, middle, end = (round(t * rate_hz) - 1 for t in (LOSS_S[0], sum(LOSS_S) / 2, LOSS_S[1]))
     nees, worst_m, at_end, claimed, after = [], 0.0, [], [], []

@@ -14,8 +14,9 @@ which miss, one OSQP problem whose numbers are updated).
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import osqp
 from numba import njit
 from scipy import sparse
 
@@ -25,6 +26,9 @@ from wakewise.planning.kernels import RATE_N, horizon, rotation
 from wakewise.planning.planner import PlanModel, Planner
 from wakewise.planning.problem import RATE_PENALTY, Horizon, PlanProblem
 from wakewise.wake.plan_disturbance import stage_disturbance
+
+if TYPE_CHECKING:
+    import osqp
 
 SQP_STEPS, QP_ITERATIONS, TOLERANCE = 5, 50, 1e-4
 """The paper's limits."""
@@ -158,6 +162,8 @@ class PaperPlanner(Planner):
             work.S[k], work.R[k] = blocks[k, 6:, :6], blocks[k, 6:, 6:]
 
     def _osqp(self, H: Array, g: Array, U: Array) -> tuple[Array, bool]:
+        import osqp
+
         size, table, rho = U.size, self.model.table, RATE_PENALTY
         limit = float(table.weights[RATE_N])
         q = np.concatenate([g, np.zeros(size)])

@@ -34,7 +34,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
     why: dict[str, str] = {}
     with tempfile.TemporaryDirectory(prefix="wakewise-bench-") as scratch:
         for kind in coral_kinds():
-            scenario = load_scenario(PRESET, None, {"target.kind": kind, "tank.silt": 0.0, "seed": SEED})
+            scenario = load_scenario(PRESET, None, {"target.kind": kind, "tank.silt.load_kg_m2": 0.0, "seed": SEED})
             found = model_coral(scenario, Path(scratch) / kind, options)
             if found["failure"] is not None:
                 why[kind] = found["failure"]

@@ -54,10 +54,13 @@ def bench(
     """
     from wakewise.benches import BENCHES, run_bench
     from wakewise.errors import InputError
+    from wakewise.extras import need
     from wakewise.trials import BenchOptions
 
     if plot is not None and name not in ("gentle", "operator"):
         raise InputError("--plot: only `wakewise bench gentle` and `wakewise bench operator` draw")
+    if plot is not None:
+        need("--plot", "reports")
     names = [name] if name else sorted(BENCHES)
     results: dict[str, Any] = {}
     bars = Bars()

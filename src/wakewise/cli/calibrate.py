@@ -29,6 +29,9 @@ def calibrate(
     json: Json = False,
 ) -> None:
     """Calibrate a camera, also behind a flat port: focal length, distortion, and the residual of every lens model."""
+    from wakewise.extras import need
+
+    need("wakewise calibrate", "photos")
     from wakewise.files import write_json
     from wakewise.reconstruction import Board
     from wakewise.reconstruction import calibrate as solve

@@ -32,6 +32,9 @@ def colour(photos: Photos, out: Out = None, model: Model = None, json: Json = Fa
     With a model, the water's veil and attenuation are fitted to colour and depth and undone. Without one, or for a
     photograph that is not part of it, the colour cast is taken away and the contrast stretched.
     """
+    from wakewise.extras import need
+
+    need("wakewise colour", "photos")
     from wakewise.likeness.photo_colours import correct_photos
 
     folder = photos / "images" if (photos / "images").is_dir() else photos

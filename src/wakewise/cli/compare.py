@@ -55,6 +55,9 @@ def compare(
     json: Json = False,
 ) -> None:
     """Fly the same mission with each method in the same water, and set the outcomes side by side."""
+    from wakewise.extras import need
+
+    need("wakewise compare", "photos", "reports", "logs")
     from wakewise import api
     from wakewise.operation import load_scenario
     from wakewise.trials import UNITS

@@ -1,4 +1,7 @@
-"""What a person sees: a bar per stage with time left on standard error, tables or JSON on standard output."""
+"""What a person sees: a bar per stage with time left on standard error, tables or JSON on standard output.
+
+Rich is imported when something is drawn, since every command imports this page and `--help` is to be quick.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +9,21 @@ import json
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from rich.table import Table
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
 
-stderr = Console(stderr=True, highlight=False)
+
+@cache
+def _stderr() -> Console:
+    from rich.console import Console
+
+    return Console(stderr=True, highlight=False)
 
 
 class Bars:
@@ -26,6 +35,9 @@ class Bars:
     @contextmanager
     def stage(self, name: str) -> Iterator[Callable[..., None]]:
         """Show a bar while the block runs."""
+        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+        stderr = _stderr()
         columns = (
             SpinnerColumn(),
             TextColumn("{task.description:<12}"),
@@ -49,7 +61,7 @@ class Bars:
 
     def skipped(self, name: str) -> None:
         """Say that a stage was already done."""
-        stderr.print(f"[green]✓[/] {name:<12} [dim]already done")
+        _stderr().print(f"[green]✓[/] {name:<12} [dim]already done")
 
 
 def print_json(value: Any) -> None:
@@ -60,6 +72,8 @@ def print_json(value: Any) -> None:
 
 def print_table(table: Table) -> None:
     """Print a table on standard output."""
+    from rich.console import Console
+
     console = Console(highlight=False)
     # A pipe or a file has no width to fit into.
     Console(highlight=False, width=console.width if console.is_terminal else 140).print(table)
@@ -76,3 +90,12 @@ def shown(value: Any) -> str:
             return f"{value:.2g}"
         return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}" if abs(value) < 10 else f"{value:.1f}"
     return str(value)
+
+
+def reasons_once(why: Mapping[str, str], keys: Sequence[str]) -> list[str]:
+    """A line for every reason that one of these figures is missing for; figures that share a reason share the line."""
+    shared: dict[str, list[str]] = {}
+    for key in keys:
+        if key in why:
+            shared.setdefault(why[key], []).append(key)
+    return [f"{', '.join(failed)}: {reason}" for reason, failed in shared.items()]

@@ -31,6 +31,9 @@ def degrade(
 
     Each factor goes on until no model comes about, which is reported as such.
     """
+    from wakewise.extras import need
+
+    need("wakewise degrade", "photos", "reports")
     from wakewise.cli.options import overrides
     from wakewise.operation import load_scenario
     from wakewise.reports.degradation import plot_degradation

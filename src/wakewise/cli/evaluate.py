@@ -103,6 +103,9 @@ def _against_mesh(
 ) -> tuple[dict[str, Any], dict[str, tuple[str, str]]]:
     import numpy as np
 
+    from wakewise.extras import need
+
+    need("wakewise evaluate", "photos", only=("embreex", "small_gicp"))
     from wakewise.evaluation import SURFACE_DEFINITIONS, Crop, compare_surface, error_colours, suspicious_scale
     from wakewise.reconstruction import Cloud as Points
     from wakewise.reconstruction import read_reference_cameras, write_cloud

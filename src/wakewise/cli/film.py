@@ -56,6 +56,9 @@ def film(
     the film is whole, so running the same command again continues where it stopped. A film or rows that lie in their
     default place are shown by the report beside them.
     """
+    from wakewise.extras import need
+
+    need("wakewise film", "photos", "reports")
     from wakewise.reports import write_comparison, write_report
     from wakewise.reports.film import VIEWS, compared_trials, write_film, write_rows
     from wakewise.reports.looks import FILMS

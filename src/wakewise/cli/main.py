@@ -30,7 +30,7 @@ from wakewise.cli import (
     vehicle,
     wake,
 )
-from wakewise.errors import InputError, WakewiseError
+from wakewise.errors import InputError, MissingExtra, WakewiseError
 
 app = typer.Typer(
     name="wakewise",
@@ -99,8 +99,16 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except typer.TyperException as fault:
         _say(fault.format_message())
         return 2
-    except InputError as fault:
+    except (InputError, MissingExtra) as fault:
         _say(str(fault))
+        return 2
+    except ModuleNotFoundError as fault:
+        from wakewise.extras import missing_extra
+
+        refusal = missing_extra("this command", fault)
+        if refusal is None:
+            raise
+        _say(str(refusal))
         return 2
     except WakewiseError as fault:
         _say(str(fault))

@@ -67,6 +67,9 @@ def nerf(
     Needs the extra `nerf`. Leaves views/ (photo left, render right), points.ply, mesh.ply and field.json. In a trial's
     folder the surface is measured against the truth. A run that was stopped goes on where it was.
     """
+    from wakewise.extras import need
+
+    need("wakewise nerf", "nerf", "photos")
     from wakewise.reconstruction.nerf import pick_device
     from wakewise.reconstruction.nerf import profile as profile_of
 

@@ -19,7 +19,9 @@ Out = Annotated[
 ]
 Sets = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="FIELD=VALUE", help="Change one field, such as tank.silt=0; may be repeated."),
+    typer.Option(
+        "--set", metavar="FIELD=VALUE", help="Change a field, such as mission.standoff_m=0.6; may be repeated."
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 Seed = Annotated[int | None, typer.Option("--seed", help="Seed of every random draw.", show_default=False)]

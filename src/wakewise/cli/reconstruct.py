@@ -57,6 +57,9 @@ def reconstruct_photos(
 
     Stages that are done are skipped. Without reference cameras the model has no scale.
     """
+    from wakewise.extras import need
+
+    need("wakewise reconstruct", "photos")
     import numpy as np
 
     from wakewise.operation.scenario import check_scenario, parse_overrides

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wakewise.cli.console import Bars, print_json, print_table, shown
+from wakewise.cli.console import Bars, print_json, print_table, reasons_once, shown
 from wakewise.cli.options import (
     Json,
     Out,
@@ -66,6 +66,9 @@ def scan(
 
     Stages that are done are skipped, so running the same command again continues where it stopped.
     """
+    from wakewise.extras import need
+
+    need("wakewise scan", "photos", "reports", "logs")
     from wakewise.api import trial
     from wakewise.operation import load_scenario
 
@@ -86,7 +89,6 @@ def scan(
     for key in _HEADLINES:
         table.add_row(key, shown(figures[key]), figures["units"][key])
     print_table(table)
-    for key, reason in figures["why"].items():
-        if key in _HEADLINES:
-            typer.echo(f"{key}: {reason}")
+    for line in reasons_once(figures["why"], _HEADLINES):
+        typer.echo(line)
     typer.echo(f"report: {report}")

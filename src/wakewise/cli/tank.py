@@ -9,6 +9,7 @@ import typer
 
 from wakewise.cli.console import print_json
 from wakewise.cli.options import Json
+from wakewise.physics import TRIM_WATER_KG_M3
 
 if TYPE_CHECKING:
     from wakewise.arrays import Array
@@ -84,7 +85,7 @@ def probe_command(
     seed: ProbeSeed = 0,
     turbulence: Turbulence = False,
     swirl: Swirl = False,
-    density: Density = 1000.0,
+    density: Density = TRIM_WATER_KG_M3,
     out: ProbeOut = None,
     json: Json = False,
 ) -> None:
@@ -114,7 +115,7 @@ def probe_command(
         floor_z_m=floor,
         target=_target(target, floor),
         flow=flow,
-        turbulence=TankSettings().turbulence if turbulence else 0.0,
+        turbulence=TankSettings().jets.turbulence if turbulence else 0.0,
         swirl=swirl,
         density_kg_m3=density,
         seed=seed,

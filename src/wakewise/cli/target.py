@@ -52,6 +52,7 @@ def show(
     import numpy as np
 
     from wakewise.errors import InputError
+    from wakewise.extras import need
     from wakewise.targets import (
         coral,
         coral_kinds,
@@ -65,6 +66,8 @@ def show(
 
     if out is not None and out.suffix.lower() not in (".html", ".svg", ".ply"):
         raise InputError(f"--out {out}: suffix '{out.suffix}', allowed: .html, .svg, .ply")
+    if out is not None:
+        need("--out", "reports", "photos", only=("matplotlib", "cv2", "embreex"))
     given = read_marks(marks) if marks is not None else None
     if target in coral_kinds():
         name, mesh, scores = target, coral(target, seed), None

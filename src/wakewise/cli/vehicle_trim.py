@@ -38,8 +38,8 @@ def trim(vehicle: Vehicle = "paper", scenario: ScenarioFile = None, json: Json =
     poses = tuple(route.body(float(t), body.X_BC).X_WB for t in times)
     wake = wake_model(chosen.control.wake.model_copy(update={"floor": True}), chosen.tank.size_m[2])
     settings = chosen.control.model_copy(update={"levers": LeverSettings(bed=True)})
-    tank = chosen.tank
-    unknown_N = tank.trim_range_N if tank.trim_N is None else abs(tank.trim_N)
+    apart = chosen.tank.mismatch
+    unknown_N = apart.trim_range_N if apart.trim_N is None else abs(apart.trim_N)
     advice = trim_advice(body, poses, parts.region, wake, settings, unknown_N=unknown_N)
     if json:
         print_json(

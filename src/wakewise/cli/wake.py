@@ -126,9 +126,12 @@ def validate(
     json: Json = False,
 ) -> None:
     """Hold every wake model against every flow, on held-out thrusts, beside the paper's 0.99 and 0.82."""
+    from wakewise.extras import need
     from wakewise.studies.wake_validation import ValidationOptions, figures
     from wakewise.studies.wake_validation import validate as run
 
+    if out is not None:
+        need("--out", "reports")
     with Bars().stage("validate") as progress:
         result = run(
             ValidationOptions(

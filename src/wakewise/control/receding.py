@@ -54,7 +54,9 @@ class PlanState:
 
     `thrusts_N`, shape (n,), are the last commands; `nominal_N`, shape (n,), what the planned commands alone would
     make the thrusters give at the plan's start; `share`, shape (n, 6), shares corrections out; `backup` is the state
-    of PID and allocator; `goal_nu`, shape (6,), is the twist of the last goal.
+    of PID and allocator; `goal_nu`, shape (6,), is the twist of the last goal. `moved_N` is what was flown beside the
+    planned commands in the null space, where somebody else shared the wrench out, and `moved_given_N` what of it the
+    thrusters give by now, both shape (n,).
     """
 
     tracker: TrackerState
@@ -67,6 +69,8 @@ class PlanState:
     trouble: str | None = None
     saturated: bool = False
     goal_nu: Array | None = None
+    moved_N: Array | None = None
+    moved_given_N: Array | None = None
 
     def __post_init__(self) -> None:
         freeze(self, thrusts_N=(None,), nominal_N=(None,))
@@ -118,6 +122,21 @@ class PlanningController:
             return self._fall_back(replace(state, goal_nu=goal.nu_B), dt_s, estimate, goal)
         return self._follow(state, state.plan, state.share, dt_s, estimate, goal.nu_B)
 
+    def told(self, state: PlanState, thrusts_N: Array, dt_s: float) -> PlanState:
+        """The state after other thrusts, shape (n,), of the same wrench were flown in place of the last command.
+
+        The next plan begins at these shares, not at those that were planned and never sent: its rate limit, its lag
+        and its first jets are theirs. What corrects the wrench stays out of the plan (see the top of the file).
+        """
+        if state.plan is None:
+            return replace(state, thrusts_N=thrusts_N)
+        table, null = self.model.table, self.model.layout.null
+        planned = state.plan.commands_N[_stage(state.plan, state.age_s - dt_s, table.stage_s)]
+        moved = null @ (null.T @ (thrusts_N - planned))
+        keep = table.keep ** (dt_s / table.stage_s)
+        before = np.zeros_like(moved) if state.moved_given_N is None else state.moved_given_N
+        return replace(state, thrusts_N=thrusts_N, moved_N=moved, moved_given_N=keep * before + (1.0 - keep) * moved)
+
     def _unusable(self, estimate: BodyState, goal: Goal) -> str | None:
         count = self.guard.count
         for what, X_WB, nu_B in (("estimate", estimate.X_WB, estimate.nu_B), ("goal", goal.X_WB, goal.nu_B)):
@@ -150,6 +169,8 @@ class PlanningController:
             if away <= self.tube.position_m and turned <= self.tube.attitude_rad:
                 nominal, thrusts = expected, self._nominal_thrusts(state)
                 before = state.plan.commands_N[_stage(state.plan, state.age_s, settings.stage_s)]
+                if state.moved_N is not None and state.moved_given_N is not None:
+                    thrusts, before = thrusts + state.moved_given_N, before + state.moved_N
             else:
                 self.guard.count(
                     "off the path", f"off the planned path by {away:.2f} m: planned anew from the estimate"
@@ -178,6 +199,8 @@ class PlanningController:
             age_s=0.0,
             nominal_N=thrusts,
             trouble=None,
+            # They are in the thrusts that the new plan began with.
+            moved_given_N=None,
         )
 
     def _nominal_thrusts(self, state: PlanState) -> Array:

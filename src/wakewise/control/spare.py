@@ -183,7 +183,7 @@ class Respared:
             thrusts = state.thrusts_N + self.layout.inverse @ missing
             if np.all((thrusts >= self.layout.lower_N) & (thrusts <= self.layout.upper_N)):
                 held = SpareState(
-                    flown_by(inner, thrusts), thrusts, state.age_s + dt_s, state.disturbance, state.free_age_s
+                    self._told(inner, thrusts, dt_s), thrusts, state.age_s + dt_s, state.disturbance, state.free_age_s
                 )
                 return held, replace(command, thrusts_N=thrusts, disturbance=state.disturbance)
         G = self.view.gram(estimate.X_WB)
@@ -197,21 +197,18 @@ class Respared:
             free_age_s = 0.0
             if self._cost(anew) < (1.0 - WORTH) * self._cost(found):
                 found = anew
-        new = SpareState(flown_by(inner, found.thrusts_N), found.thrusts_N, dt_s, found.disturbance, free_age_s)
+        new = SpareState(self._told(inner, found.thrusts_N, dt_s), found.thrusts_N, dt_s, found.disturbance, free_age_s)
         return new, replace(command, thrusts_N=found.thrusts_N, disturbance=found.disturbance)
+
+    def _told(self, inner: Any, thrusts_N: Array, dt_s: float) -> Any:
+        """The other controller's state, told what was flown in place of its thrusts, if it can be told."""
+        tell = getattr(self.inner, "told", None)
+        return inner if tell is None else tell(inner, thrusts_N, dt_s)
 
     def _cost(self, found: Allocation) -> float:
         """Cost of shares without the price on change."""
         D = 0.0 if found.disturbance is None else found.disturbance
         return self.weights.disturbance * D + self.weights.effort * float(found.thrusts_N @ found.thrusts_N)
-
-
-def flown_by(state: Any, thrusts_N: Array) -> Any:
-    """The state of a controller whose thrusts were exchanged, told what was flown, if it keeps count of that.
-
-    Else what it falls back on (the last thrusts, fading; the PID's allocator) would begin at thrusts never sent.
-    """
-    return replace(state, thrusts_N=thrusts_N) if hasattr(state, "thrusts_N") else state
 
 
 def respared(

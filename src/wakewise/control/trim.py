@@ -27,11 +27,11 @@ from wakewise.control.settings import ControlSettings
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.interfaces import WakeModel
+from wakewise.physics import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle, compile_body, restoring_wrench
 from wakewise.wake.view import WakeView
 
-WATER_KG_M3, GRAVITY_M_S2 = 1000.0, 9.80665
 FLOATS_N = (-2.0, -1.0, 0.0, 1.0, 1.5, 2.0, 3.0)
 """Net buoyancies looked at, positive floats."""
 SHIFTS_MM = (-3.0, 0.0, 3.0, 6.0, 9.0)
@@ -104,7 +104,7 @@ def ballasted(vehicle: Vehicle, float_N: float, shift_mm: float = 0.0) -> Vehicl
     InputError
         If no displaced volume would be left.
     """
-    volume_m3 = vehicle.displaced_volume_m3 + float_N / (WATER_KG_M3 * GRAVITY_M_S2)
+    volume_m3 = vehicle.displaced_volume_m3 + float_N / (TRIM_WATER_KG_M3 * GRAVITY_M_S2)
     if not volume_m3 > 0.0:
         raise InputError(f"ballast: {float_N:g} N leaves a displaced volume of {volume_m3:g} m3, it must stay positive")
     return replace(
@@ -114,7 +114,7 @@ def ballasted(vehicle: Vehicle, float_N: float, shift_mm: float = 0.0) -> Vehicl
 
 def net_buoyancy_N(vehicle: Vehicle) -> float:
     """Buoyancy less weight in fresh water of 1000 kg/m3, positive floats."""
-    return GRAVITY_M_S2 * (WATER_KG_M3 * vehicle.displaced_volume_m3 - vehicle.mass_kg)
+    return GRAVITY_M_S2 * (TRIM_WATER_KG_M3 * vehicle.displaced_volume_m3 - vehicle.mass_kg)
 
 
 def trim_advice(
@@ -196,7 +196,7 @@ def _row(
     layout = vehicle_layout(vehicle)
     D, thrust, down, effort = [], [], [], []
     for error_N in errors:
-        body = compile_body(ballasted(vehicle, added_N + error_N, shift_mm), WATER_KG_M3, GRAVITY_M_S2)
+        body = compile_body(ballasted(vehicle, added_N + error_N, shift_mm), TRIM_WATER_KG_M3, GRAVITY_M_S2)
         for X_WB, G in zip(poses, grams, strict=True):
             wrench = -restoring_wrench(body, X_WB.q)
             wrench[:3] -= force_W @ X_WB.R

@@ -32,16 +32,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from wakewise.arrays import Array, freeze
 from wakewise.estimation.kernels import GAINS, GYRO, correct, felt, predict, turn_between, turned_by, unexplained
-from wakewise.estimation.settings import FilterSettings
+from wakewise.estimation.settings import FilterSettings, Priors
 from wakewise.geometry import Pose, matrix_from_quat
 from wakewise.interfaces import BodyState, Measurement
+from wakewise.physics import GRAVITY_M_S2
 from wakewise.vehicles import Vehicle, compile_body
 
-_GRAVITY_M_S2 = 9.80665
 _TICK_S = 1e-9
 _MEMORY = 15  # poses that the mean of innovations goes back, a quarter of a second at 62 Hz
 _CHANCE = 9.0 / (2 * _MEMORY - 1)  # square of three sigmas of that mean for a filter whose noise is right
@@ -104,8 +104,15 @@ class ErrorStateFilter:
     covariance grows; all of it is in `BodyState.covariance` of what `step` returns.
     """
 
-    def __init__(self, vehicle: Vehicle, settings: FilterSettings | None = None, start_s: float = 0.0) -> None:
-        s = self.settings = settings or FilterSettings()
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        settings: FilterSettings | None = None,
+        start_s: float = 0.0,
+        priors: Priors | None = None,
+    ) -> None:
+        self.settings = settings or FilterSettings()
+        s = self.priors = priors or Priors()
         self._start_s = start_s
         self._body = compile_body(vehicle)
         self._packed = self._body.packed
@@ -121,7 +128,10 @@ class ErrorStateFilter:
                 s.accelerometer_bias_walk_m_s3,
             ]
         )
-        self._gate = {n: float(chi2.isf(s.gate, n)) if s.gate > 0.0 else np.inf for n in (1, 3, 6)}
+        # chdtri is the inverse of chi-squared's upper tail.
+        self._gate = {
+            n: float(chdtri(n, self.settings.gate)) if self.settings.gate > 0.0 else np.inf for n in (1, 3, 6)
+        }
         spread = (
             s.start_std_m,
             s.start_std_rad,
@@ -166,7 +176,7 @@ class ErrorStateFilter:
         commands = (*state.commands, (state.time_s, np.where(np.isfinite(thrusts_N), thrusts_N, 0.0)))
         fresh = tuple(m for m in measurements if m.time_s > state.settled_s - _TICK_S)
         waiting = tuple(sorted((*state.waiting, *fresh), key=lambda m: m.time_s))
-        settled_s = max(now_s - self.settings.settle_s, state.settled_s)
+        settled_s = max(now_s - self.priors.settle_s, state.settled_s)
         due = tuple(m for m in waiting if m.time_s <= settled_s + _TICK_S)
         rest = waiting[len(due) :]
         walk = _Walk(state, commands)
@@ -223,7 +233,7 @@ class ErrorStateFilter:
     def _take(self, walk: _Walk, measured: Measurement) -> None:
         s = self.settings
         if measured.X_WB is not None and np.isfinite(measured.X_WB.p_m.sum() + measured.X_WB.q.sum()):
-            if walk.refused_in_a_row >= s.gate_patience:
+            if walk.refused_in_a_row >= self.priors.gate_patience:
                 walk.P[np.diag_indices(self._errors)] += np.diag(self._start_covariance)
             H, residual, std = self._pose_rows(walk, measured.X_WB)
             self._heed(walk, residual / np.sqrt(np.einsum("ij,jk,ik->i", H, walk.P, H) + std**2))
@@ -273,13 +283,13 @@ class ErrorStateFilter:
         """
         mean = walk.mean
         R_WB = matrix_from_quat(mean[3:7])
-        down_B = R_WB.T @ np.array([0.0, 0.0, _GRAVITY_M_S2])
+        down_B = R_WB.T @ np.array([0.0, 0.0, GRAVITY_M_S2])
         H = np.empty((3, self._errors))
         expected = felt(self._packed, self._B, mean, walk.thrusts_N, walk.rest_q, down_B, H)
         period_s = max(time_s - walk.force_s, 1e-3) if walk.force_s is not None else 0.02
         walk.force_s = time_s
         s = self.settings
-        std = np.hypot(s.accelerometer_std_m_s2, s.acceleration_noise_m_s2 / np.sqrt(period_s))
+        std = np.hypot(s.accelerometer_std_m_s2, self.priors.acceleration_noise_m_s2 / np.sqrt(period_s))
         self._correct(walk, H, force_B_m_s2 - expected, np.full(3, std))
 
     def _correct(self, walk: _Walk, H: Array, residual: Array, std: Array) -> float:

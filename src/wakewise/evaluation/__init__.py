@@ -1,26 +1,36 @@
-"""How good a flight and a model were: alignment, accuracy and completeness, trajectory error, flight figures.
+"""How good a flight and a model were: alignment, accuracy and completeness, flight figures.
 
 Pure functions whose results carry their unit in their name.
 """
 
-from wakewise.evaluation.alignment import Refinement, Similarity, refine_icp, robust_similarity, umeyama
-from wakewise.evaluation.definitions import SURFACE as SURFACE_DEFINITIONS
-from wakewise.evaluation.depth_maps import DEPTH_DEFINITIONS, DepthScore, DepthView, compare_depths, read_depth_views
-from wakewise.evaluation.flight import flight_figures
-from wakewise.evaluation.surface import (
-    Comparison,
-    Crop,
-    Surface,
-    SurfaceScore,
-    compare_surface,
-    count_views,
-    error_colours,
-    evaluate_surface,
-    sample_surface,
-    suspicious_scale,
-    thin,
-)
-from wakewise.evaluation.trajectory import TrajectoryError, paired_instants, read_tum, trajectory_error
+from typing import TYPE_CHECKING
+
+from wakewise.doors import lazy_door
+
+if TYPE_CHECKING:
+    from wakewise.evaluation.alignment import Refinement, Similarity, refine_icp, robust_similarity, umeyama
+    from wakewise.evaluation.definitions import SURFACE as SURFACE_DEFINITIONS
+    from wakewise.evaluation.depth_maps import (
+        DEPTH_DEFINITIONS,
+        DepthScore,
+        DepthView,
+        compare_depths,
+        read_depth_views,
+    )
+    from wakewise.evaluation.flight import flight_figures
+    from wakewise.evaluation.surface import (
+        Comparison,
+        Crop,
+        Surface,
+        SurfaceScore,
+        compare_surface,
+        count_views,
+        error_colours,
+        evaluate_surface,
+        sample_surface,
+        suspicious_scale,
+        thin,
+    )
 
 __all__ = [
     "DEPTH_DEFINITIONS",
@@ -33,21 +43,19 @@ __all__ = [
     "Similarity",
     "Surface",
     "SurfaceScore",
-    "TrajectoryError",
     "compare_depths",
     "compare_surface",
     "count_views",
     "error_colours",
     "evaluate_surface",
     "flight_figures",
-    "paired_instants",
     "read_depth_views",
-    "read_tum",
     "refine_icp",
     "robust_similarity",
     "sample_surface",
     "suspicious_scale",
     "thin",
-    "trajectory_error",
     "umeyama",
 ]
+
+lazy_door(__name__, "photos")

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import small_gicp
 
 from wakewise.arrays import Array, BoolArray, freeze
 from wakewise.errors import InputError, StageError
+from wakewise.extras import need
 
 # Median and 99.9th percentile of the length of a 3D normal vector, in standard deviations (chi, 3 degrees of freedom).
 _CHI3_MEDIAN, _CHI3_999 = 1.538, 4.033
@@ -174,6 +174,9 @@ def refine_icp(
         If too few points match or the cloud would move farther than `limit_m`: the alignment before it was wrong, or
         this is no model of that surface.
     """
+    need("registration (ICP)", "photos", only=("small_gicp",))
+    import small_gicp
+
     target = small_gicp.PointCloud(np.asarray(surface_m, dtype=np.float64))
     # Estimating makes room for normals; the true ones then take their place.
     small_gicp.estimate_normals(target, num_neighbors=10, num_threads=2)

@@ -12,13 +12,12 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from embreex import rtcore_scene
-from embreex.mesh_construction import TriangleMesh
 from scipy.spatial import KDTree
 
 from wakewise.arrays import Array, BoolArray, IntArray, freeze
 from wakewise.errors import InputError, StageError
 from wakewise.evaluation.alignment import Refinement, refine_icp
+from wakewise.extras import need
 from wakewise.targets import MeshDistance
 
 SUCCESS_RMSE_MM = 3.0
@@ -153,6 +152,10 @@ def count_views(
     enough : int, optional
         Stop looking for more cameras where so many are found, which is most of the work.
     """
+    need("the share of a surface that cameras see", "photos", only=("embreex",))
+    from embreex import rtcore_scene
+    from embreex.mesh_construction import TriangleMesh
+
     scene = rtcore_scene.EmbreeScene()
     TriangleMesh(scene, np.asarray(mesh.vertices_m, dtype=np.float32)[np.asarray(mesh.faces)])
     start = surface.points_m + 5e-4 * surface.normals

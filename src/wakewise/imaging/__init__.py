@@ -5,15 +5,20 @@ silt, flakes, the camera's motion while the shutter is open and the sensor. Ever
 the true silt and a seed.
 """
 
-from wakewise.imaging.blur import motion_blur, motion_px, pose_at
-from wakewise.imaging.camera import Camera, FlatPort, LensCamera, PinholeCamera
-from wakewise.imaging.camera_model import Calibration, calibrate
-from wakewise.imaging.optics import SiltOptics, WaterOptics, haze_between, through_water, water_optics, water_types
-from wakewise.imaging.panels import Panels
-from wakewise.imaging.photograph import Photo, photograph, photograph_of, sharpness
-from wakewise.imaging.renderer import Lights, Render, render
-from wakewise.imaging.scene import Scene
-from wakewise.imaging.settings import ImagingSettings
+from typing import TYPE_CHECKING
+
+from wakewise.doors import lazy_door
+
+if TYPE_CHECKING:
+    from wakewise.imaging.blur import motion_blur, motion_px, pose_at
+    from wakewise.imaging.camera import Camera, FlatPort, LensCamera, PinholeCamera
+    from wakewise.imaging.camera_model import Calibration, calibrate
+    from wakewise.imaging.optics import SiltOptics, WaterOptics, haze_between, through_water, water_optics, water_types
+    from wakewise.imaging.panels import Panels
+    from wakewise.imaging.photograph import Photo, photograph, photograph_of, sharpness
+    from wakewise.imaging.renderer import Lights, Render, render
+    from wakewise.imaging.scene import Scene
+    from wakewise.imaging.settings import ImagingSettings
 
 __all__ = [
     "Calibration",
@@ -42,3 +47,5 @@ __all__ = [
     "water_optics",
     "water_types",
 ]
+
+lazy_door(__name__, "photos")

@@ -18,7 +18,7 @@ from wakewise.imaging.particles import draw_flakes, flake_positions
 from wakewise.imaging.renderer import Image, Render, render
 from wakewise.imaging.scene import Scene
 from wakewise.imaging.sensor import expose
-from wakewise.imaging.settings import ImagingSettings
+from wakewise.imaging.settings import ELECTRONS_PER_S, FLAKES_PER_KG, READ_NOISE_E, ImagingSettings
 from wakewise.interfaces import ScalarGrid
 
 BALANCE_M = 0.25
@@ -90,10 +90,10 @@ def photograph_of(
     haze = haze_between(camera, middle, water, grains or SiltOptics(), silt, lights)
     radiance, silt_per_m = through_water(view, camera, haze, water, lights.from_above)
     radiance = motion_blur(radiance, view.depth_m, camera, poses)
-    flakes = flake_positions(camera, middle, silt, settings.flakes_per_m3, settings.flakes_per_kg, rng)
+    flakes = flake_positions(camera, middle, silt, settings.flakes_per_m3, FLAKES_PER_KG, rng)
     radiance = draw_flakes(radiance, view.depth_m, camera, poses, flakes, water, lights, rng)
     gains = settings.gain * np.exp(water.signal_per_m * BALANCE_M)
-    image = expose(radiance, gains, settings.electrons_per_s * settings.exposure_s, settings.read_noise_e, rng)
+    image = expose(radiance, gains, ELECTRONS_PER_S * settings.exposure_s, READ_NOISE_E, rng)
     on_target = view.target_fraction >= 0.5
     return Photo(
         image=image,

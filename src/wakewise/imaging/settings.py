@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-import numpy as np
 from pydantic import Field
 
-from wakewise.imaging.camera import FlatPort, LensCamera, PinholeCamera
-from wakewise.imaging.optics import WaterOptics, water_optics
-from wakewise.imaging.renderer import Lights
 from wakewise.settings import Settings
 
+if TYPE_CHECKING:
+    from wakewise.imaging.camera import LensCamera, PinholeCamera
+    from wakewise.imaging.optics import WaterOptics
+    from wakewise.imaging.renderer import Lights
+
 WaterType = Literal["I", "IB", "II", "III", "1C", "3C", "5C"]
+
+
+PORT_GLASS_M, PORT_INDEX = 0.005, 1.49
+"""Thickness and refractive index of a flat port: 5 mm of acrylic."""
+LAMP_OFFSET_M = 0.2
+"""Distance of each of two lamps to the camera's side: where small vehicles carry them."""
+FLAKES_PER_KG = 1e6
+"""Visible flakes per kilogram of suspended silt."""
+ELECTRONS_PER_S, READ_NOISE_E = 1.5e6, 4.0
+"""Electrons per second at saturation, 12000 in the default exposure, and read noise, rms, of a small CMOS sensor."""
 
 
 class ImagingSettings(Settings):
@@ -31,8 +42,6 @@ class ImagingSettings(Settings):
     port_air_m: float | None = Field(
         None, description="air between the lens's pupil and a flat port, m; none = no port", ge=0.0, le=1.0
     )
-    port_glass_m: float = Field(0.005, description="thickness of the flat port, m", ge=0.0, le=0.1)
-    port_index: float = Field(1.49, description="refractive index of the flat port; 1.49 is acrylic", ge=1.0, le=3.0)
     water_type: WaterType = Field("II", description="Jerlov water type: I to III oceanic, 1C to 5C coastal")
     ambient: float = Field(0.4, description="light from the sky relative to the reference, 0 = night", ge=0.0, le=10.0)
     panels: float = Field(
@@ -42,14 +51,10 @@ class ImagingSettings(Settings):
         le=10,
     )
     lamp: float = Field(0.35, description="lamps' irradiance at 0.5 m relative to the reference", ge=0.0, le=100.0)
-    lamp_offset_m: float = Field(0.2, description="distance of each of two lamps to the camera's side, m", gt=0, le=2.0)
     gain: float = Field(0.75, description="signal, 1 = saturation, of a white card in unit light", gt=0.0, le=100.0)
     flakes_per_m3: float = Field(1500.0, description="visible flakes in clear water, 1/m3", ge=0.0, le=1e6)
-    flakes_per_kg: float = Field(1e6, description="visible flakes per kilogram of suspended silt, 1/kg", ge=0.0, le=1e8)
-    electrons_per_s: float = Field(1.5e6, description="electrons per second at saturation", gt=0.0, le=1e12)
     photo_format: Literal["png", "jpeg"] = Field("png", description="how photographs are stored")
     jpeg_quality: int = Field(92, description="quality of photographs stored as JPEG", ge=1, le=100)
-    read_noise_e: float = Field(4.0, description="read noise, electrons rms", ge=0.0, le=1000.0)
 
     def camera(self) -> PinholeCamera | LensCamera:
         """Camera of these settings; an ideal one if it has neither distortion nor port.
@@ -59,17 +64,23 @@ class ImagingSettings(Settings):
         InputError
             If the lens cannot show the field of view.
         """
+        from wakewise.imaging.camera import FlatPort, LensCamera, PinholeCamera
+
         fov_rad = math.radians(self.fov_deg)
         if self.port_air_m is None and not any(self.distortion):
             return PinholeCamera(self.width, self.height, fov_rad)
         port = None
         if self.port_air_m is not None:
-            port = FlatPort(air_m=self.port_air_m, glass_m=self.port_glass_m, glass_index=self.port_index)
+            port = FlatPort(air_m=self.port_air_m, glass_m=PORT_GLASS_M, glass_index=PORT_INDEX)
         return LensCamera(self.width, self.height, fov_rad, self.distortion, port)
 
     def lights(self) -> Lights:
         """Sky, panels, and two lamps level with the lens, a little above it."""
-        x = self.lamp_offset_m
+        import numpy as np
+
+        from wakewise.imaging.renderer import Lights
+
+        x = LAMP_OFFSET_M
         return Lights(
             ambient=self.ambient,
             panels=self.panels,
@@ -79,4 +90,6 @@ class ImagingSettings(Settings):
 
     def water(self) -> WaterOptics:
         """Clear water of the chosen type."""
+        from wakewise.imaging.optics import water_optics
+
         return water_optics(self.water_type)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 from wakewise.errors import InputError
 from wakewise.importers.stated_matrix import read_number_matrix
+from wakewise.plugins import find, offered
 from wakewise.vehicles.check import AnyVehicle
 from wakewise.vehicles.draft import VehicleDraft
 from wakewise.vehicles.library import draft_names, load_draft
@@ -31,11 +32,23 @@ def find_vehicle(
         If there is no such vehicle or file, or it cannot be read as a vehicle.
     """
     path = Path(name_or_path)
+    reader = _reader_from_outside(path)
+    if reader is not None:
+        return reader(path)
     if name_or_path in draft_names() or not path.is_file() or _is_ours(path):
         return load_draft(name_or_path)
     from wakewise.importers.read import import_vehicle
 
     return import_vehicle(path, packages=packages, skip_missing=skip_missing)
+
+
+def _reader_from_outside(path: Path) -> Callable[[Path], VehicleDraft] | None:
+    """What an installed package offers for files of this ending (entry points `wakewise.vehicle_formats`)."""
+    ending = path.suffix.removeprefix(".").lower()
+    if ending not in offered("vehicle format") or not path.is_file():
+        return None
+    reader: Callable[[Path], VehicleDraft] = find("vehicle format", ending, {}).maker
+    return reader
 
 
 def any_vehicle(name_or_path: str) -> Vehicle:

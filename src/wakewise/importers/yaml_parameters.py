@@ -12,8 +12,7 @@ from wakewise.importers.found import Found
 from wakewise.importers.water import store
 from wakewise.importers.xml import PlacedError
 from wakewise.importers.yamls import Item
-
-GRAVITY_M_S2 = 9.81
+from wakewise.physics import GRAVITY_M_S2
 
 Entries = list[tuple[tuple[str, ...], Item]]
 """Every item of a file with the keys that lead to it."""

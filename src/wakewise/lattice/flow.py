@@ -9,6 +9,7 @@ import numpy as np
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
 from wakewise.lattice.meanfield import MeanField
+from wakewise.physics import FRESH_WATER_KG_M3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,7 +46,7 @@ class LatticeFlow:
     thrusts_N: Array
     areas_m2: Array
     turns: Array | None = None
-    density_kg_m3: float = 998.0
+    density_kg_m3: float = FRESH_WATER_KG_M3
 
     def __post_init__(self) -> None:
         if self.turns is None:

@@ -7,19 +7,24 @@ refuses what does not fit, `foreign.py` guards what comes from outside; `flying.
 `telemetry.py` keep what was, `photography.py` renders what the camera saw.
 """
 
-from wakewise.operation.flying import Flight, fly, fly_trial
-from wakewise.operation.parts import PARTS, Parts
-from wakewise.operation.photography import photo_name, photograph_flight
-from wakewise.operation.recorder import FlightRecorder, read_exposures, step_columns
-from wakewise.operation.scenario import (
-    PRESETS,
-    Scenario,
-    differences,
-    load_scenario,
-    parse_overrides,
-    read_scenario,
-    write_scenario,
-)
+from typing import TYPE_CHECKING
+
+from wakewise.doors import lazy_door
+
+if TYPE_CHECKING:
+    from wakewise.operation.flying import Flight, fly, fly_trial
+    from wakewise.operation.parts import PARTS, Parts
+    from wakewise.operation.photography import photo_name, photograph_flight
+    from wakewise.operation.recorder import FlightRecorder, read_exposures, step_columns
+    from wakewise.operation.scenario import (
+        PRESETS,
+        Scenario,
+        differences,
+        load_scenario,
+        parse_overrides,
+        read_scenario,
+        write_scenario,
+    )
 
 __all__ = [
     "PARTS",
@@ -40,3 +45,5 @@ __all__ = [
     "step_columns",
     "write_scenario",
 ]
+
+lazy_door(__name__)

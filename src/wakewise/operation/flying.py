@@ -13,6 +13,7 @@ import polars as pl
 
 from wakewise.errors import StageError, WakewiseError
 from wakewise.evaluation import flight_figures
+from wakewise.extras import has
 from wakewise.interfaces import Witness, no_progress
 from wakewise.missions import SETTLING
 from wakewise.operation.loop import Step, run_loop
@@ -20,7 +21,6 @@ from wakewise.operation.parts import Parts
 from wakewise.operation.preflight import check_begin
 from wakewise.operation.recorder import FlightRecorder
 from wakewise.operation.scenario import Scenario
-from wakewise.operation.telemetry import write_mcap
 
 WATER_EVERY_S = 0.1
 """How often the water is asked about; in between the last answer stands."""
@@ -51,9 +51,13 @@ class Flight:
 
     @cached_property
     def figures(self) -> dict[str, Any]:
-        """What the flight is judged by, from the first leg on: wash at the target, errors, energy."""
+        """What the flight is judged by, from the first leg on: wash at the target, errors, energy.
+
+        A flight that was ended before its first leg is judged by all of it.
+        """
         frame = self.steps.filter(pl.col("leg") != SETTLING)
-        return {"method": self.parts.method, "seed": self.parts.scenario.seed, **flight_figures(frame)}
+        judged = frame if frame.height else self.steps
+        return {"method": self.parts.method, "seed": self.parts.scenario.seed, **flight_figures(judged)}
 
     def __str__(self) -> str:
         """The flight in one line: the water at the target, the error of position, the energy, what went amiss."""
@@ -66,8 +70,14 @@ class Flight:
         return f"{self.figures['method']}, seed {self.figures['seed']}: {', '.join([*words, *amiss])}"
 
     def write(self, folder: Path) -> None:
-        """Write log.mcap, exposures.npz, timings.parquet; last steps.parquet, which says that the flight is whole."""
-        write_mcap(self.steps, folder / "log.mcap")
+        """Write exposures.npz, timings.parquet; last steps.parquet, which says that the flight is whole.
+
+        log.mcap, for viewers, is written where the extra `logs` is installed; a trial asks for it beforehand.
+        """
+        if has("logs"):
+            from wakewise.operation.telemetry import write_mcap
+
+            write_mcap(self.steps, folder / "log.mcap")
         self.recorder.write(folder)
 
 
@@ -168,6 +178,8 @@ def fly(
 
 def fly_trial(parts: Parts, folder: Path, progress: Callable[..., None] = no_progress) -> None:
     """Fly the mission once and leave its record. steps.parquet is written last: where it is, the flight is whole.
+
+    log.mcap, for viewers, is written where the extra `logs` is installed; a trial asks for it beforehand.
 
     Raises
     ------

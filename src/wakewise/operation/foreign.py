@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wakewise.control import MAKERS, make_controller
 from wakewise.interfaces import BodyState, Command, Controller, Goal
-from wakewise.plugins import find
+from wakewise.operation.pilots import PILOTS
+from wakewise.operation.worlds import WORLDS
+from wakewise.plugins import find, offered
+from wakewise.targets import coral_kinds
+from wakewise.wake.models import OWN_MODELS
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
+    from wakewise.operation.scenario import Scenario
 
 PATIENCE_S = 60.0
 """Time over and above its periods that a controller from outside may take in all; then it is not asked any more."""
@@ -34,13 +40,31 @@ def is_ours(part: Any) -> bool:
 
 
 def from_outside(parts: Parts) -> dict[str, str]:
-    """Parts of a flight that are not this package's own, by name, in words."""
+    """Parts of a flight that are not this package's own, in words: given in Python or named in the scenario."""
     found = {name: described(part) for name, part in parts.given.items() if not is_ours(part)}
-    if "controller" not in parts.given:
-        origin = find("method", parts.scenario.method, MAKERS).origin
-        if origin:
-            found["controller"] = f"{parts.scenario.method} (from {origin})"
+    for name, (kind, named, own) in _named(parts.scenario).items():
+        if name in parts.given or named in own or not (named in offered(kind) or ":" in named):
+            continue
+        origin = find(kind, named, own).origin
+        found[name] = f"{named} (from {origin})"
+    ending = Path(parts.scenario.vehicle).suffix.removeprefix(".").lower()
+    if "vehicle" not in parts.given and ending in offered("vehicle format"):
+        found["vehicle"] = f"{parts.scenario.vehicle} (read by {find('vehicle format', ending, {}).origin})"
+    if "wake" in found:
+        found["wake"] += "; derivatives by central differences"
     return found
+
+
+def _named(scenario: Scenario) -> dict[str, tuple[str, str, Mapping[str, Any]]]:
+    """Kind, name and our own ones of each part that a scenario names."""
+    return {
+        "controller": ("method", scenario.method, MAKERS),
+        "wake": ("wake model", scenario.control.wake.model, dict.fromkeys(OWN_MODELS)),
+        "world": ("world", scenario.world, WORLDS),
+        "pilot": ("pilot", scenario.pilot, PILOTS),
+        "target": ("target", scenario.target.kind, dict.fromkeys(coral_kinds())),
+        "current": ("current", scenario.tank.current.file or "", {"": None}),
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +73,7 @@ class GuardedState:
 
     inner: Any
     backup: Any
+    first: bool = True
     late_s: float = 0.0
     gave_up: str | None = None
 
@@ -90,12 +115,13 @@ class Guarded:
             trouble = self._trouble(command)
         except Exception as fault:  # see above
             inner, command, trouble = state.inner, None, f"{self.name}: raised {_said(fault)}"
-        took_s = self.clock() - began
+        # What is compiled or read on the first step is not the controller's pace.
+        took_s = 0.0 if state.first else self.clock() - began
         late_s = state.late_s + max(took_s - dt_s, 0.0)
         gave_up = None
         if late_s > self.patience_s:
             gave_up = f"{self.name}: given up, {late_s:.0f} s late in all, last {took_s:.2f} s for {dt_s:.2f} s"
-        state = replace(state, inner=inner, late_s=late_s, gave_up=gave_up)
+        state = replace(state, inner=inner, first=False, late_s=late_s, gave_up=gave_up)
         if trouble is not None or command is None:
             return self._fall_back(state, dt_s, estimate, goal, trouble or "no command")
         thrusts = np.clip(command.thrusts_N, self.lower_N, self.upper_N)

@@ -25,6 +25,7 @@ from wakewise.interfaces import BodyState, Measurement, Plant, ScalarGrid, Truth
 from wakewise.lattice import LatticeFlow, MeanField, load_mean_field
 from wakewise.tank import Sensors, TankSettings, VehiclePlant, build_ambient
 from wakewise.tank.probes import surface_points
+from wakewise.tank.settings import PLANT_STEP_S
 from wakewise.targets import Target
 from wakewise.thrusters import electrical_power_W
 from wakewise.vehicles import Vehicle
@@ -103,7 +104,7 @@ class InstantWater:
             size_m=settings.size_m,
             target_W_m=target.mesh.vertices_m,
         )
-        self._sensors = Sensors(settings, sensor_rng)
+        self._sensors = Sensors(settings.sensors, sensor_rng)
         self._jets = jets
         self._surface_W_m = surface_points(target, _PROBES, probe_rng)
         self._time = 0.0
@@ -117,7 +118,7 @@ class InstantWater:
         """Hold commanded thrusts, shape (n,), for dt_s; return what the sensors handed over."""
         end = self._time + dt_s
         while end - self._time > _TOLERANCE_S:
-            stop = min(self._time + self.settings.plant_step_s, end, self._sensors.next_due_s())
+            stop = min(self._time + PLANT_STEP_S, end, self._sensors.next_due_s())
             self._plant.step(thrusts_N, max(stop - self._time, 0.0))
             self._time = max(stop, self._time)
             if self._sensors.next_due_s() - self._time < _TOLERANCE_S:

@@ -45,7 +45,7 @@ def photograph_flight(parts: Parts, folder: Path, progress: Callable[..., None] 
     progress(0, len(exposures), "building the scene")
     scene = parts.scene
     streams = parts.seeds.imaging().spawn(len(exposures))
-    grains = SiltOptics(diameter_m=scenario.tank.grain_m, density_kg_m3=scenario.tank.grain_density_kg_m3)
+    grains = SiltOptics(diameter_m=scenario.tank.silt.grain_m, density_kg_m3=scenario.tank.silt.grain_density_kg_m3)
     images = folder / "images"
     rows = []
     for k, (planned, exposure, rng) in enumerate(zip(names, exposures, streams, strict=True)):

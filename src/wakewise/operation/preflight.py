@@ -11,7 +11,7 @@ from wakewise.errors import InputError
 from wakewise.missions import check_clearance
 from wakewise.operation.surroundings import surroundings_of
 from wakewise.planning import check_start, state_of
-from wakewise.tank import Holding, build_ambient, holding
+from wakewise.tank import Holding, holding, tank_ambient
 from wakewise.tank.fitting import check_fit
 
 if TYPE_CHECKING:
@@ -88,18 +88,18 @@ def check_current(parts: Parts, looks: int = 200) -> Holding | None:
         If it cannot stay on the route, with the figures, or the current's series is shorter than the flight.
     """
     tank, vehicle, route = parts.scenario.tank, parts.vehicle, parts.route
-    # The draw of the tank's own current: the turbulence looked at is the one that is flown in.
-    ambient = build_ambient(tank, parts.seeds.tank().spawn(5)[4])
+    ambient = tank_ambient(tank, parts.seeds.tank())
     if ambient.end_s < route.duration_s:
         raise InputError(
-            f"tank.current_file: {ambient.end_s:.0f} s of series are left, the flight takes {route.duration_s:.0f} s"
+            f"tank.current.file: {ambient.end_s:.0f} s of series are left, the flight takes {route.duration_s:.0f} s"
         )
     passing = []
     for time_s in np.linspace(0.0, route.duration_s, looks):
         wished = route.body(float(time_s), vehicle.X_BC)
         current = ambient.velocity(wished.X_WB.p_m[None], float(time_s))[0]
         passing.append(current @ wished.X_WB.R - wished.nu_B[:3])
-    trim_N = tank.trim_range_N if tank.trim_N is None else tank.trim_N
+    apart = tank.mismatch
+    trim_N = apart.trim_range_N if apart.trim_N is None else apart.trim_N
     found = holding(vehicle, np.array(passing), tank.density_kg_m3, trim_N)
     if found is not None and found.share < 1.0:
         raise InputError(f"tank: {vehicle.name} cannot hold its route, {found.said()}")

@@ -82,6 +82,7 @@ class FlightRecorder:
     _legs: list[str] = field(default_factory=list)
     _fallbacks: list[str] = field(default_factory=list)
     _exposing: list[bool] = field(default_factory=list)
+    _opened: int = 0
     _collisions: list[bool] = field(default_factory=list)
     _solve_ms: list[float] = field(default_factory=list)
     _water: WaterTruth | None = None
@@ -90,7 +91,7 @@ class FlightRecorder:
     def __call__(self, step: Step) -> None:
         """Take in one step of the loop."""
         opens_s = self.route.exposures_s
-        k = sum(self._exposing)
+        k = self._opened
         exposing = bool(k < len(opens_s) and opens_s[k] < step.time_s + self.dt_s)
         if self.witness is not None and (exposing or step.time_s >= self._water_time_s + self.water_every_s - 1e-9):
             self._water, self._water_time_s = self.witness.water(), step.time_s
@@ -112,6 +113,7 @@ class FlightRecorder:
         self._legs.append(self.route.leg_name(step.time_s))
         self._fallbacks.append(step.command.fallback or "")
         self._exposing.append(exposing)
+        self._opened += exposing
         self._collisions.append(bool(truth and truth.collision))
         self._solve_ms.append(1e3 * step.solve_s)
         if exposing and truth is not None and self.witness is not None:

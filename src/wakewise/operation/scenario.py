@@ -18,12 +18,13 @@ from wakewise.files import write_text
 from wakewise.imaging import ImagingSettings
 from wakewise.missions import MissionSettings
 from wakewise.operation.pilots import PILOTS
+from wakewise.operation.renamed import became
 from wakewise.operation.worlds import WORLDS
 from wakewise.plugins import names
 from wakewise.reconstruction import ReconstructionSettings
 from wakewise.settings import Settings
 from wakewise.tank import TankSettings
-from wakewise.tank.settings import WATERS
+from wakewise.tank.settings import SILTS
 from wakewise.targets import coral_kinds
 from wakewise.yaml_text import YamlError, read_yaml
 
@@ -133,7 +134,7 @@ class Scenario(Settings):
         tree = self.model_dump()
         for name, value in changes.items():
             new = value.model_dump() if isinstance(value, BaseModel) else value
-            tree = _merged(tree, _with_water(_nested(name, new)))
+            tree = _merged(tree, _with_silt(_nested(name, new)))
         return check_scenario(tree, "scenario")
 
     def parts(self) -> Parts:
@@ -146,7 +147,7 @@ class Scenario(Settings):
 def load_scenario(preset: str | None, path: Path | None, overrides: dict[str, Any]) -> Scenario:
     """Lay a scenario file over a preset and the overrides over both, then check the whole.
 
-    A kind of water (`tank.water`) sets silt and grains: they replace those of the layers below it, where a scenario
+    A kind of silt (`tank.silt.kind`) sets load and grains: they replace those of the layers below it, where a scenario
     that a trial left behind spells them out, and yield to what its own layer, or one above, says of them.
 
     Parameters
@@ -156,7 +157,7 @@ def load_scenario(preset: str | None, path: Path | None, overrides: dict[str, An
     path : Path or None
         A scenario YAML file, which may hold any part of a scenario.
     overrides : dict
-        Dotted field names to values, such as ``{"tank.silt": 0}``.
+        Dotted field names to values, such as ``{"mission.standoff_m": 0.6}``.
 
     Raises
     ------
@@ -178,7 +179,7 @@ def load_scenario(preset: str | None, path: Path | None, overrides: dict[str, An
         changes = _merged(changes, _nested(name, value))
     tree: dict[str, Any] = {}
     for layer in (*layers, changes):
-        tree = _merged(tree, _with_water(layer))
+        tree = _merged(tree, _with_silt(layer))
     return check_scenario(tree, source)
 
 
@@ -191,8 +192,15 @@ def check_scenario(tree: dict[str, Any], source: str) -> Scenario:
 
 
 def describe_fault(fault: ValidationError, model: type[BaseModel]) -> str:
-    """Say in one line which field of `model` is wrong, what was found and what is allowed (the first fault only)."""
-    first = fault.errors(include_url=False)[0]
+    """Say in one line which field of `model` is wrong, what was found and what is allowed (the first fault only).
+
+    Names of an older scenario are told all at once, each with what became of it.
+    """
+    faults = fault.errors(include_url=False)
+    old = [(dotted, became(dotted, one["input"])) for one in faults for dotted in (".".join(map(str, one["loc"])),)]
+    if any(words for _, words in old):
+        return "; ".join(f"{dotted}: {words}" for dotted, words in old if words)
+    first = faults[0]
     where = ".".join(str(part) for part in first["loc"]) or "scenario"
     if first["type"] == "extra_forbidden":
         *parents, unknown = [str(part) for part in first["loc"]]
@@ -219,7 +227,7 @@ def parse_overrides(items: list[str]) -> dict[str, Any]:
     for item in items:
         name, equals, text = item.partition("=")
         if not equals or not name.strip():
-            raise InputError(f"--set: '{item}', must be FIELD=VALUE such as tank.silt=0")
+            raise InputError(f"--set: '{item}', must be FIELD=VALUE such as mission.standoff_m=0.6")
         try:
             overrides[name.strip()] = read_yaml(text)
         except YamlError as fault:
@@ -271,12 +279,13 @@ def _read_yaml(path: Path) -> dict[str, Any]:
     return tree
 
 
-def _with_water(layer: dict[str, Any]) -> dict[str, Any]:
-    """The layer with what its kind of water says and it does not, so that this replaces what lies below."""
+def _with_silt(layer: dict[str, Any]) -> dict[str, Any]:
+    """The layer with what its kind of silt says and it does not, so that this replaces what lies below."""
     tank = layer.get("tank")
-    if not isinstance(tank, dict) or not isinstance(tank.get("water"), str):
+    silt = tank.get("silt") if isinstance(tank, dict) else None
+    if not isinstance(tank, dict) or not isinstance(silt, dict) or not isinstance(silt.get("kind"), str):
         return layer
-    return layer | {"tank": WATERS.get(tank["water"], {}) | tank}
+    return layer | {"tank": tank | {"silt": SILTS.get(silt["kind"], {}) | silt}}
 
 
 def _nested(dotted: str, value: Any) -> dict[str, Any]:

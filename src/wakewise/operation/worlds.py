@@ -25,16 +25,17 @@ START_SPREAD_M, START_SPREAD_RAD = 0.02, 0.03
 def true_vehicle(parts: Parts) -> Vehicle:
     """What the world flies: the believed vehicle with the mismatch that the seed draws."""
     tank, rng = parts.scenario.tank, parts.seeds.plant()
-    trim_N = tank.trim_N
+    apart = tank.mismatch
+    trim_N = apart.trim_N
     if trim_N is None:
-        trim_N = float(rng.uniform(-tank.trim_range_N, tank.trim_range_N))
+        trim_N = float(rng.uniform(-apart.trim_range_N, apart.trim_range_N))
     return perturbed(
         parts.vehicle,
         rng,
-        mass_pct=tank.mass_pct,
-        damping_pct=tank.damping_pct,
-        added_mass_pct=tank.added_mass_pct,
-        thrust_pct=tank.thrust_pct,
+        mass_pct=apart.mass_pct,
+        damping_pct=apart.damping_pct,
+        added_mass_pct=apart.added_mass_pct,
+        thrust_pct=apart.thrust_pct,
         trim_N=trim_N,
         water_density_kg_m3=tank.density_kg_m3,
     )

@@ -20,9 +20,10 @@ from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.interfaces import WakeModel
 from wakewise.planning.condensing import add_commands, add_rate_gradient, condense, condensed_room, motion_gradient
-from wakewise.planning.kernels import CLOSEST, RATE_N, PlanCase, PlanTable, horizon, plan_work, set_reach
+from wakewise.planning.kernels import CLOSEST, RATE_N, W_DISTURBANCE, PlanCase, PlanTable, horizon, plan_work, set_reach
 from wakewise.planning.problem import (
     BARRIER_REACH_M,
+    CLEARANCE_M,
     EDGE_DEG,
     RATE_LIMIT_N_S,
     RATE_PENALTY,
@@ -36,9 +37,10 @@ from wakewise.planning.qp import BoxQP
 from wakewise.planning.surroundings import Surroundings
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle, compile_body
-from wakewise.wake import gram
+from wakewise.wake import PaperJet, gram
+from wakewise.wake.numeric import NumericWake, thinned
 from wakewise.wake.plan_disturbance import wake_scratch
-from wakewise.wake.table import WakeTable, wake_table, with_smooth_edge
+from wakewise.wake.table import WakeTable, is_compiled, wake_table, with_smooth_edge
 
 BARRIER_RANGE = (0.02, 20.0)
 """Least and largest mu of the clearance barrier: it grows from plan to plan while the plan comes too close."""
@@ -56,6 +58,7 @@ class PlanModel:
     table: PlanTable
     wake_table: WakeTable
     layout: Layout
+    numeric: NumericWake | None = None
 
     @property
     def thrusters(self) -> int:
@@ -83,8 +86,7 @@ def compile_plan(
     Raises
     ------
     InputError
-        Limits with min > max or not finite, no points, weights that are negative or NaN, a wake model without
-        derivatives.
+        Limits with min > max or not finite, no points, weights that are negative or NaN.
     """
     lower = np.array(vehicle.thrust_lower_N if lower_N is None else lower_N, dtype=np.float64)
     upper = np.array(vehicle.thrust_upper_N if upper_N is None else upper_N, dtype=np.float64)
@@ -116,7 +118,7 @@ def compile_plan(
         RATE_LIMIT_N_S * h,
         RATE_PENALTY,
         BARRIER_REACH_M,
-        settings.clearance_m,
+        CLEARANCE_M,
         terms.w_disturbance,
     ]
     table = PlanTable(
@@ -135,8 +137,12 @@ def compile_plan(
         majorise=majorise,
     )
     smooth = with_smooth_edge(wake, float(np.radians(EDGE_DEG)))
+    numeric = None if is_compiled(smooth) else _numeric(smooth, region, vehicle, terms)
+    if numeric is not None:
+        # The kernels leave D out; `Planner` adds it stage by stage.
+        table.weights[W_DISTURBANCE] = 0.0
     view = wake_table(
-        smooth,
+        smooth if numeric is None else PaperJet(),
         region.points_W_m,
         region.weights,
         vehicle.thruster_positions_B_m,
@@ -146,7 +152,22 @@ def compile_plan(
         smooth_N=SMOOTH_N,
     )
     layout = compile_layout(vehicle.allocation_matrix, np.minimum(lower, 0.0), np.maximum(upper, 0.0))
-    return PlanModel(vehicle, region, smooth, settings, terms, table, view, layout)
+    return PlanModel(vehicle, region, smooth, settings, terms, table, view, layout, numeric)
+
+
+def _numeric(wake: WakeModel, region: Region, vehicle: Vehicle, terms: PlanTerms) -> NumericWake:
+    """A wake model without kernels, over some of the region's points; weights add up to 1 as in `wake_table`."""
+    points, weights = thinned(region.points_W_m, region.weights)
+    return NumericWake(
+        model=wake,
+        points_W_m=points,
+        weights=weights / float(weights.sum()),
+        positions_B_m=vehicle.thruster_positions_B_m,
+        axes_B=vehicle.thruster_axes_B,
+        areas_m2=vehicle.disk_areas_m2,
+        coherent=terms.superposition == "coherent",
+        smooth_N=SMOOTH_N,
+    )
 
 
 class Planner:
@@ -179,12 +200,12 @@ class Planner:
     def cost(self, U: Array) -> float:
         """Objective of commands, shape (N, n), for the problem last loaded; fills the prediction."""
         self._predicted = U
-        return float(horizon(self.model.table, self.model.wake_table, self._scratch, self._case, U, self._work, False))
+        return self._roll(U, slopes=False)
 
     def gradient(self, U: Array) -> Array:
         """Gradient of the objective, shape (N n,), a view that the next call overwrites."""
         table = self.model.table
-        horizon(table, self.model.wake_table, self._scratch, self._case, U, self._work, True)
+        self._roll(U, slopes=True)
         motion_gradient(table, self._work, self._room.g)
         add_commands(table, self._case.command, U, self._room, self._steps)
         add_rate_gradient(table, self._steps, U.shape[1], self._room.g)
@@ -194,10 +215,31 @@ class Planner:
         """Objective, and gradient (N n,) and Hessian (N n, N n) (lower triangle) without the hinges of rate; views."""
         table = self.model.table
         self._predicted = U
-        J = horizon(table, self.model.wake_table, self._scratch, self._case, U, self._work, True)
+        J = self._roll(U, slopes=True)
         condense(table, self._work, self._room)
         add_commands(table, self._case.command, U, self._room, self._steps)
         return float(J), self._room.g, self._room.H
+
+    def _roll(self, U: Array, *, slopes: bool) -> float:
+        """Objective of commands; fills the work, with derivatives if asked."""
+        model, work = self.model, self._work
+        J = float(horizon(model.table, model.wake_table, self._scratch, self._case, U, work, slopes))
+        if model.numeric is None or model.terms.w_disturbance == 0.0:
+            return J
+        weight = model.table.stage_s * model.terms.w_disturbance
+        for k in range(len(U)):
+            X_WB = Pose(work.X[k, :3], work.X[k, 3:7])
+            if slopes:
+                work.D[k], gradient, H = model.numeric.stage(X_WB, work.T[k])
+                work.gx[k, :6] += weight * gradient[:6]
+                work.gT[k] += weight * gradient[6:]
+                work.Q[k] += weight * H[:6, :6]
+                work.S[k] += weight * H[6:, :6]
+                work.R[k] += model.table.majorise * weight * H[6:, 6:]
+            else:
+                work.D[k] = model.numeric.value(X_WB, work.T[k])
+        work.parts[0] += weight * float(work.D.sum())
+        return J + weight * float(work.D.sum())
 
     def load(self, problem: PlanProblem) -> None:
         """Take a problem in."""
@@ -343,7 +385,7 @@ class Planner:
         if self._predicted is not U:
             self.cost(U)
         closest, mu = self._work.parts[CLOSEST], self._case.barrier
-        factor = 4.0 if closest < self.model.settings.clearance_m else 0.7
+        factor = 4.0 if closest < CLEARANCE_M else 0.7
         mu[0] = min(max(factor * mu[0], BARRIER_RANGE[0]), BARRIER_RANGE[1])
         return Horizon(
             states=self._work.X.copy(),

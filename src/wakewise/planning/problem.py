@@ -28,8 +28,9 @@ PLAN_EVERY_S = 0.1
 RATE_LIMIT_N_S, RATE_PENALTY = 100.0, 100.0
 """Soft limit of the change of commands (N/s), which a thruster of 0.1 s reaches from 0 to 10 N, and the penalty rho of
 the squared excess (per N^2), large beside every other price of a newton."""
-BARRIER_REACH_M = 0.25
-"""Clearance from which nothing is felt; less where the goal itself is nearer."""
+CLEARANCE_M, BARRIER_REACH_M = 0.05, 0.25
+"""Clearance at which the barrier becomes steep, that of a mission, and clearance from which nothing is felt; less where
+the goal itself is nearer."""
 SMOOTH_N = 0.5
 """Thrust below which the root of thrust is rounded off, or its slope at 0 would be infinite."""
 EDGE_DEG = 3.0
@@ -77,7 +78,6 @@ class PlanSettings(Settings):
     attitude_tolerance_rad: float = Field(
         default=0.0, description="attitude error that costs nothing (rad); lets buoyancy carry load", ge=0.0, le=0.5
     )
-    clearance_m: float = Field(default=0.05, description="clearance at which the barrier becomes steep (m)", gt=0.0)
     iterations: int = Field(default=5, description="most iterations per plan; 1 is the fast mode", ge=1, le=50)
 
     @property

@@ -24,6 +24,8 @@ from wakewise.reconstruction.stereo import DepthMap, pair_depth, rectifiable
 from wakewise.reconstruction.views import Ball, View, rank_partners, read_views
 
 # Depth maps of at most this many other photos vote on a point.
+AGREEMENT_PX = 1.0
+"""Largest disparity difference of depths that agree."""
 VOTING_PHOTOS = 8
 T = TypeVar("T")
 S = TypeVar("S")
@@ -154,7 +156,7 @@ def _fuse_all(
             # The pair the other way round is no independent witness; of two photos it is the only one.
             and ({other.first, other.second} != {own.first, own.second} or (alone and other.first != own.first))
         ]
-        return fuse(maps, index, neighbours, 1 if alone else settings.agreeing_views, settings.agreement_px)
+        return fuse(maps, index, neighbours, 1 if alone else settings.agreeing_views, AGREEMENT_PX)
 
     # Cells as they come, in the order of the maps, so that all points need not be in memory at once.
     gathered = CellMeans(9, spacing)

@@ -20,8 +20,8 @@ from wakewise.reconstruction.colmap import call, settle, workroom
 from wakewise.reconstruction.lenses import Lens
 from wakewise.reconstruction.pairs import Pairs
 from wakewise.reconstruction.photos import Photo, PhotoStore
-from wakewise.reconstruction.settings import ReconstructionSettings
-from wakewise.reconstruction.sift import folder_features
+from wakewise.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
+from wakewise.reconstruction.sift import PEAK_THRESHOLD, folder_features
 
 T = TypeVar("T")
 FEW_FEATURES = 150
@@ -68,7 +68,7 @@ def match_photos(
     """
     names = [photo.name for photo in photos]
     _check_pairs(names, pairs)
-    pycolmap.set_random_seed(settings.random_seed)
+    pycolmap.set_random_seed(RANDOM_SEED)
     with whole_file(database) as whole, workroom(database, database_bytes(len(photos), len(pairs), settings)) as room:
         work = room / "database.db"
         work.touch()
@@ -213,7 +213,7 @@ def _by_colmap(
     options.sift.max_num_features = settings.max_features
     options.sift.first_octave = settings.first_octave
     # COLMAP counts the contrast per scale of an octave, and has three.
-    options.sift.peak_threshold = settings.peak_threshold / options.sift.octave_resolution
+    options.sift.peak_threshold = PEAK_THRESHOLD / options.sift.octave_resolution
     done = 0
     for batch in _batches(names, EXTRACTION_BATCHES):
         tell(done)
@@ -250,7 +250,7 @@ def _match(
     options.num_threads = settings.threads
     options.use_gpu = False
     verification = pycolmap.TwoViewGeometryOptions()
-    verification.ransac.random_seed = settings.random_seed
+    verification.ransac.random_seed = RANDOM_SEED
     pairing = pycolmap.ImportedPairingOptions()
     # COLMAP's list of pairs is split at spaces, which names may have: numbers stand for them meanwhile.
     ids = _renamed(database, lambda image: str(image.image_id))

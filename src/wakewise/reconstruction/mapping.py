@@ -19,8 +19,10 @@ from wakewise.files import whole_folder
 from wakewise.interfaces import Progress
 from wakewise.reconstruction.colmap import call, no_stderr, settle, workroom
 from wakewise.reconstruction.photos import PhotoStore
-from wakewise.reconstruction.settings import ReconstructionSettings
+from wakewise.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
 
+# Most iterations of a bundle adjustment; fewer registered photos than that are a failure.
+BUNDLE_ITERATIONS, MIN_REGISTERED = 100, 3
 # Largest reprojection errors that are let pass, one after the other, until the mean is small enough (COLMAP's own: 4).
 CUTS_PX = (2.0, 1.5, 1.0, 0.75)
 MIN_ANGLE_DEG = 1.5
@@ -84,7 +86,7 @@ def map_photos(
         )
     model = max(models.values(), key=lambda one: one.num_reg_images())
     registered = model.num_reg_images()
-    least = min(settings.min_registered, photos)
+    least = min(MIN_REGISTERED, photos)
     if registered < least:
         raise StageError(f"mapping: {registered} of {photos} photos register, at least {least} must")
     _tighten(model, settings)
@@ -97,7 +99,7 @@ def map_photos(
         "suspicion": None,
     }
     if references is not None:
-        figures = _align(model, references, settings) | _plausibility(model)
+        figures = _align(model, references) | _plausibility(model)
     colour_points(model, store or PhotoStore(folder), settings.threads)
     error_px = float(model.compute_mean_reprojection_error())
     figures |= {
@@ -135,19 +137,19 @@ def _solve(
     if settings.mapper == "global":
         options = pycolmap.GlobalPipelineOptions()
         options.num_threads = settings.threads
-        options.random_seed = settings.random_seed
-        options.mapper.random_seed = settings.random_seed
+        options.random_seed = RANDOM_SEED
+        options.mapper.random_seed = RANDOM_SEED
         options.mapper.num_threads = settings.threads
         adjustment = options.mapper.bundle_adjustment
-        adjustment.ceres.solver_options.max_num_iterations = settings.bundle_iterations
+        adjustment.ceres.solver_options.max_num_iterations = BUNDLE_ITERATIONS
         adjustment.refine_focal_length = adjustment.refine_extra_params = settings.refine_camera
         # It takes no cancellation token: an interrupt waits for its end.
         found = call(lambda **_: pycolmap.global_mapping(database, folder, out, options=options), "mapping", watch)
         return dict(found)
     options = pycolmap.IncrementalPipelineOptions()
     options.num_threads = settings.threads
-    options.random_seed = settings.random_seed
-    options.mapper.random_seed = settings.random_seed
+    options.random_seed = RANDOM_SEED
+    options.mapper.random_seed = RANDOM_SEED
     options.min_model_size = min(3, photos)
     options.ba_refine_focal_length = options.ba_refine_extra_params = settings.refine_camera
     options.mapper.abs_pose_refine_focal_length = options.mapper.abs_pose_refine_extra_params = settings.refine_camera
@@ -163,7 +165,7 @@ def _solve(
     options.ba_global_frames_ratio = options.ba_global_points_ratio = GROWTH
     # Two threads sum in any order, so that the same photos gave a few other points; they took as long as one, too.
     options.ba_min_num_residuals_for_cpu_multi_threading = NEVER
-    options.ba_global_max_num_iterations = settings.bundle_iterations
+    options.ba_global_max_num_iterations = BUNDLE_ITERATIONS
     if settings.position_priors:
         options.use_prior_position = True
         options.use_robust_loss_on_prior_position = True
@@ -202,7 +204,7 @@ def _tighten(model: pycolmap.Reconstruction, settings: ReconstructionSettings) -
         options = pycolmap.BundleAdjustmentOptions()
         options.print_summary = False
         options.refine_focal_length = options.refine_extra_params = settings.refine_camera
-        options.ceres.solver_options.max_num_iterations = settings.bundle_iterations
+        options.ceres.solver_options.max_num_iterations = BUNDLE_ITERATIONS
         options.ceres.solver_options.num_threads = settings.threads
         options.ceres.min_num_residuals_for_cpu_multi_threading = NEVER
         with no_stderr():  # it announces itself whatever the level of logging
@@ -239,9 +241,7 @@ def colour_points(model: pycolmap.Reconstruction, store: PhotoStore, threads: in
         model.points3D[point_id].color = mean[row]
 
 
-def _align(
-    model: pycolmap.Reconstruction, references: dict[str, Array], settings: ReconstructionSettings
-) -> dict[str, Any]:
+def _align(model: pycolmap.Reconstruction, references: dict[str, Array]) -> dict[str, Any]:
     """Bring the model into the references' frame; error over every registered photo that has a reference."""
     paired = [
         (image.projection_center(), references[image.name])
@@ -252,7 +252,7 @@ def _align(
         raise StageError(f"alignment: {len(paired)} registered photos have a reference position, at least 3 must")
     centres, wanted = (np.array(column) for column in zip(*paired, strict=True))
     try:
-        similarity, inliers = robust_similarity(centres, wanted, np.random.default_rng(settings.random_seed))
+        similarity, inliers = robust_similarity(centres, wanted, np.random.default_rng(RANDOM_SEED))
     except InputError as error:
         raise StageError(f"alignment of the cameras: {error}") from None
     error_mm = 1e3 * np.linalg.norm(similarity.apply(centres) - wanted, axis=1)

@@ -14,6 +14,8 @@ from wakewise.reconstruction.settings import ReconstructionSettings
 
 Pairs = list[tuple[str, str]]
 # Views whose axes differ by more hardly share a SIFT match (Mikolajczyk & Schmid 2005, doi 10.1109/TPAMI.2005.188).
+EXHAUSTIVE_UP_TO, SEQUENCE_OVERLAP, POSE_NEIGHBOURS = 80, 10, 8
+"""Photos up to which `auto` matches every pair; photos that each is matched with, in sequence and by poses."""
 MAX_ANGLE_RAD = np.radians(45.0)
 
 
@@ -45,9 +47,9 @@ def choose_pairs(
         axes = None
         if axes_W is not None and all(name in axes_W for name in names):
             axes = np.array([axes_W[name] for name in names])
-        return pose_pairs(names, centres, axes, settings.pose_neighbours)
-    if settings.matching == "sequential" or (settings.matching == "auto" and len(names) > settings.exhaustive_up_to):
-        return sequence_pairs(names, settings.sequence_overlap)
+        return pose_pairs(names, centres, axes, POSE_NEIGHBOURS)
+    if settings.matching == "sequential" or (settings.matching == "auto" and len(names) > EXHAUSTIVE_UP_TO):
+        return sequence_pairs(names, SEQUENCE_OVERLAP)
     return list(combinations(names, 2))
 
 

@@ -16,7 +16,7 @@ from wakewise.interfaces import Progress
 from wakewise.processes import half_done
 from wakewise.reconstruction.clouds import Cloud, read_cloud, write_cloud
 from wakewise.reconstruction.colmap import call
-from wakewise.reconstruction.settings import ReconstructionSettings
+from wakewise.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
 from wakewise.reconstruction.stages import need_room
 from wakewise.reconstruction.views import Ball
 
@@ -82,7 +82,7 @@ def patch_match(
         raise StageError(f"dense: {keep.sum()} points survive patch-match, at least 100 must")
     points = cloud.points_m[keep]
     write_cloud(out, Cloud(points_m=points, normals=cloud.normals[keep], colours=cloud.colours[keep]))
-    some = np.random.default_rng(settings.random_seed).choice(len(points), min(len(points), 2000), replace=False)
+    some = np.random.default_rng(RANDOM_SEED).choice(len(points), min(len(points), 2000), replace=False)
     spacing = float(np.median(np.asarray(KDTree(points).query(points[some], k=2)[0])[:, 1]))
     maps = len(pycolmap.Reconstruction(sparse).images)
     return {"dense_points": len(points), "depth_maps": maps, "point_spacing_mm": 1e3 * spacing}

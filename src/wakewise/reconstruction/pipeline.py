@@ -32,18 +32,15 @@ from wakewise.reconstruction.views import Ball
 # Part of every stage's fingerprint: raise it when a stage's result changes for the same input.
 VERSION = 6
 _STAGES = {
-    "match": ("detector", "max_features", "first_octave", "peak_threshold", "random_seed"),
+    "match": ("detector", "max_features", "first_octave"),
     "map": (
         "mapper",
-        "bundle_iterations",
         "refine_camera",
         "reprojection_px",
         "position_priors",
         "prior_sigma_m",
-        "min_registered",
-        "random_seed",
     ),
-    "dense": ("dense", "dense_px", "dense_zoom", "stereo_paths", "stereo_partners", "agreeing_views", "agreement_px"),
+    "dense": ("dense", "dense_px", "dense_zoom", "stereo_paths", "stereo_partners", "agreeing_views"),
     "mesh": ("mesh_depth",),
 }
 

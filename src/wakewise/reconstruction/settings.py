@@ -8,6 +8,9 @@ from pydantic import Field
 
 from wakewise.settings import Settings
 
+RANDOM_SEED = 0
+"""Of every random choice: the same photos give the same model."""
+
 
 class ReconstructionSettings(Settings):
     """How photographs become a model. The defaults are one fixed rule for every target; none is fitted to one."""
@@ -21,26 +24,14 @@ class ReconstructionSettings(Settings):
     first_octave: Literal[-1, 0] = Field(
         default=-1, description="-1 doubles the photo before looking for features, for real photos; 0 is 4 times faster"
     )
-    peak_threshold: float = Field(
-        default=0.02,
-        gt=0.0,
-        le=0.3,
-        description="smallest SIFT contrast, grey levels 0 to 1, over all 3 scales of an octave",
-    )
     matching: Literal["auto", "exhaustive", "sequential", "poses"] = Field(
         default="auto",
         description="which photos to match: all pairs, neighbours in order of name (and laps by ever wider steps), or "
         "neighbours by known camera poses; auto takes poses if known, else all pairs of a small set",
     )
-    exhaustive_up_to: int = Field(
-        default=80, ge=3, description="photos up to which auto matches every pair; more: in sequence"
-    )
-    sequence_overlap: int = Field(default=10, ge=2, le=100, description="photos that each is matched with, in sequence")
-    pose_neighbours: int = Field(default=8, ge=2, le=100, description="photos that each is matched with, by poses")
     mapper: Literal["incremental", "global"] = Field(
         default="incremental", description="one photo after the other, or all at once (GLOMAP)"
     )
-    bundle_iterations: int = Field(default=100, ge=1, le=1000, description="most iterations of a bundle adjustment")
     reprojection_px: float = Field(
         default=0.5,
         gt=0.0,
@@ -61,7 +52,6 @@ class ReconstructionSettings(Settings):
         le=100.0,
         description="standard deviation of a known camera position, m, where priors pull",
     )
-    min_registered: int = Field(default=3, ge=3, description="fewer registered photos than this is a failure")
     dense: Literal["stereo", "patch-match"] = Field(
         default="stereo", description="dense points by semi-global stereo, or by COLMAP's patch-match, which needs CUDA"
     )
@@ -76,12 +66,8 @@ class ReconstructionSettings(Settings):
         default=3, ge=1, le=8, description="neighbours that each photo is paired with for stereo"
     )
     agreeing_views: int = Field(default=2, ge=1, le=10, description="other depth maps that must agree with a point")
-    agreement_px: float = Field(
-        default=1.0, gt=0.0, le=5.0, description="largest disparity difference of depths that agree"
-    )
     mesh: bool = Field(default=True, description="make a surface mesh from the dense points")
     mesh_depth: int = Field(default=9, ge=6, le=12, description="greatest octree depth of the Poisson surface")
     threads: int = Field(
         default=2, ge=1, le=64, description="threads of feature extraction, matching, mapping and stereo"
     )
-    random_seed: int = Field(default=0, ge=0, description="seed of every random choice")

@@ -19,6 +19,8 @@ from wakewise.reconstruction.photos import Image, PhotoStore
 from wakewise.reconstruction.settings import ReconstructionSettings
 
 # OpenCV always doubles a photo first; the doubled one is kept to what COLMAP takes at most (its max_image_size).
+PEAK_THRESHOLD = 0.02
+"""Smallest SIFT contrast, grey levels 0 to 1, over all 3 scales of an octave."""
 MAX_DOUBLED_PX = 3200
 # Photos whose grey levels (1st to 99th percentile) span less are stretched to twice that, at most 8 times: the contrast
 # threshold would drop everything in the dark or in haze.
@@ -44,7 +46,7 @@ def photo_features(image: Image, settings: ReconstructionSettings) -> Features:
         small = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
     # Without the precise upscale keypoints are a quarter of a pixel to the right and below.
     detector = cv2.SIFT.create(
-        nfeatures=settings.max_features, contrastThreshold=settings.peak_threshold, enable_precise_upscale=True
+        nfeatures=settings.max_features, contrastThreshold=PEAK_THRESHOLD, enable_precise_upscale=True
     )
     points, raw = detector.detectAndCompute(small, None)
     if not points:

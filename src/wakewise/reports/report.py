@@ -223,8 +223,7 @@ def _water(trial: Trial) -> str:
             figures.water_over_time(trial),
             "water and position over time",
             f"Shading separates the legs.{ticks} D is no measurement: it is the controller's own wake model, asked how "
-            "fast the jets move the points that its method watches (weighted sum of squared speeds), and what its "
-            "method keeps low.",
+            "fast the jets move the points that its method watches (weighted sum of squared speeds).",
             gap,
             narrow=figures.water_over_time(trial, narrow=True),
         )

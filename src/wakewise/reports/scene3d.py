@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import contextlib
 import io
+from collections.abc import AsyncIterator, Iterator
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import trimesh
 import viser
+import websockets.asyncio.server
 
 from wakewise.arrays import Array, IntArray
 from wakewise.errors import InputError
@@ -55,7 +58,8 @@ def scene_html(trial: Trial, errors: ModelErrors | None) -> str | None:
         return None
     # viser greets on standard output, which belongs to the command line's own answer.
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        with _unheard():
+            server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
             scene = server.scene
             scene.set_up_direction("+z")
@@ -70,6 +74,22 @@ def scene_html(trial: Trial, errors: ModelErrors | None) -> str | None:
         finally:
             server.stop()
     return html
+
+
+@contextlib.contextmanager
+def _unheard() -> Iterator[None]:
+    """Keep viser's server from listening: nobody is to connect, and a report needs no port, not even a local one."""
+
+    @contextlib.asynccontextmanager
+    async def closed(*_: object, **__: object) -> AsyncIterator[SimpleNamespace]:
+        yield SimpleNamespace(server=SimpleNamespace(sockets=()))
+
+    served = websockets.asyncio.server.serve
+    websockets.asyncio.server.serve = closed  # type: ignore[assignment,misc]
+    try:
+        yield
+    finally:
+        websockets.asyncio.server.serve = served  # type: ignore[misc]
 
 
 def _aim(server: viser.ViserServer, trial: Trial) -> None:

@@ -58,44 +58,68 @@ def _headline(values: Mapping[str, Any]) -> str:
     name, paper = main_flow(values), values["paper"]
     if name is None:
         return "<h1>No flow could be had.</h1>"
-    printed = values["models"]["paper"][name]
-    best = max(
-        (model for model in values["models"] if values["models"][model][name]["r2_core"] is not None),
-        key=lambda model: values["models"][model][name]["r2_core"],
-        default=None,
-    )
-    fails = _literal_fails(values)
-    state = "bad" if fails else ""
-    head = (
-        "As printed, the paper's formula does not describe a thruster's jet."
-        if fails
-        else "The paper's formula as printed meets at least one of the flows."
-    )
+    printed, ranked = values["models"]["paper"][name], _ranked(values)
+    tiles, head, state, lines = [], "No model could be tested.", "", []
+    if ranked:
+        best, worst = ranked[0]
+        good = worst >= _FAIR
+        state = "good" if worst >= _GOOD else "" if good else "bad"
+        head = f"Use {best}." if good else f"No model fits every flow; {best} comes nearest."
+        flows = sum(values["models"][best][flow]["r2_core"] is not None for flow in values["flows"])
+        lines.append(f"{best} ({_WORDS.get(best, best)}): its R2 is {_number(worst)} or better on all {flows} flows.")
+        if len(ranked) > 1:
+            second, low = ranked[1]
+            lines[-1] += f" Next comes {second} ({_WORDS.get(second, second)}) with {_number(low)} at its worst."
+        tiles += _tiles_of(best, values["models"][best][name], _SEEN.get(name, name))
     seen = _SEEN.get(name, name)
-    tiles = [
+    tiles += [
         tile("paper claims", f"{paper['r2_core']:g}", "", f"R2 in A, {paper['r2_wake']:g} in B"),
-        tile("as printed, A", _number(printed["r2_core"]), "", f"R2 against the {seen}", "off"),
-        tile("as printed, B", _number(printed["r2_wake"]), "", f"R2 against the {seen}", "off"),
+        tile("as printed, A", _floored(printed["r2_core"]), "", f"R2 against the {seen}", "off"),
+        tile("as printed, B", _floored(printed["r2_wake"]), "", f"R2 against the {seen}", "off"),
     ]
-    if best is not None:
-        cell = values["models"][best][name]
-        for region, key in (("A", "r2_core"), ("B", "r2_wake")):
-            good = cell[key] is not None and cell[key] >= _GOOD
-            tiles.append(
-                tile(f"{best}, {region}", _number(cell[key]), "", f"R2 against the {seen}", "ok" if good else "off")
-            )
     grid = values["grid_convergence_pct"]
     tiles.append(
         tile("two grids", "—" if grid is None else f"{grid:.1f}", "%", "change of the lattice's speed at 0.3 m")
     )
-    sentence = (
-        "R2 is negative where a model is farther from the flow than a single mean speed would be. Calibrated models "
-        "are tested on thrusts and positions that their fit has not seen."
+    lines.append(
+        "As printed, the paper's formula does not describe a thruster's jet."
+        if _literal_fails(values)
+        else "The paper's formula as printed meets at least one of the flows."
     )
+    lines.append(
+        "R2 is 1 for a model that is right everywhere, and negative where it is farther from the flow than a single "
+        "mean speed would be. Calibrated models are tested on thrusts and positions that their fit has not seen."
+    )
+    said = "".join(f'<p class="why">{escape(line)}</p>' for line in lines)
     return (
-        f'<p class="eyebrow"><span>wake models against flows</span></p><h1 class="{state}"><span class="mark"></span>'
-        f'{head}</h1><p class="why">{sentence}</p><dl class="tiles">{"".join(tiles)}</dl>'
+        f'<p class="eyebrow"><span>which wake model to use</span></p><h1 class="{state}"><span class="mark"></span>'
+        f'{escape(head)}</h1>{said}<dl class="tiles">{"".join(tiles)}</dl>'
     )
+
+
+def _ranked(values: Mapping[str, Any]) -> list[tuple[str, float]]:
+    """Models with their worst R2 over all flows and both regions, the best model first; the untested are left out."""
+    found = []
+    for model, cells in values["models"].items():
+        known = [cell[key] for cell in cells.values() for key in ("r2_core", "r2_wake") if cell[key] is not None]
+        if known:
+            found.append((model, min(known)))
+    return sorted(found, key=lambda each: -each[1])
+
+
+def _tiles_of(model: str, cell: Mapping[str, Any], seen: str) -> list[str]:
+    return [
+        tile(
+            f"{model}, {region}", _number(cell[key]), "", f"R2 against the {seen}",
+            "ok" if cell[key] is not None and cell[key] >= _GOOD else "off",
+        )
+        for region, key in (("A", "r2_core"), ("B", "r2_wake"))
+    ]  # fmt: skip
+
+
+def _floored(value: float | None) -> str:
+    """R2 for the head of the page: below -1 how far below says nothing more; the table has the number."""
+    return "below −1" if value is not None and value < -1.0 else _number(value)
 
 
 def _literal_fails(values: Mapping[str, Any]) -> bool:
@@ -126,7 +150,9 @@ def _table(result: WakeValidation, values: Mapping[str, Any]) -> str:
     lead = (
         "Models down, flows across, on the rows that were held out. R2 = 1 − Σ(u − model)² / Σ(u − mean)² of the speed "
         "along the jet, the mean taken per thrust, so that some thrusts being stronger explains nothing. "
-        "“paper” and “linear” are not calibrated; the others are, on each flow's training part."
+        "“paper” and “linear” are not calibrated; the others are, on each flow's training part. The flows: "
+        + "; ".join(f"<b>{escape(name)}</b>, {escape(flow['title'])}" for name, flow in values["flows"].items())
+        + "."
     )
     return section("table", "How good is each model?", lead, tables + _plainly(values))
 

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wakewise.arrays import Array
+from wakewise.physics import FRESH_WATER_KG_M3
 from wakewise.reports.ink import CORAL, INK, LINE, MUTED, SAND, SLATE, TEAL, VIOLET, dress, new_figure
 from wakewise.studies.wake_validation import MeasuredFlow, WakeValidation, axial_decay, exit_speeds, find_flow, profile
 from wakewise.wake.jets import AxialJet
@@ -149,7 +150,7 @@ def _line(axes: Axes, name: str, x: Array, y: Array) -> None:
 def _exit_share(model: AxialJet, flow: MeasuredFlow, x: Array, r: Array) -> Array:
     """Speed of a model over the exit speed for the flow's disk, which no longer depends on thrust."""
     area = flow.samples.disk_area_m2
-    return np.asarray(model.speed(x, r, 1.0, area) * np.sqrt(998.0 * area))
+    return np.asarray(model.speed(x, r, 1.0, area) * np.sqrt(FRESH_WATER_KG_M3 * area))
 
 
 def _short(value: float | None) -> str:

@@ -17,8 +17,8 @@ _UNITS = (
 
 GROUPS: dict[str, tuple[str, ...]] = {
     "The model": (
-        "success", "rmse_mm", "rmse_cap_mm", "accuracy", "completeness", "visible", "f_score", "icp", "cloud", "truth",
-        "dense", "mesh",
+        "success", "rmse_mm", "rmse_cap_mm", "accuracy", "completeness", "visible", "f_score", "icp", "outside",
+        "cloud", "truth", "dense", "mesh",
     ),
     "The photographs": (
         "images", "registered", "features", "inlier", "reprojection", "cameras", "points", "sharpness", "sparse",

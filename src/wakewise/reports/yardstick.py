@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import dataclass
 from html import escape
 
@@ -17,6 +18,8 @@ from wakewise.reports.words import number
 
 ALIKE = 0.03
 """Two figures this near to one another, relative, are called the same."""
+UNIT, NO_BREAK = re.compile(r"(?<=\d) (?=[m%µP])"), "\u00a0"
+"""The space before a unit, at which no line may end."""
 SELDOM = 0.05
 """Grains that move for less than this share of the time are said to, and not held against the flight."""
 SMALL = 0.25
@@ -146,7 +149,7 @@ def against_grains(trial: Trial) -> Yardstick | None:
     over = _share_over(trial, moves)
     grains = "The bed's grains"
     if trial.settings is not None:
-        grains = f"The bed's grains, {number(1e6 * trial.settings.tank.grain_m)} µm across,"
+        grains = f"The bed's grains, {number(1e6 * trial.settings.tank.silt.grain_m)} µm across,"
     words = (
         f"{grains} move from a pull of {number(moves)} Pa on; where the water pulls hardest near the target (one place "
         f"in twenty) it is {number(pull)} Pa on average, {_share(pull / moves)} of that."
@@ -203,5 +206,5 @@ def _card(found: Yardstick) -> str:
     return (
         f'<div class="yardstick"><h3>{escape(found.question)}</h3>'
         f'<p class="verdict {state}">{escape(found.verdict)}</p>'
-        f"{bars}<p>{escape(found.sentence)}</p></div>"
+        f"{bars}<p>{UNIT.sub(NO_BREAK, escape(found.sentence))}</p></div>"
     )

@@ -16,9 +16,9 @@ from scipy.interpolate import RegularGridInterpolator
 
 from wakewise.arrays import Array
 from wakewise.interfaces import Flow
+from wakewise.physics import FRESH_WATER_KG_M3 as WATER_DENSITY_KG_M3
 from wakewise.water import Water
 
-WATER_DENSITY_KG_M3 = 998.0
 DISK_DIAMETER_M = 0.06
 """Disk of the paper's vehicle."""
 

@@ -176,7 +176,7 @@ def fly_course(course: Course, method: str, w_track: float, seed: int) -> Flown:
     base = ControlSettings(wake=WakeSettings(**WAKE_OF["paper"]), levers=LeverSettings(**OFF))
     control = base.model_copy(update={"plan": obeying(base.plan, w_track)})
     plant_rng, _ = np.random.default_rng([seed, 13]).spawn(2)
-    trim_N = float(plant_rng.uniform(-tank.trim_range_N, tank.trim_range_N))
+    trim_N = float(plant_rng.uniform(-tank.mismatch.trim_range_N, tank.mismatch.trim_range_N))
     true = perturbed(
         vehicle,
         plant_rng,
@@ -184,7 +184,7 @@ def fly_course(course: Course, method: str, w_track: float, seed: int) -> Flown:
         damping_pct=30.0,
         added_mass_pct=20.0,
         thrust_pct=5.0,
-        trim_N=-tank.trim_range_N if course.sinks else trim_N,
+        trim_N=-tank.mismatch.trim_range_N if course.sinks else trim_N,
     )
     watch = target.centre_W_m if course.watches else None
     rest = Intent(velocity_W_m_s=np.zeros(3), watch_W_m=watch)

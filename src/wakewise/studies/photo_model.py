@@ -13,9 +13,8 @@ from wakewise.interfaces import Progress, no_progress
 from wakewise.reconstruction import ReconstructionSettings, read_cloud, reconstruct
 from wakewise.studies.photo_sets import PhotoSet
 from wakewise.targets import Target
+from wakewise.trials.trial import REGION_SHARE
 
-REGION_SHARE = 1.25
-"""What is reconstructed is a little more than the target: estimated cameras put it some millimetres off its place."""
 _MODEL_FIGURES = (
     "images",
     "registered_images",

@@ -10,7 +10,7 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
-from wakewise.studies.flows import WATER_DENSITY_KG_M3
+from wakewise.physics import FRESH_WATER_KG_M3 as WATER_DENSITY_KG_M3
 from wakewise.wake.calibration import Split
 from wakewise.wake.samples import CORE, JetSamples
 from wakewise.wake.scores import score_speeds

@@ -17,6 +17,7 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.interfaces import Progress, no_progress
+from wakewise.physics import FRESH_WATER_KG_M3
 from wakewise.studies.flows import BLAAUW_VAN_DE_KAA, FUEHRER_ROEMISCH, JetFlow, ParcelJet
 from wakewise.studies.oracle import grid_convergence_pct, oracle_jets
 from wakewise.studies.real_jet import read_air_jet
@@ -299,7 +300,7 @@ def axial_decay(samples: JetSamples, half_width_m: float = 6e-3) -> tuple[Array,
 
 def exit_speeds(samples: JetSamples) -> Array:
     """Exit speed sqrt(T / (rho A)) of every row, shape (n,)."""
-    return np.asarray(np.sqrt(samples.thrust_N / (998.0 * samples.disk_area_m2)))
+    return np.asarray(np.sqrt(samples.thrust_N / (FRESH_WATER_KG_M3 * samples.disk_area_m2)))
 
 
 def find_flow(result: WakeValidation, name: str) -> MeasuredFlow:

@@ -15,7 +15,7 @@ from wakewise.tank.holding import Holding, holding
 from wakewise.tank.plant import VehiclePlant
 from wakewise.tank.sensors import Sensors
 from wakewise.tank.settings import TankSettings, ThrusterFailure
-from wakewise.tank.tank import Tank
+from wakewise.tank.tank import Tank, tank_ambient
 from wakewise.tank.tether import Tether
 from wakewise.tank.world import TankWorld
 
@@ -31,4 +31,5 @@ __all__ = [
     "beam_attenuation_per_m",
     "build_ambient",
     "holding",
+    "tank_ambient",
 ]

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from wakewise.errors import InputError
 from wakewise.interfaces import Current
-from wakewise.tank.settings import TankSettings
+from wakewise.plugins import find, offered
+from wakewise.tank.settings import EDDY_M, TankSettings
 from wakewise.water import AiryWave, AmbientSum, BackgroundTurbulence, PumpJet, SteadyCurrent, read_current_series
 from wakewise.water.current_series import CurrentSeries
 
@@ -24,37 +26,37 @@ def build_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSu
     """
     length, width, depth = settings.size_m
     parts: list[Current] = []
-    if settings.current_file is not None:
-        parts.append(_series(settings))
-    elif any(settings.current_m_s):
-        parts.append(SteadyCurrent(velocity_W_m_s=np.array(settings.current_m_s)))
-    if settings.wave_amplitude_m > 0.0:
+    if settings.current.file is not None:
+        parts.append(_current(settings))
+    elif any(settings.current.velocity_m_s):
+        parts.append(SteadyCurrent(velocity_W_m_s=np.array(settings.current.velocity_m_s)))
+    if settings.waves.amplitude_m > 0.0:
         parts.append(
             AiryWave(
-                amplitude_m=settings.wave_amplitude_m,
-                period_s=settings.wave_period_s,
-                heading_rad=math.radians(settings.wave_heading_deg),
+                amplitude_m=settings.waves.amplitude_m,
+                period_s=settings.waves.period_s,
+                heading_rad=math.radians(settings.waves.heading_deg),
                 depth_m=depth,
             )
         )
-    if settings.pump_speed_m_s > 0.0:
-        x, y, z = settings.pump_at_m
+    if settings.pump.speed_m_s > 0.0:
+        x, y, z = settings.pump.at_m
         if abs(x) > length / 2 or abs(y) > width / 2 or not 0.0 <= z <= depth:
             raise InputError(
-                f"tank.pump_at_m: ({x:g}, {y:g}, {z:g}) m is outside the water of {length:g} x {width:g} x {depth:g} m"
+                f"tank.pump.at_m: ({x:g}, {y:g}, {z:g}) m is outside the water of {length:g} x {width:g} x {depth:g} m"
             )
         parts.append(
             PumpJet(
-                outlet_W_m=np.array(settings.pump_at_m),
-                towards_W=np.array(settings.pump_towards),
-                speed_m_s=settings.pump_speed_m_s,
-                diameter_m=settings.pump_diameter_m,
+                outlet_W_m=np.array(settings.pump.at_m),
+                towards_W=np.array(settings.pump.towards),
+                speed_m_s=settings.pump.speed_m_s,
+                diameter_m=settings.pump.diameter_m,
                 bed_z_m=depth,
                 reach_m=math.hypot(length, width),
             )
         )
-    if settings.background_m_s > 0.0:
-        parts.append(BackgroundTurbulence.drawn(settings.background_m_s, settings.background_length_m, rng))
+    if settings.current.turbulence_m_s > 0.0:
+        parts.append(BackgroundTurbulence.drawn(settings.current.turbulence_m_s, EDDY_M, rng))
     return AmbientSum(parts=tuple(parts))
 
 
@@ -63,19 +65,28 @@ def mean_current_m_s(settings: TankSettings, duration_s: float) -> tuple[float, 
 
     A series is looked at four times a second, for as long as it lasts. Waves, pump and turbulence do not count.
     """
-    if settings.current_file is None:
-        return settings.current_m_s
-    series = _series(settings)
-    times = np.arange(0.0, min(duration_s, series.end_s), 0.25)
+    if settings.current.file is None:
+        return settings.current.velocity_m_s
+    series = _current(settings)
+    times = np.arange(0.0, min(duration_s, float(getattr(series, "end_s", math.inf))), 0.25)
     north, east, down = np.mean([series.velocity(np.zeros((1, 3)), float(t))[0] for t in times], axis=0)
     return float(north), float(east), float(down)
 
 
+def _current(settings: TankSettings) -> Current:
+    """What the settings name in place of a steady current: a series' file, or a current from outside."""
+    named = settings.current.file or ""
+    if not Path(named).expanduser().exists() and (named in offered("current") or ":" in named):
+        make: Callable[[], Current] = find("current", named, {}).maker
+        return make()
+    return _series(settings)
+
+
 def _series(settings: TankSettings) -> CurrentSeries:
     return read_current_series(
-        Path(settings.current_file or "").expanduser(),
-        start_s=settings.current_file_from_s,
-        stop_s=settings.current_file_to_s,
-        gain=settings.current_file_gain,
-        longest_gap_s=settings.current_file_gap_s,
+        Path(settings.current.file or "").expanduser(),
+        start_s=settings.current.from_s,
+        stop_s=settings.current.to_s,
+        gain=settings.current.gain,
+        longest_gap_s=settings.current.gap_s,
     )

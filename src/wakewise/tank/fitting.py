@@ -30,7 +30,7 @@ def check_fit(settings: TankSettings, vehicle: Vehicle, route: Sequence[tuple[fl
         Naming the field, what was found and what is allowed.
     """
     _check_failures(settings, vehicle, route[-1][0])
-    if settings.tether_diameter_m > 0.0:
+    if settings.tether.diameter_m > 0.0:
         _check_tether(settings, vehicle, route)
 
 
@@ -53,15 +53,15 @@ def _check_failures(settings: TankSettings, vehicle: Vehicle, end_s: float) -> N
 
 
 def _check_tether(settings: TankSettings, vehicle: Vehicle, route: Sequence[tuple[float, Pose]]) -> None:
-    held_B = np.array(settings.tether_at_B_m)
+    held_B = np.array(settings.tether.at_B_m)
     if np.any(np.abs(held_B) > vehicle.size_m / 2 + _BRACKET_M):
         place = ", ".join(f"{v:g}" for v in held_B)
         half = " x ".join(f"{v:g}" for v in vehicle.size_m / 2)
-        raise InputError(f"tank.tether_at_B_m: ({place}) m is not on the hull, which reaches {half} m from its middle")
-    away = [float(np.linalg.norm(X_WB.apply(held_B) - np.array(settings.tether_from_m))) for _, X_WB in route]
+        raise InputError(f"tank.tether.at_B_m: ({place}) m is not on the hull, which reaches {half} m from its middle")
+    away = [float(np.linalg.norm(X_WB.apply(held_B) - np.array(settings.tether.from_m))) for _, X_WB in route]
     farthest = int(np.argmax(away))
-    if away[farthest] > settings.tether_length_m:
+    if away[farthest] > settings.tether.length_m:
         raise InputError(
-            f"tank.tether_length_m: {settings.tether_length_m:g}, the route is {away[farthest]:.2f} m from the winch "
+            f"tank.tether.length_m: {settings.tether.length_m:g}, the route is {away[farthest]:.2f} m from the winch "
             f"at {route[farthest][0]:.0f} s"
         )

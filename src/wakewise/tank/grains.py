@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
+from wakewise.physics import GRAVITY_M_S2
 
-GRAVITY_M_S2 = 9.80665
 VISCOSITY_M2_S = 1.0e-6  # of fresh water at 20 degrees
 VON_KARMAN = 0.40
 SAND_M = 62.5e-6  # from here on grains are sand (Wentworth 1922), which van Rijn's law is for
@@ -37,7 +37,7 @@ def threshold_stress_Pa(grain_m: float, grain_density_kg_m3: float, density_kg_m
     """Bed shear stress that moves loose grains without cohesion.
 
     For 20 um of calcite 0.063 Pa. A bed that has consolidated or holds clay or biofilm resists more; that is what
-    `TankSettings.erosion_threshold_Pa` is for.
+    `SiltSettings.threshold_Pa` is for.
     """
     number = grain_number(grain_m, grain_density_kg_m3, density_kg_m3)
     shields = 0.30 / (1 + 1.2 * number) + 0.055 * (1 - math.exp(-0.020 * number))

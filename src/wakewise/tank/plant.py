@@ -11,6 +11,7 @@ from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, matrix_from_quat
 from wakewise.interfaces import BodyState
+from wakewise.physics import GRAVITY_M_S2
 from wakewise.tank.contact import Surroundings
 from wakewise.tank.settings import ThrusterFailure
 from wakewise.tank.tether import Tether
@@ -21,7 +22,7 @@ from wakewise.vehicles.kernels import rotate
 from wakewise.vehicles.runge_kutta import rk4_kernel
 from wakewise.water.currents import AmbientSum
 
-_GRAVITY_W_M_S2 = np.array([0.0, 0.0, 9.80665])
+_GRAVITY_W_M_S2 = np.array([0.0, 0.0, GRAVITY_M_S2])
 
 
 class VehiclePlant:

@@ -11,6 +11,7 @@ from wakewise.arrays import Array, BoolArray, freeze
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.lattice import LatticeFlow, MeanField, load_mean_field
+from wakewise.physics import TRIM_WATER_KG_M3
 from wakewise.tank.contact import Surroundings
 from wakewise.tank.probe_tables import ThrustHistory
 from wakewise.targets import Mesh, Target
@@ -66,7 +67,7 @@ def probe(
     flow: str = "parcels",
     turbulence: float = 0.0,
     swirl: bool = False,
-    density_kg_m3: float = 1000.0,
+    density_kg_m3: float = TRIM_WATER_KG_M3,
     seed: int = 0,
 ) -> Probed:
     """Find the flow of a vehicle that is held at one pose while its thrusters push as told, in water at rest before.

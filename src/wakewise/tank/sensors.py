@@ -16,7 +16,7 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.geometry import Pose, quat_from_rotvec, quat_multiply
 from wakewise.interfaces import BodyState, Measurement
-from wakewise.tank.settings import TankSettings
+from wakewise.tank.settings import SensorSettings
 
 LEAST_CONTRAST = 0.1  # an assumption: detectors of printed marks work down to a contrast of some percent to a fifth
 _TICK_TOLERANCE_S = 1e-9  # a sample due at the end of a step belongs to that step
@@ -30,7 +30,7 @@ class Sensors:
     older than what was handed over before.
     """
 
-    def __init__(self, settings: TankSettings, rng: np.random.Generator) -> None:
+    def __init__(self, settings: SensorSettings, rng: np.random.Generator) -> None:
         self._settings = settings
         self._pose_rng, imu_rng, self._depth_rng, self._tracking_rng = rng.spawn(4)
         self._gyro_rng, self._force_rng = imu_rng.spawn(2)

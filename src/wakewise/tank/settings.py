@@ -13,14 +13,22 @@ Length = Annotated[float, Field(gt=0.3, le=100.0)]
 Speed = Annotated[float, Field(ge=-3.0, le=3.0)]  # beyond what most vehicles hold, which is said with the margin
 Place = tuple[float, float, float]
 
-WATERS: dict[str, dict[str, float]] = {
-    "clear": {"silt": 0.0, "suspended_mg_l": 0.0},
-    "silt": {"silt": 0.1, "suspended_mg_l": 0.0, "grain_m": 20e-6, "grain_density_kg_m3": 2710.0},
+SILTS: dict[str, dict[str, float]] = {
+    "clear": {"load_kg_m2": 0.0, "suspended_mg_l": 0.0},
+    "silt": {"load_kg_m2": 0.1, "suspended_mg_l": 0.0, "grain_m": 20e-6, "grain_density_kg_m3": 2710.0},
     # 50 mg/L of ground calcite with a median grain of 0.3 mm. It is sand: it sinks 4 cm/s, the water of a tank 1.5 m
     # deep is clear after 35 s, and no thruster keeps it up. What it tests is sand on the bed, not turbid water.
-    "caco3-50mg": {"silt": 0.0, "suspended_mg_l": 50.0, "grain_m": 3e-4, "grain_density_kg_m3": 2710.0},
+    "caco3-50mg": {"load_kg_m2": 0.0, "suspended_mg_l": 50.0, "grain_m": 3e-4, "grain_density_kg_m3": 2710.0},
 }
-"""Fields that a kind of water sets, unless they are given as well."""
+"""Fields that a kind of silt sets, unless they are given as well."""
+PLANT_STEP_S = 0.005
+"""Longest time step of the vehicle: a twentieth of a thruster's lag."""
+EDDY_M = 0.2
+"""Length of the energetic eddies of turbulence that no thruster made: near half a vehicle."""
+MAX_PARCELS = 4096
+"""Above this the jets are made coarser, and it is logged: what two cores step as fast as a flight lasts."""
+MAX_SILT_PARTICLES = 4000
+"""Above this, pairs of particles become one."""
 
 
 class ThrusterFailure(Settings):
@@ -42,50 +50,68 @@ class ThrusterFailure(Settings):
         return self
 
 
-class TankSettings(Settings):
-    """The world of a trial: water, silt, sensors, and how far the plant is from what its controller believes.
+class CurrentSettings(Settings):
+    """The water's own motion: a steady current or a measured series, and turbulence that no thruster made."""
 
-    Defaults with a source: a load of 0.1 kg/m2 lies just below the mean of all sediment on mid-shelf reefs (0.127;
-    inner shelf 0.864 kg/m2; Tebbett, Goatley and Bellwood 2017, doi 10.1371/journal.pone.0170854), of which part is
-    as fine as the silt here: a silty bed, not an average one. A jet's turbulence of 0.25 is
-    that of round jets on the axis (0.24 to 0.28; Hussein, Capp and George 1994, doi 10.1017/S002211209400323X).
-    Sensor figures are typical of small vehicles' parts and of a camera-based pose at one metre, not of one product.
-    """
-
-    size_m: tuple[Length, Length, Length] = Field((6.0, 5.0, 1.5), description="length, width and depth of the water")
-    density_kg_m3: float = Field(1000.0, gt=900.0, lt=1100.0, description="of the water; vehicles are trimmed in 1000")
-    current_m_s: tuple[Speed, Speed, Speed] = Field((0.03, 0.02, 0.0), description="steady current: north, east, down")
-    current_file: str | None = Field(
-        None, min_length=1, description="series in place of current_m_s: CSV (time_s,u,v[,w] in m/s) or NOAA's JSON"
+    velocity_m_s: tuple[Speed, Speed, Speed] = Field((0.03, 0.02, 0.0), description="steady current: north, east, down")
+    file: str | None = Field(
+        None,
+        min_length=1,
+        description="in place of velocity_m_s: a series (CSV time_s,u,v[,w], m/s; NOAA's JSON) or package.module:make",
     )
-    current_file_from_s: float = Field(0.0, ge=0.0, description="where in the series the trial starts")
-    current_file_to_s: float | None = Field(None, gt=0.0, description="where the part used ends, null for all")
-    current_file_gain: float = Field(1.0, ge=-10.0, le=10.0, description="multiplies the series")
-    current_file_gap_s: float | None = Field(
+    from_s: float = Field(0.0, ge=0.0, description="where in the series the trial starts")
+    to_s: float | None = Field(None, gt=0.0, description="where the part used ends, null for all")
+    gain: float = Field(1.0, ge=-10.0, le=10.0, description="multiplies the series")
+    gap_s: float | None = Field(
         None, gt=0.0, description="longest pause allowed in the part used, null for three median steps"
     )
-    wave_amplitude_m: float = Field(0.0, ge=0.0, le=0.5, description="of a linear wave on the surface, 0 for none")
-    wave_period_s: float = Field(3.0, gt=1.0, le=60.0, description="its period: waves below 1 Hz")
-    wave_heading_deg: float = Field(0.0, ge=-360.0, le=360.0, description="where it runs to, from north through east")
-    pump_speed_m_s: float = Field(0.0, ge=0.0, le=5.0, description="exit speed of a pump's fixed jet, 0 for none")
-    pump_diameter_m: float = Field(0.05, ge=0.005, le=0.5, description="diameter of its outlet")
-    pump_at_m: Place = Field((-2.9, 0.0, 0.8), description="place of its outlet")
-    pump_towards: Place = Field((1.0, 0.0, 0.0), description="where it blows")
-    background_m_s: float = Field(
+    turbulence_m_s: float = Field(
         0.0, ge=0.0, le=0.3, description="rms per axis of turbulence that no thruster made, 0 for none"
     )
-    background_length_m: float = Field(0.2, ge=0.02, le=5.0, description="length of its energetic eddies")
+
+
+class WaveSettings(Settings):
+    """A linear wave on the surface."""
+
+    amplitude_m: float = Field(0.0, ge=0.0, le=0.5, description="its amplitude, 0 for none")
+    period_s: float = Field(3.0, gt=1.0, le=60.0, description="its period: waves below 1 Hz")
+    heading_deg: float = Field(0.0, ge=-360.0, le=360.0, description="where it runs to, from north through east")
+
+
+class PumpSettings(Settings):
+    """A pump's fixed jet."""
+
+    speed_m_s: float = Field(0.0, ge=0.0, le=5.0, description="its exit speed, 0 for none")
+    diameter_m: float = Field(0.05, ge=0.005, le=0.5, description="diameter of its outlet")
+    at_m: Place = Field((-2.9, 0.0, 0.8), description="place of its outlet")
+    towards: Place = Field((1.0, 0.0, 0.0), description="where it blows")
+
+
+class JetSettings(Settings):
+    """What the thrusters' jets are like.
+
+    A turbulence of 0.25 is that of round jets on the axis (0.24 to 0.28; Hussein, Capp and George 1994, doi
+    10.1017/S002211209400323X).
+    """
+
     turbulence: float = Field(0.25, ge=0.0, le=0.5, description="fluctuation on a jet's axis over its mean speed")
     swirl: bool = Field(False, description="jets twice as wide, as a propeller's swirl makes them")
-    flow_step_s: float = Field(0.05, ge=0.005, le=0.1, description="time step of the water")
-    max_parcels: int = Field(
-        4096, ge=256, le=65536, description="above this the jets are made coarser, and it is logged"
-    )
+    inflow_loss: bool = Field(False, description="thrust falls where water already runs through the disk")
 
-    water: Literal["clear", "silt", "caco3-50mg"] = Field(
-        "silt", description="sets silt, suspended_mg_l and grains, unless they are given too; caco3-50mg clears in 35 s"
+
+class SiltSettings(Settings):
+    """Fine silt on the bed and in the water.
+
+    A load of 0.1 kg/m2 lies just below the mean of all sediment on mid-shelf reefs (0.127; inner shelf 0.864 kg/m2;
+    Tebbett, Goatley and Bellwood 2017, doi 10.1371/journal.pone.0170854), of which part is as fine as the silt here: a
+    silty bed, not an average one.
+    """
+
+    kind: Literal["clear", "silt", "caco3-50mg"] = Field(
+        "silt",
+        description="sets load_kg_m2, suspended_mg_l and grains, unless they are given too; caco3-50mg clears in 35 s",
     )
-    silt: float = Field(0.1, ge=0.0, le=20.0, description="kg/m2 of loose fine silt on the bed, 0 for a clean bed")
+    load_kg_m2: float = Field(0.1, ge=0.0, le=20.0, description="loose fine silt on the bed, 0 for a clean bed")
     grain_m: float = Field(20e-6, ge=1e-6, le=1e-3, description="grain diameter of the silt")
     grain_density_kg_m3: float = Field(2710.0, gt=1150.0, le=8000.0, description="density of the grains (calcite 2710)")
     suspended_mg_l: float = Field(0.0, ge=0.0, le=5000.0, description="evenly in the water at the start")
@@ -93,22 +119,33 @@ class TankSettings(Settings):
         "auto", description="law of erosion; auto takes van Rijn's for sand, from 62.5 um on"
     )
     erosion_kg_m2_s: float = Field(5e-5, ge=0.0, le=1e-2, description="Partheniades' erosion rate M")
-    erosion_threshold_Pa: float | None = Field(None, gt=0.0, le=10.0, description="None: Soulsby's, from the grain")
-    max_silt_particles: int = Field(4000, ge=100, le=100000, description="above this, pairs of particles become one")
+    threshold_Pa: float | None = Field(
+        None, gt=0.0, le=10.0, description="stress from which it erodes, null for Soulsby's, from the grain"
+    )
 
-    trim_N: float | None = Field(None, ge=-50.0, le=50.0, description="buoyancy beyond the believed one; None draws it")
-    trim_range_N: float = Field(1.0, ge=0.0, le=50.0, description="a drawn trim lies between minus and plus this")
-    mass_pct: float = Field(5.0, ge=0.0, le=90.0, description="plant's mass differs by up to this")
-    damping_pct: float = Field(30.0, ge=0.0, le=90.0, description="plant's drag differs by up to this")
-    added_mass_pct: float = Field(20.0, ge=0.0, le=90.0, description="plant's added mass differs by up to this")
-    thrust_pct: float = Field(5.0, ge=0.0, le=90.0, description="each thruster's gain differs by up to this")
-    failures: tuple[ThrusterFailure, ...] = Field((), description="thrusters that fail: thruster, at_s, kind, value")
-    inflow_loss: bool = Field(False, description="thrust falls where water already runs through the disk")
-    tether_diameter_m: float = Field(0.0, ge=0.0, le=0.05, description="of a cable to the vehicle, 0 for none")
-    tether_length_m: float = Field(5.0, gt=0.0, le=500.0, description="paid out; the vehicle goes no farther")
-    tether_from_m: Place = Field((-2.5, 0.0, 0.0), description="where the cable comes from: a winch, the surface")
-    tether_at_B_m: Place = Field((0.0, 0.0, 0.0), description="where it holds the vehicle, in the body frame")
-    plant_step_s: float = Field(0.005, ge=0.0005, le=0.02, description="longest time step of the vehicle")
+    @model_validator(mode="before")
+    @classmethod
+    def _as_its_kind_has_it(cls, given: Any) -> Any:
+        """Fill in what the kind says and the user does not."""
+        if isinstance(given, dict) and isinstance(given.get("kind"), str):
+            return SILTS.get(given["kind"], {}) | given
+        return given
+
+
+class TetherSettings(Settings):
+    """A cable to the vehicle."""
+
+    diameter_m: float = Field(0.0, ge=0.0, le=0.05, description="its diameter, 0 for none")
+    length_m: float = Field(5.0, gt=0.0, le=500.0, description="paid out; the vehicle goes no farther")
+    from_m: Place = Field((-2.5, 0.0, 0.0), description="where the cable comes from: a winch, the surface")
+    at_B_m: Place = Field((0.0, 0.0, 0.0), description="where it holds the vehicle, in the body frame")
+
+
+class SensorSettings(Settings):
+    """What the vehicle senses.
+
+    Figures are typical of small vehicles' parts and of a camera-based pose at one metre, not of one product.
+    """
 
     pose_rate_hz: float = Field(62.0, gt=0.0, le=500.0, description="rate of the camera-based pose")
     pose_noise_m: float = Field(0.002, ge=0.0, le=1.0, description="its position noise, one sigma per axis")
@@ -136,14 +173,6 @@ class TankSettings(Settings):
     depth_rate_hz: float = Field(20.0, gt=0.0, le=500.0, description="rate of the pressure sensor")
     depth_noise_m: float = Field(0.005, ge=0.0, le=1.0, description="its noise, one sigma")
 
-    @model_validator(mode="before")
-    @classmethod
-    def _as_the_water_has_it(cls, given: Any) -> Any:
-        """Fill in what the kind of water says and the user does not."""
-        if isinstance(given, dict) and isinstance(given.get("water"), str):
-            return WATERS.get(given["water"], {}) | given
-        return given
-
     @field_validator("pose_outages_s")
     @classmethod
     def _spans_run_forwards(cls, spans: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
@@ -152,22 +181,50 @@ class TankSettings(Settings):
                 raise ValueError(f"from {begin:g} to {end:g} s, each span must start at 0 or later and end after that")
         return spans
 
+
+class MismatchSettings(Settings):
+    """How far the plant is from what its controller believes."""
+
+    trim_N: float | None = Field(None, ge=-50.0, le=50.0, description="buoyancy beyond the believed one; null draws it")
+    trim_range_N: float = Field(1.0, ge=0.0, le=50.0, description="a drawn trim lies between minus and plus this")
+    mass_pct: float = Field(5.0, ge=0.0, le=90.0, description="plant's mass differs by up to this")
+    damping_pct: float = Field(30.0, ge=0.0, le=90.0, description="plant's drag differs by up to this")
+    added_mass_pct: float = Field(20.0, ge=0.0, le=90.0, description="plant's added mass differs by up to this")
+    thrust_pct: float = Field(5.0, ge=0.0, le=90.0, description="each thruster's gain differs by up to this")
+
+
+class TankSettings(Settings):
+    """The world of a trial: water, silt, sensors, and how far the plant is from what its controller believes."""
+
+    size_m: tuple[Length, Length, Length] = Field((6.0, 5.0, 1.5), description="length, width and depth of the water")
+    density_kg_m3: float = Field(1000.0, gt=900.0, lt=1100.0, description="of the water; vehicles are trimmed in 1000")
+    flow_step_s: float = Field(0.05, ge=0.005, le=0.1, description="time step of the water")
+    current: CurrentSettings = CurrentSettings()
+    waves: WaveSettings = WaveSettings()
+    pump: PumpSettings = PumpSettings()
+    jets: JetSettings = JetSettings()
+    silt: SiltSettings = SiltSettings()
+    tether: TetherSettings = TetherSettings()
+    sensors: SensorSettings = SensorSettings()
+    mismatch: MismatchSettings = MismatchSettings()
+    failures: tuple[ThrusterFailure, ...] = Field((), description="thrusters that fail: thruster, at_s, kind, value")
+
     @model_validator(mode="after")
     def _water_holds_it(self) -> TankSettings:
         """Refuse waves that break, a pump that blows out of the water and a winch outside it."""
         length, width, depth = self.size_m
-        if self.wave_amplitude_m > 0.0:
+        if self.waves.amplitude_m > 0.0:
             self._check_wave(depth)
         sides = (length / 2, width / 2)
-        if self.pump_speed_m_s > 0.0:
-            for name, at, towards, side in zip("xy", self.pump_at_m, self.pump_towards, sides, strict=False):
+        if self.pump.speed_m_s > 0.0:
+            for name, at, towards, side in zip("xy", self.pump.at_m, self.pump.towards, sides, strict=False):
                 if abs(at) >= side and at * towards > 0.0:
-                    raise ValueError(f"pump_towards: blows out of the tank through the wall at {name} = {at:g} m")
-        if self.tether_diameter_m > 0.0:
-            x, y, z = self.tether_from_m
+                    raise ValueError(f"pump.towards: blows out of the tank through the wall at {name} = {at:g} m")
+        if self.tether.diameter_m > 0.0:
+            x, y, z = self.tether.from_m
             if abs(x) > sides[0] or abs(y) > sides[1] or z > depth:
                 raise ValueError(
-                    f"tether_from_m: ({x:g}, {y:g}, {z:g}) m is outside the walls or below the floor of "
+                    f"tether.from_m: ({x:g}, {y:g}, {z:g}) m is outside the walls or below the floor of "
                     f"{length:g} x {width:g} x {depth:g} m; give the place at which the cable enters the water"
                 )
         return self
@@ -176,10 +233,10 @@ class TankSettings(Settings):
         from wakewise.water.currents import wave_number_per_m
 
         # Steepest wave over a level bed: H / L = 0.142 tanh(k h) (R. Miche 1944, Ann. Ponts Chauss. 114).
-        k = wave_number_per_m(self.wave_period_s, depth_m)
+        k = wave_number_per_m(self.waves.period_s, depth_m)
         most_m = 0.5 * 0.142 * (2 * math.pi / k) * math.tanh(k * depth_m)
-        if self.wave_amplitude_m > most_m:
+        if self.waves.amplitude_m > most_m:
             raise ValueError(
-                f"wave_amplitude_m: {self.wave_amplitude_m:g} m, a wave of {self.wave_period_s:g} s in {depth_m:g} m "
-                f"of water breaks above {most_m:.3f} m"
+                f"waves.amplitude_m: {self.waves.amplitude_m:g} m, a wave of {self.waves.period_s:g} s "
+                f"in {depth_m:g} m of water breaks above {most_m:.3f} m"
             )

@@ -17,11 +17,12 @@ from wakewise.tank.plant import VehiclePlant
 from wakewise.tank.probes import surface_points
 from wakewise.tank.sediment import SHEAR_HEIGHT_M, Silt, SiltLaws
 from wakewise.tank.sensors import Sensors
-from wakewise.tank.settings import TankSettings
+from wakewise.tank.settings import MAX_PARCELS, MAX_SILT_PARTICLES, PLANT_STEP_S, TankSettings
 from wakewise.tank.tether import Tether
 from wakewise.targets import Target
 from wakewise.thrusters import electrical_power_W
 from wakewise.vehicles import Vehicle
+from wakewise.water import AmbientSum
 from wakewise.water.blockage import Blockage
 from wakewise.water.closure import PLAIN, SWIRLING
 from wakewise.water.induction import impulse_velocity
@@ -69,7 +70,7 @@ class Tank:
             raise InputError(
                 f"target {target.name}: stands on a bed at {target.bed_z_m:g} m, tank.size_m has {depth:g}"
             )
-        water_rng, silt_rng, sensor_rng, probe_rng, current_rng = rng.spawn(5)
+        water_rng, silt_rng, sensor_rng, probe_rng, current_rng = _streams(rng)
         self.settings = settings
         self.target = target
         self.ambient = build_ambient(settings, current_rng)
@@ -91,26 +92,27 @@ class Tank:
             rng=water_rng,
             ambient=self.ambient,
             half_size_m=(length / 2, width / 2),
-            turbulence=settings.turbulence,
-            max_parcels=settings.max_parcels,
-            spreading=SWIRLING if settings.swirl else PLAIN,
+            turbulence=settings.jets.turbulence,
+            max_parcels=MAX_PARCELS,
+            spreading=SWIRLING if settings.jets.swirl else PLAIN,
             body=Blockage.of(target),
         )
+        silt = settings.silt
         laws = SiltLaws.of(
-            settings.grain_m,
-            settings.grain_density_kg_m3,
+            silt.grain_m,
+            silt.grain_density_kg_m3,
             settings.density_kg_m3,
-            settings.erosion_kg_m2_s,
-            settings.erosion_threshold_Pa,
-            settings.pickup,
+            silt.erosion_kg_m2_s,
+            silt.threshold_Pa,
+            silt.pickup,
         )
-        self.silt = Silt(laws, settings.silt, settings.size_m, settings.max_silt_particles, silt_rng)
-        self.silt.suspend(1e-3 * settings.suspended_mg_l, target.centre_W_m)
+        self.silt = Silt(laws, silt.load_kg_m2, settings.size_m, MAX_SILT_PARTICLES, silt_rng)
+        self.silt.suspend(1e-3 * silt.suspended_mg_l, target.centre_W_m)
         _say_when_it_clears(settings, laws)
         self._stirring_speed = _STIRRING_SHARE * speed_at_stress_m_s(
             laws.threshold_Pa / settings.density_kg_m3, SHEAR_HEIGHT_M, laws.grain_m
         )
-        self._sensors = Sensors(settings, sensor_rng)
+        self._sensors = Sensors(settings.sensors, sensor_rng)
         self._probes = TargetProbes(target, probe_rng)
         self._time = 0.0
         self._flow_steps = 0
@@ -118,7 +120,7 @@ class Tank:
         self._silt_middle = -(-self._silt_every // 2) % self._silt_every
         self._disks_before_m = self._plant.disks()[0]
         # The water at the disks is looked at once for each of its own steps.
-        self._inflow = self.ambient.velocity(self._disks_before_m, 0.0) if settings.inflow_loss else None
+        self._inflow = self.ambient.velocity(self._disks_before_m, 0.0) if settings.jets.inflow_loss else None
         self._muddy = self.silt.total_kg > 0.0
         self._touching = ""
         self._measured: WaterTruth | None = None
@@ -180,7 +182,7 @@ class Tank:
         self._touching = ""
         while end - self._time > _TIME_TOLERANCE_S:
             flow_due = (self._flow_steps + 1) * self.settings.flow_step_s
-            stop = min(self._time + self.settings.plant_step_s, end, flow_due, self._sensors.next_due_s())
+            stop = min(self._time + PLANT_STEP_S, end, flow_due, self._sensors.next_due_s())
             self._advance(commands, max(stop - self._time, 0.0))
             if flow_due - self._time < _TIME_TOLERANCE_S:
                 self._move_water()
@@ -190,13 +192,6 @@ class Tank:
     def excess_velocity(self, points_W_m: Array) -> Array:
         """Velocity of the water less that of the same water without thrusters, shape (n, 3)."""
         return self.water.excess_velocity(points_W_m)
-
-    def bed_speed_m_s(self, xy_W_m: Array) -> Array:
-        """Excess speed, shape (n,), 1.5 cm above the bed at horizontal places, shape (n, 2)."""
-        xy = np.atleast_2d(np.asarray(xy_W_m, dtype=np.float64))
-        points = np.concatenate([xy, np.full((len(xy), 1), self.settings.size_m[2] - 0.015)], axis=1)
-        speed: Array = np.linalg.norm(self.excess_velocity(points), axis=1)
-        return speed
 
     def concentration_grid(self) -> ScalarGrid:
         """Silt in kg/m3 over 1.6 x 1.6 m about the target's foot, from the bed up to 1 m or the surface."""
@@ -254,15 +249,25 @@ class Tank:
         self.silt.step(now, circles, self._silt_every * self.settings.flow_step_s)
 
 
+def tank_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSum:
+    """The water's own motion in a tank that is made with a generator like this one; the same draws."""
+    return build_ambient(settings, _streams(rng)[-1])
+
+
+def _streams(rng: np.random.Generator) -> list[np.random.Generator]:
+    """Generators of water, silt, sensors, probes and the water's own motion."""
+    return rng.spawn(5)
+
+
 def _tether(settings: TankSettings) -> Tether | None:
     """The cable that the settings ask for, if any."""
-    if settings.tether_diameter_m == 0.0:
+    if settings.tether.diameter_m == 0.0:
         return None
     return Tether(
-        winch_W_m=np.array(settings.tether_from_m),
-        p_BT_m=np.array(settings.tether_at_B_m),
-        diameter_m=settings.tether_diameter_m,
-        length_m=settings.tether_length_m,
+        winch_W_m=np.array(settings.tether.from_m),
+        p_BT_m=np.array(settings.tether.at_B_m),
+        diameter_m=settings.tether.diameter_m,
+        length_m=settings.tether.length_m,
         density_kg_m3=settings.density_kg_m3,
     )
 
@@ -270,11 +275,11 @@ def _tether(settings: TankSettings) -> Tether | None:
 def _say_when_it_clears(settings: TankSettings, laws: SiltLaws) -> None:
     """Warn that grains which are in the water at the start will not stay there."""
     clears_s = settings.size_m[2] / laws.settling_m_s
-    if settings.suspended_mg_l > 0.0 and clears_s < _SOON_S:
+    if settings.silt.suspended_mg_l > 0.0 and clears_s < _SOON_S:
         log.warning(
-            "tank.suspended_mg_l %g: grains of %.3g mm sink %.1f mm/s and all lie on the bed after %.0f s",
-            settings.suspended_mg_l,
-            1e3 * settings.grain_m,
+            "tank.silt.suspended_mg_l %g: grains of %.3g mm sink %.1f mm/s and all lie on the bed after %.0f s",
+            settings.silt.suspended_mg_l,
+            1e3 * settings.silt.grain_m,
             1e3 * laws.settling_m_s,
             clears_s,
         )

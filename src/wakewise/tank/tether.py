@@ -59,7 +59,7 @@ class Tether:
         """
         away = float(np.linalg.norm(X_WB.apply(self.p_BT_m) - self.winch_W_m))
         if away > self.length_m:
-            raise InputError(f"tank.tether_length_m: {self.length_m:g}, the vehicle starts {away:.2f} m from its winch")
+            raise InputError(f"tank.tether.length_m: {self.length_m:g}, the vehicle starts {away:.2f} m from its winch")
 
     def force_W_N(self, X_WB: Pose, nu_B: Array, water: Current, time_s: float) -> Array:
         """Force of the cable on the vehicle, shape (3,), in the world."""

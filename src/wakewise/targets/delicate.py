@@ -16,14 +16,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from embreex.mesh_construction import TriangleMesh
-from embreex.rtcore_scene import EmbreeScene
 from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.spatial import KDTree
 
 from wakewise.arrays import Array, BoolArray, freeze
 from wakewise.errors import InputError
 from wakewise.targets.mesh import Mesh
+from wakewise.targets.rays import Rays
 
 THIN_M = (0.004, 0.012)
 """Thickness at or below which a part is as thin as can be, and from which on it is not thin."""
@@ -148,19 +147,11 @@ def _shrink(radius: Array, vertices: Array, normals: Array, obstacles: Array) ->
 
 def _seen_through(mesh: Mesh, normals: Array, farthest_m: float) -> Array:
     """How far a ray straight inward from every vertex goes before it leaves the flesh, shape (n,)."""
-    # Single precision is finest near the origin, and rays must start just inside.
-    middle = 0.5 * (mesh.vertices_m.min(axis=0) + mesh.vertices_m.max(axis=0))
-    vertices = mesh.vertices_m - middle
+    # A ray must start just inside, or it would meet the faces of its own vertex.
     inside_m = 2e-5 * farthest_m
-    scene = EmbreeScene()
-    held = TriangleMesh(scene, vertices[mesh.faces].astype(np.float32))
-    start = (vertices - inside_m * normals).astype(np.float32)
-    hit = scene.run(start, -normals.astype(np.float32), output=True)
-    del held
-    face = np.asarray(hit["primID"], dtype=np.int64)
+    face, length = Rays(mesh).first(mesh.vertices_m - inside_m * normals, -normals)
     leaves = (face >= 0) & (np.einsum("nk,nk->n", normals, mesh.area_vectors_m2[face]) < 0.0)
-    length = np.asarray(hit["tfar"], dtype=np.float64) + inside_m
-    return np.where(leaves, np.minimum(length, farthest_m), farthest_m)
+    return np.where(leaves, np.minimum(length + inside_m, farthest_m), farthest_m)
 
 
 def curvature_per_m(mesh: Mesh) -> Array:

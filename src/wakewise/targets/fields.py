@@ -11,7 +11,6 @@ import numpy as np
 from numba import njit, prange
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from skimage.measure import marching_cubes
 
 from wakewise.arrays import Array
 from wakewise.targets.mesh import Mesh
@@ -38,6 +37,8 @@ class Grid:
 
 def zero_surface(grid: Grid) -> Mesh:
     """Largest closed piece of the surface where the field is zero, oriented outward."""
+    from skimage.measure import marching_cubes
+
     # Marching cubes makes a sliver or a pinched vertex where a sample is exactly zero: move those by a nanometre.
     values = np.where(np.abs(grid.values) < 1e-9, np.float32(1e-9), grid.values)
     vertices, faces, _, _ = marching_cubes(values, 0.0, spacing=(grid.spacing_m,) * 3, gradient_direction="ascent")

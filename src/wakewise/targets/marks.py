@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import trimesh
 from scipy.spatial import KDTree
 
 from wakewise.arrays import Array, freeze
@@ -131,6 +130,8 @@ def read_vertex_scores(path: Path | str, mesh: Mesh) -> Array | None:
     path = Path(path)
     if path.suffix.lower() != ".ply":
         return None
+    import trimesh
+
     read = read_mesh(path)
     loaded = trimesh.load(path, file_type="ply", force="mesh", process=False)
     vertex = loaded.metadata.get("_ply_raw", {}).get("vertex", {}).get("data")

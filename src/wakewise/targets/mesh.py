@@ -12,7 +12,6 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-import trimesh
 
 from wakewise.arrays import Array, IntArray, freeze
 from wakewise.errors import InputError
@@ -159,6 +158,8 @@ def read_mesh(path: Path | str) -> Mesh:
 
 def write_mesh(path: Path, mesh: Mesh) -> None:
     """Write a mesh as binary PLY, whole or not at all, in single precision (0.1 um at 1 m)."""
+    import trimesh
+
     with whole_file(path) as temporary:
         trimesh.Trimesh(mesh.vertices_m, mesh.faces, process=False).export(temporary, file_type="ply")
 
@@ -173,6 +174,8 @@ def _read(path: Path) -> tuple[Array, IntArray]:
         raise InputError(f"{path}: the file is empty (0 bytes), give a mesh file ({_suffixes()})")
     if path.suffix.lower() not in READABLE_SUFFIXES:
         raise InputError(f"{path}: suffix '{path.suffix}' is not a mesh format, allowed: {_suffixes()}")
+    import trimesh
+
     try:
         with _silence():
             loaded = trimesh.load(path, file_type=path.suffix[1:].lower(), force="mesh", process=False)

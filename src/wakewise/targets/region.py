@@ -24,8 +24,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from embreex.mesh_construction import TriangleMesh
-from embreex.rtcore_scene import EmbreeScene
 from scipy.spatial import KDTree
 
 from wakewise.arrays import Array, BoolArray, IntArray, freeze
@@ -33,6 +31,7 @@ from wakewise.errors import InputError
 from wakewise.targets.delicate import Delicacy
 from wakewise.targets.distance import MeshDistance
 from wakewise.targets.mesh import Mesh
+from wakewise.targets.rays import Rays
 from wakewise.targets.sampling import cell_middles, centroidal, relaxed, reweighted
 from wakewise.targets.target import Target
 
@@ -271,14 +270,10 @@ class Solid:
     """
 
     def __init__(self, mesh: Mesh) -> None:
-        self._scene = EmbreeScene()
-        self._mesh = TriangleMesh(self._scene, mesh.triangles_m.astype(np.float32))
+        self._rays = Rays(mesh)
         self._faces_up = mesh.area_vectors_m2[:, 2] < 0.0
 
     def holds(self, points_W_m: Array) -> BoolArray:
         """Whether each point, shape (n, 3), is inside."""
-        if len(points_W_m) == 0:
-            return np.zeros(0, dtype=np.bool_)
-        up = np.tile(np.array([0.0, 0.0, -1.0], dtype=np.float32), (len(points_W_m), 1))
-        face = self._scene.run(points_W_m.astype(np.float32), up)
+        face, _ = self._rays.first(points_W_m, np.array([0.0, 0.0, -1.0]))
         return np.asarray((face >= 0) & self._faces_up[face], dtype=np.bool_)

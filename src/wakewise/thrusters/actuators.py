@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wakewise.arrays import Array
+from wakewise.physics import TRIM_WATER_KG_M3
 from wakewise.thrusters.thrust_curve import ThrustCurve
 
 FIGURE_OF_MERIT_FORWARD = 0.333
@@ -49,7 +50,7 @@ def electrical_power_W(
     thrusts_N: Array,
     disk_areas_m2: Array,
     *,
-    water_density_kg_m3: float = 1000.0,
+    water_density_kg_m3: float = TRIM_WATER_KG_M3,
     figure_of_merit_forward: float = FIGURE_OF_MERIT_FORWARD,
     figure_of_merit_reverse: float = FIGURE_OF_MERIT_REVERSE,
     curve: ThrustCurve | None = None,

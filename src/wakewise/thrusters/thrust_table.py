@@ -13,9 +13,10 @@ from scipy.optimize import isotonic_regression
 
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
+from wakewise.physics import GRAVITY_M_S2
 from wakewise.thrusters.thrust_curve import NEUTRAL_US, CurveSide, ThrustCurve
 
-KGF_N = 9.80665
+KGF_N = GRAVITY_M_S2
 """Newton per kilogram-force, by definition (3rd CGPM, 1901)."""
 
 COLUMNS = {

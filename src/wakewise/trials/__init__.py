@@ -6,10 +6,15 @@ Start reading in `trial.py` (a trial is a page). `stages.py` is who watches and 
 figure with its unit and definition, `timing.py` how benches and studies measure and what they are asked.
 """
 
-from wakewise.trials.metrics import DEFINITIONS, UNITS
-from wakewise.trials.stages import Quiet, Watch
-from wakewise.trials.timing import BenchOptions
-from wakewise.trials.trial import compare_methods, run_trial
+from typing import TYPE_CHECKING
+
+from wakewise.doors import lazy_door
+
+if TYPE_CHECKING:
+    from wakewise.trials.metrics import DEFINITIONS, UNITS
+    from wakewise.trials.stages import Quiet, Watch
+    from wakewise.trials.timing import BenchOptions
+    from wakewise.trials.trial import compare_methods, run_trial
 
 __all__ = [
     "DEFINITIONS",
@@ -20,3 +25,5 @@ __all__ = [
     "compare_methods",
     "run_trial",
 ]
+
+lazy_door(__name__)

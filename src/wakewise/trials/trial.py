@@ -17,6 +17,7 @@ import polars as pl
 
 from wakewise.errors import InputError, StageError
 from wakewise.evaluation import Crop, evaluate_surface, flight_figures
+from wakewise.extras import need
 from wakewise.files import write_json, write_text
 from wakewise.geometry import matrix_from_quat
 from wakewise.likeness.textured import write_textured
@@ -56,8 +57,9 @@ _SURFACE_FIGURES = (
     "outside_pct",
 )
 _MODEL_FIGURES = ("reprojection_px", "cameras_rmse_mm", "features_per_image", "inlier_matches")
-# What is reconstructed is a little more than the target: estimated cameras put it some millimetres off its place.
+
 REGION_SHARE = 1.25
+"""What is reconstructed is a little more than the target: estimated cameras put it some millimetres off its place."""
 
 
 def run_trial(flight: Parts | Scenario, folder: Path, watch: Watch | None = None) -> Figures:
@@ -67,9 +69,13 @@ def run_trial(flight: Parts | Scenario, folder: Path, watch: Watch | None = None
     ------
     InputError
         If the scenario cannot be flown, or the folder holds another trial, or another run is at it.
+    MissingExtra
+        Without the extras `photos` and `logs`.
     EnvironmentFailure
         If the disk is full, or a file cannot be read or written; the stages before it are kept.
     """
+    need("a trial", "photos", "logs")
+    need("a trial", "photos", "logs")
     watch = watch or Quiet()
     parts = flight if isinstance(flight, Parts) else flight.parts()
     scenario = as_flown(parts)

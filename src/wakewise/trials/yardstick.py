@@ -11,7 +11,7 @@ from wakewise.control import vehicle_layout
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.operation import Parts
-from wakewise.tank import TankSettings, build_ambient
+from wakewise.tank import TankSettings, tank_ambient
 from wakewise.tank.grains import threshold_stress_Pa
 from wakewise.trials.metrics import Figures, Gathering
 from wakewise.wake import WakeView
@@ -35,7 +35,7 @@ def add_yardsticks(gathering: Gathering, parts: Parts, steps: pl.DataFrame) -> N
     threshold = grain_threshold_Pa(parts.scenario.tank)
     gathering.add({"grain_threshold_Pa": threshold})
     if threshold is None:
-        gathering.missing(("grain_threshold_Pa",), "neither bed nor water holds loose grains (tank.silt is 0)")
+        gathering.missing(("grain_threshold_Pa",), "neither bed nor water holds loose grains (tank.silt)")
 
 
 def sharing_figures(parts: Parts, steps: pl.DataFrame, instants: int = INSTANTS) -> Figures:
@@ -76,16 +76,16 @@ def ambient_speed_m_s(parts: Parts, time_s: Array, looks: int = LOOKS) -> float:
     region = parts.region
     surface = region.points_W_m[region.distance_m <= 0.0]
     points = surface if len(surface) else region.points_W_m
-    # Background turbulence is another draw than the tank's: its mean speed is what matters here.
-    ambient = build_ambient(parts.scenario.tank, np.random.default_rng(parts.scenario.seed))
+    ambient = tank_ambient(parts.scenario.tank, parts.seeds.tank())
     when = np.linspace(float(time_s[0]), min(float(time_s[-1]), ambient.end_s), looks)
     return float(np.mean([np.linalg.norm(ambient.velocity(points, float(t)), axis=1).mean() for t in when]))
 
 
 def grain_threshold_Pa(tank: TankSettings) -> float | None:
     """Stress from which the bed's grains move, as the tank itself takes it; None where there are no grains."""
-    if tank.silt == 0.0 and tank.suspended_mg_l == 0.0:
+    silt = tank.silt
+    if silt.load_kg_m2 == 0.0 and silt.suspended_mg_l == 0.0:
         return None
-    if tank.erosion_threshold_Pa is not None:
-        return tank.erosion_threshold_Pa
-    return threshold_stress_Pa(tank.grain_m, tank.grain_density_kg_m3, tank.density_kg_m3)
+    if silt.threshold_Pa is not None:
+        return silt.threshold_Pa
+    return threshold_stress_Pa(silt.grain_m, silt.grain_density_kg_m3, tank.density_kg_m3)

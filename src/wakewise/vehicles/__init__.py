@@ -30,7 +30,6 @@ from wakewise.vehicles.dynamics import (
     step_rk4,
     step_semi_implicit,
 )
-from wakewise.vehicles.energy import mechanical_energy, mechanical_power
 from wakewise.vehicles.hydrodynamics import Hydrodynamics
 from wakewise.vehicles.jacobians import acceleration_jacobians, step_rk4_jacobians, step_semi_implicit_jacobians
 from wakewise.vehicles.library import draft_names, draft_yaml, load_draft, load_vehicle, vehicle_names
@@ -72,8 +71,6 @@ __all__ = [
     "failures",
     "load_draft",
     "load_vehicle",
-    "mechanical_energy",
-    "mechanical_power",
     "mixing_disagreements",
     "null_space_names",
     "parameters",

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.arrays import Array
+from wakewise.physics import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.vehicles.check import (
     WRENCH_AXES,
     AnyVehicle,
@@ -24,9 +25,6 @@ from wakewise.vehicles.check import (
 from wakewise.vehicles.draft import VehicleDraft
 from wakewise.vehicles.mixing import ARDUSUB_FRAMES, Comparison, compare_matrix, compare_with_ardusub
 from wakewise.vehicles.vehicle import Vehicle
-
-WATER_DENSITY_KG_M3 = 1000.0
-GRAVITY_M_S2 = 9.80665
 
 
 def check_report(vehicle: AnyVehicle, comparison: Comparison | None = None) -> dict[str, Any]:
@@ -116,7 +114,7 @@ def describe(vehicle: AnyVehicle) -> dict[str, Any]:
     limits = draft.thrust_limits_N
     trim_N = None
     if draft.displaced_volume_m3 is not None and draft.mass_kg is not None:
-        trim_N = round((WATER_DENSITY_KG_M3 * draft.displaced_volume_m3 - draft.mass_kg) * GRAVITY_M_S2, 9)
+        trim_N = round((TRIM_WATER_KG_M3 * draft.displaced_volume_m3 - draft.mass_kg) * GRAVITY_M_S2, 9)
     return {
         "name": draft.name,
         "title": draft.title,

@@ -22,6 +22,7 @@ import numpy as np
 
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
+from wakewise.physics import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.vehicles import fossen, kernels
 from wakewise.vehicles.fossen import rigid_body_mass
 from wakewise.vehicles.runge_kutta import rk4_kernel
@@ -73,7 +74,9 @@ class RigidBody:
         )
 
 
-def compile_body(vehicle: Vehicle, water_density_kg_m3: float = 1000.0, gravity_m_s2: float = 9.80665) -> RigidBody:
+def compile_body(
+    vehicle: Vehicle, water_density_kg_m3: float = TRIM_WATER_KG_M3, gravity_m_s2: float = GRAVITY_M_S2
+) -> RigidBody:
     """Collect what the equations need of a vehicle in water of one density.
 
     Raises

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from wakewise.errors import InputError
+from wakewise.physics import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.vehicles.hydrodynamics import Hydrodynamics
 from wakewise.vehicles.vehicle import Vehicle
 
@@ -20,8 +21,8 @@ def perturbed(
     added_mass_pct: float = 0.0,
     thrust_pct: float = 0.0,
     trim_N: float = 0.0,
-    water_density_kg_m3: float = 1000.0,
-    gravity_m_s2: float = 9.80665,
+    water_density_kg_m3: float = TRIM_WATER_KG_M3,
+    gravity_m_s2: float = GRAVITY_M_S2,
 ) -> Vehicle:
     """Draw a vehicle whose parameters differ from the nominal by factors uniform in 1 +- pct/100.
 

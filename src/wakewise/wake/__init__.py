@@ -6,9 +6,8 @@ never uses this room: a planner that knew the truth would prove nothing.
 Start reading in `disturbance.py` (D and its Gram matrix) and `models.py` (models by name). Models: `cones.py` (the
 paper's), `jets.py` (round turbulent jets), `floor.py` (their wall jets), `families.py` (what can be fitted). Sums:
 `sums.py` and `floor_sums.py` with `kernels.py` (compiled), `gradients.py` (derivatives of D), `table.py` and
-`plan_disturbance.py` (D and derivatives over a planner's stage), `view.py` (D from a vehicle's pose). `travel.py`
-says when wash arrives; `calibration.py`, `samples.py`, `scores.py` and `fit_file.py` fit a model to measured
-velocities.
+`plan_disturbance.py` (D and derivatives over a planner's stage), `view.py` (D from a vehicle's pose).
+`calibration.py`, `samples.py`, `scores.py` and `fit_file.py` fit a model to measured velocities.
 """
 
 from wakewise.wake.cones import PaperJet, PowerJet
@@ -17,7 +16,6 @@ from wakewise.wake.floor import FloorJet, bed_of, free_jet
 from wakewise.wake.gradients import Superposition, disturbance_slopes, gauss_newton, gram_with_derivatives, smooth_roots
 from wakewise.wake.jets import AxialJet, GaussianJet, RoundJet
 from wakewise.wake.models import WakeSettings, model_names, wake_model
-from wakewise.wake.travel import arrival_time_s, arrival_times_s
 from wakewise.wake.view import WakeView
 
 __all__ = [
@@ -30,8 +28,6 @@ __all__ = [
     "Superposition",
     "WakeSettings",
     "WakeView",
-    "arrival_time_s",
-    "arrival_times_s",
     "bed_of",
     "disturbance",
     "disturbance_slopes",

@@ -15,8 +15,9 @@ from typing import ClassVar
 import numpy as np
 
 from wakewise.errors import InputError
+from wakewise.physics import FRESH_WATER_KG_M3
 from wakewise.wake import kernels
-from wakewise.wake.jets import FRESH_WATER_KG_M3, AxialJet, Law, check_ranges
+from wakewise.wake.jets import AxialJet, Law, check_ranges
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class PaperJet(AxialJet):
     """
 
     reference_distance_m: ClassVar[float] = 1.0
-    water_density_kg_m3: ClassVar[float] = 998.0
+    water_density_kg_m3: ClassVar[float] = FRESH_WATER_KG_M3
     half_angle_rad: ClassVar[float] = np.pi / 4
 
     @property

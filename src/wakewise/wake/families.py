@@ -41,8 +41,8 @@ class Family:
         return WakeSettings.model_validate({"model": self.name, **numbers})
 
     def model(self, values: Array) -> AxialJet:
-        """The model with parameter values, shape (p,)."""
-        jet = wake_model(self.settings(values))
+        """The free jet with parameter values, shape (p,)."""
+        jet = wake_model(self.settings(values).model_copy(update={"floor": False}))
         if not isinstance(jet, AxialJet):
             raise InputError(f"wake model '{self.name}': has a floor term, only the free jet can be fitted")
         return jet

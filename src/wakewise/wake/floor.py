@@ -30,7 +30,8 @@ from numba import njit
 from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.interfaces import WakeModel
-from wakewise.wake.jets import FRESH_WATER_KG_M3, AxialJet, RoundJet
+from wakewise.physics import FRESH_WATER_KG_M3
+from wakewise.wake.jets import AxialJet, RoundJet
 from wakewise.wake.sums import FAST, fill_rows, pose_slopes
 
 WALL_SPEED = 1.16

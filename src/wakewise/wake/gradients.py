@@ -35,6 +35,7 @@ from wakewise.wake.checks import explain, same_sizes
 from wakewise.wake.floor import FloorJet
 from wakewise.wake.floor_sums import floor_gram_sum, floor_stage_sum
 from wakewise.wake.jets import AxialJet
+from wakewise.wake.numeric import NumericWake
 from wakewise.wake.stage import stage_sum
 from wakewise.wake.sums import gram_slope_sum
 
@@ -87,7 +88,7 @@ def gram_with_derivatives(
     Parameters
     ----------
     model : WakeModel
-        One of this room.
+        One of this room, or one from outside, whose derivatives are central differences (`wakewise.wake.numeric`).
     region_points_W : ndarray, shape (n, 3)
     weights : ndarray, shape (n,)
     X_WB : Pose
@@ -105,9 +106,10 @@ def gram_with_derivatives(
     place = (region_points_W, weights, X_WB.p_m, X_WB.q, positions_B_m, axes_B, areas_m2)
     if isinstance(model, AxialJet):
         G, dG, check = gram_slope_sum(*place, *model.law)
+    elif isinstance(model, FloorJet):
+        G, dG, check = floor_gram_sum(*place, *model.jet.law, model.numbers, True)
     else:
-        floor = _floor(model)
-        G, dG, check = floor_gram_sum(*place, *floor.jet.law, floor.numbers, True)
+        (G, dG), check = _numeric(model, *place, 0.0, superposition).gram_slopes(X_WB), 0.0
     if check != 0.0:
         raise explain(region_points_W, weights, positions_B_m, axes_B, areas_m2)
     if superposition == "incoherent":
@@ -188,9 +190,10 @@ def _stage(
     how = (thrusts, float(smooth_N), superposition == "coherent", hessian)
     if isinstance(model, AxialJet):
         D, gradient, H, check = stage_sum(*place, *model.law, *how)
+    elif isinstance(model, FloorJet):
+        D, gradient, H, check = floor_stage_sum(*place, *model.jet.law, model.numbers, *how)
     else:
-        floor = _floor(model)
-        D, gradient, H, check = floor_stage_sum(*place, *floor.jet.law, floor.numbers, *how)
+        (D, gradient, H), check = _numeric(model, *place, smooth_N, superposition).stage(X_WB, thrusts), 0.0
     if check != 0.0:
         raise explain(region_points_W, weights, positions_B_m, axes_B, areas_m2)
     if not np.isfinite(D):
@@ -198,7 +201,25 @@ def _stage(
     return D, gradient, H
 
 
-def _floor(model: WakeModel) -> FloorJet:
-    if not isinstance(model, FloorJet):
-        raise InputError(f"wake model {model.name}: has no derivatives, allowed: the models of wakewise.wake")
-    return model
+def _numeric(
+    model: WakeModel,
+    region_points_W: Array,
+    weights: Array,
+    _p: Array,
+    _q: Array,
+    positions_B_m: Array,
+    axes_B: Array,
+    areas_m2: Array,
+    smooth_N: float,
+    superposition: Superposition,
+) -> NumericWake:
+    return NumericWake(
+        model=model,
+        points_W_m=region_points_W,
+        weights=weights,
+        positions_B_m=positions_B_m,
+        axes_B=axes_B,
+        areas_m2=areas_m2,
+        coherent=superposition == "coherent",
+        smooth_N=smooth_N,
+    )

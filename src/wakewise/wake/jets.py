@@ -16,10 +16,8 @@ from numpy.typing import ArrayLike
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
+from wakewise.physics import FRESH_WATER_KG_M3
 from wakewise.wake import kernels
-
-FRESH_WATER_KG_M3 = 998.0
-"""Fresh water at 20-21 deg C, the density of the paper (CRC Handbook of Chemistry and Physics: 998.2 at 20 deg C)."""
 
 
 class Law(NamedTuple):
@@ -130,8 +128,8 @@ class RoundJet(AxialJet):
     it is the Gaussian self-similar jet with U_c = 6.9 sqrt(T / rho) / x. The power 6 of the passage between the two is
     a choice of smoothing, not a measured constant: it leaves 99 % of the exit speed at 4 D and 90 % at 6 D, and meets
     the decay law within 1 % at 10 D. The water is still upstream of the disk; the slow inflow towards the jet's sides
-    is left out, and so are walls (see `wakewise.wake.floor`) and the time a jet needs to arrive
-    (`wakewise.wake.travel`).
+    is left out, and so are walls (see `wakewise.wake.floor`) and the time a jet needs to
+    arrive.
 
     Parameters
     ----------

@@ -24,12 +24,15 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from wakewise.errors import InputError
+from wakewise.interfaces import WakeModel
+from wakewise.plugins import find, names, offered
 from wakewise.settings import Settings
 from wakewise.wake.cones import PaperJet, PowerJet
 from wakewise.wake.floor import FloorJet
 from wakewise.wake.jets import AxialJet, GaussianJet, RoundJet
 
 ModelName = Literal["paper", "paper-calibrated", "fitted", "linear", "jet", "jet-fitted"]
+"""Our own models."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,9 @@ class WakeSettings(Settings):
     A number left out has the model's default; a number that the model does not have is refused.
     """
 
-    model: ModelName = Field(default="jet", description="wake model that the controller believes in")
+    model: str = Field(
+        default="jet", description="wake model that the controller believes in: a name, or package.module:make"
+    )
     floor: bool = Field(default=True, description="add the wall jets that spread along the bed where jets strike it")
     edge_width_deg: float = Field(
         default=0.0, description="width of the smooth edge of a cone (deg), 0 is the sharp edge", ge=0.0, le=40.0
@@ -101,7 +106,9 @@ class WakeSettings(Settings):
 
     @model_validator(mode="after")
     def _only_numbers_of_the_model(self) -> Self:
-        recipe = _RECIPES[self.model]
+        recipe = _RECIPES.get(self.model, _FOREIGN)
+        if recipe is _FOREIGN and self.model not in offered("wake model") and ":" not in self.model:
+            raise ValueError(f"wake model '{self.model}': unknown, allowed: {', '.join(model_names())}")
         for name in type(self).model_fields:
             unknown = name not in recipe.numbers and name in _NUMBERS and getattr(self, name) is not None
             if unknown or (name == "edge_width_deg" and self.edge_width_deg > 0.0 and not recipe.edge):
@@ -110,20 +117,27 @@ class WakeSettings(Settings):
         return self
 
 
+OWN_MODELS: tuple[str, ...] = tuple(_RECIPES)
+"""Names of our own models."""
+
+_FOREIGN = _Recipe(PaperJet, {})
+"""What a model from outside takes from the settings: nothing; it brings its own numbers, and its own floor."""
+
 _NUMBERS = frozenset(name for recipe in _RECIPES.values() for name in recipe.numbers)
 
 
 def model_names() -> tuple[str, ...]:
-    """Names of the wake models."""
-    return tuple(_RECIPES)
+    """Names of the wake models: ours, then those that installed packages offer."""
+    return tuple(names("wake model", _RECIPES))
 
 
-def wake_model(which: str | WakeSettings, bed_z_m: float | None = None) -> AxialJet | FloorJet:
+def wake_model(which: str | WakeSettings, bed_z_m: float | None = None) -> WakeModel:
     """Wake model of that name with its default numbers, or as settings say.
 
     Parameters
     ----------
     which : str or WakeSettings
+        A name of `model_names`, or ``package.module:make``, a callable without arguments that gives a `WakeModel`.
     bed_z_m : float, optional
         Depth of the bed below the surface (world z), needed for settings with `floor`.
 
@@ -142,9 +156,11 @@ def wake_model(which: str | WakeSettings, bed_z_m: float | None = None) -> Axial
     """
     if isinstance(which, str):
         if which not in _RECIPES:
-            raise InputError(f"wake model '{which}': unknown, allowed: {', '.join(sorted(_RECIPES))}")
+            return _from_outside(which)
         recipe = _RECIPES[which]
         return recipe.make(**recipe.numbers)
+    if which.model not in _RECIPES:
+        return _from_outside(which.model)
     recipe = _RECIPES[which.model]
     chosen = {name: getattr(which, name) for name in recipe.numbers}
     numbers = {name: default if chosen[name] is None else chosen[name] for name, default in recipe.numbers.items()}
@@ -156,3 +172,9 @@ def wake_model(which: str | WakeSettings, bed_z_m: float | None = None) -> Axial
     if bed_z_m is None:
         raise InputError(f"wake model {which.model}: floor is set but there is no bed, allowed: give the bed's depth")
     return FloorJet(jet=jet, bed_z_m=bed_z_m)
+
+
+def _from_outside(name: str) -> WakeModel:
+    """A model that an installed package offers (entry points `wakewise.wake_models`), or `package.module:make`."""
+    make: Callable[[], WakeModel] = find("wake model", name, _RECIPES).maker  # type: ignore[assignment]
+    return make()

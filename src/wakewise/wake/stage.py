@@ -1,4 +1,6 @@
-"""Compiled: D at given thrusts and pose, with its gradient and its Gauss-Newton matrix; what a planner asks per stage.
+"""Compiled: D at given thrusts and pose, with its gradient and its Gauss-Newton matrix, for `gradients`.
+
+A planner asks `plan_disturbance`, which is held against this in the tests.
 
 Variables, in this order: position of the body in W, shape (3,), its rotation vector on the body's side
 (R_WB exp([theta])), shape (3,), and the m thrusts. With residuals r = sqrt(w) v (coherent: three components of the

@@ -97,6 +97,11 @@ def wake_table(
     )
 
 
+def is_compiled(wake: WakeModel) -> bool:
+    """Whether the kernels know a model; they do those of this room, with or without a floor."""
+    return isinstance(wake.jet if isinstance(wake, FloorJet) else wake, AxialJet)
+
+
 def with_smooth_edge(wake: WakeModel, edge_width_rad: float) -> WakeModel:
     """The same model with an edge of that width if it is a cone with a sharp edge, which no gradient can follow."""
     if isinstance(wake, FloorJet):

@@ -16,11 +16,11 @@ import numpy as np
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
 from wakewise.interfaces import Current
+from wakewise.physics import GRAVITY_M_S2
 from wakewise.water.closure import PLAIN
 from wakewise.water.faces import Room
 from wakewise.water.induction import impulse_velocity
 
-_GRAVITY_M_S2 = 9.80665
 _ROW_SPACING = 0.6  # of sigma: a row of Gaussians this dense is smooth to 1e-6
 _MODES = 48
 
@@ -43,7 +43,7 @@ class SteadyCurrent:
 
 def wave_number_per_m(period_s: float, depth_m: float) -> float:
     """Solve Airy's dispersion relation omega^2 = g k tanh(k h) for k, to rounding."""
-    omega2 = (2 * math.pi / period_s) ** 2 / _GRAVITY_M_S2
+    omega2 = (2 * math.pi / period_s) ** 2 / GRAVITY_M_S2
     # Start of Eckart 1952, good to 5 %; Newton then doubles the digits each round.
     k = omega2 / math.sqrt(math.tanh(omega2 * depth_m))
     for _ in range(6):
@@ -105,7 +105,7 @@ class PumpJet:
         freeze(self, outlet_W_m=(3,), towards_W=(3,))
         length = float(np.linalg.norm(self.towards_W))
         if length < 1e-9:
-            raise InputError("tank.pump_towards: a direction of no length, must point somewhere")
+            raise InputError("tank.pump.towards: a direction of no length, must point somewhere")
         momentum = 0.25 * math.pi * self.diameter_m**2 * self.speed_m_s**2
         core_m = PLAIN.core_D * self.diameter_m
         x, places, sigmas, impulses = 0.0, [], [], []

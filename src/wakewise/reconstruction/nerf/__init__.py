@@ -1,8 +1,13 @@
 """A neural radiance field on a hash grid, learnt from posed photos; PyTorch (extra `nerf`) is imported when it runs."""
 
-from wakewise.reconstruction.nerf.backend import DEVICES, pick_device, require_torch
-from wakewise.reconstruction.nerf.pipeline import build_field
-from wakewise.reconstruction.nerf.settings import PROFILES, FieldSettings, profile
+from typing import TYPE_CHECKING
+
+from wakewise.doors import lazy_door
+
+if TYPE_CHECKING:
+    from wakewise.reconstruction.nerf.backend import DEVICES, pick_device, require_torch
+    from wakewise.reconstruction.nerf.pipeline import build_field
+    from wakewise.reconstruction.nerf.settings import PROFILES, FieldSettings, profile
 
 __all__ = [
     "DEVICES",
@@ -13,3 +18,5 @@ __all__ = [
     "profile",
     "require_torch",
 ]
+
+lazy_door(__name__, "nerf", "photos")

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import importlib.util
 from typing import Any
 
-from wakewise.errors import InputError, how_to_install
+from wakewise.errors import InputError
+from wakewise.extras import need
 
 DEVICES = ("auto", "cpu", "cuda")
 
@@ -15,11 +15,10 @@ def require_torch() -> None:
 
     Raises
     ------
-    InputError
+    MissingExtra
         If there is no PyTorch.
     """
-    if importlib.util.find_spec("torch") is None:
-        raise InputError(f"neural field: PyTorch is not installed; {how_to_install('nerf')}")
+    need("a neural field", "nerf")
 
 
 def pick_device(name: str) -> Any:
@@ -27,8 +26,10 @@ def pick_device(name: str) -> Any:
 
     Raises
     ------
+    MissingExtra
+        If there is no PyTorch.
     InputError
-        If there is no PyTorch, no such device, or CUDA was asked for and cannot be had.
+        If there is no such device, or CUDA was asked for and cannot be had.
     """
     require_torch()
     import torch

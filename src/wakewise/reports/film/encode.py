@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image as Pictures
 
-from wakewise.errors import InputError, StageError, how_to_install
+from wakewise.errors import InputError, StageError
+from wakewise.extras import how_to_install
 from wakewise.files import whole_file
 
 Frame = NDArray[np.uint8]

@@ -139,7 +139,7 @@ class _Film:
         first = min((shot.time_s for shot in self.trial.photographs), default=0.0)
         flown = self.motion.p_W_m[self.motion.row(first) :]
         X_WC = vantage(camera, parts.target.centre_W_m, flown, 0.5 * float(np.linalg.norm(parts.vehicle.size_m)))
-        grains = SiltOptics(diameter_m=scenario.tank.grain_m, density_kg_m3=scenario.tank.grain_density_kg_m3)
+        grains = SiltOptics(diameter_m=scenario.tank.silt.grain_m, density_kg_m3=scenario.tank.silt.grain_density_kg_m3)
         scene = parts.scene
         self._outside = Outside.build(scene, camera, X_WC, hull_of(parts.vehicle), scenario.imaging.lights(), grains)
         self._tracers = wash_of(scenario, self.folder / "steps.parquet", self.times_s, wash, progress)

@@ -115,7 +115,7 @@ def cells_of(folder: Path, times_s: Sequence[float]) -> list[Cell]:
     parts = scenario.parts()
     scene = parts.scene
     exposures = read_exposures(folder / "exposures.npz")
-    grains = SiltOptics(diameter_m=scenario.tank.grain_m, density_kg_m3=scenario.tank.grain_density_kg_m3)
+    grains = SiltOptics(diameter_m=scenario.tank.silt.grain_m, density_kg_m3=scenario.tank.silt.grain_density_kg_m3)
     order = np.argsort(instants, kind="stable")
     kept = folder / ".rows.npz"
     tracers = wash_of(scenario, folder / "steps.parquet", instants[order], kept)

@@ -186,7 +186,7 @@ def fly_trial(trial: Trial) -> dict[str, float | None]:
     target, region = paper_place(scenario.tank.size_m[2])
     # The wind rose of the current is not round: each seed hovers at its own azimuth.
     azimuth = float(np.random.default_rng([trial.seed, 7]).uniform(-np.pi, np.pi))
-    direction = helped_by(scenario.tank.current_m_s, azimuth) if trial.with_current else 1.0
+    direction = helped_by(scenario.tank.current.velocity_m_s, azimuth) if trial.with_current else 1.0
     parts = scenario.parts().replace(
         vehicle=ballasted(load_vehicle(scenario.vehicle), trial.float_N, trial.shift_mm),
         target=target,

@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-import cv2
 import numpy as np
 import yaml
 from pydantic import Field, ValidationError
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
+from wakewise.extras import need
 from wakewise.settings import Settings
 from wakewise.studies.piv.images import Picture
 from wakewise.studies.piv.processing import Engine, displacements
@@ -58,6 +58,9 @@ def read_pairs(folder: Path) -> dict[str, tuple[Picture, Picture]]:
 
 
 def _read(path: Path) -> Picture:
+    need("reading pictures of a jet", "piv", only=("cv2",))
+    import cv2
+
     picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
     if picture is None:
         raise InputError(f"{path}: not a picture that can be read")

@@ -12,7 +12,8 @@ from typing import Literal
 
 import numpy as np
 
-from wakewise.errors import InputError, StageError, how_to_install
+from wakewise.errors import InputError, StageError
+from wakewise.extras import how_to_install
 from wakewise.studies.piv.correlation import correlate
 from wakewise.studies.piv.images import Picture
 from wakewise.studies.piv.vectors import Displacements

@@ -9,12 +9,12 @@ from pydantic import Field
 
 from wakewise.arrays import Array
 from wakewise.interfaces import Flow
+from wakewise.physics import FRESH_WATER_KG_M3 as WATER_DENSITY_KG_M3
+from wakewise.physics import GRAVITY_M_S2
 from wakewise.settings import Settings
 
-WATER_DENSITY_KG_M3 = 998.0
 WATER_VISCOSITY_PA_S = 1.0e-3
 """Fresh water at 20 deg C (CRC Handbook of Chemistry and Physics)."""
-GRAVITY_M_S2 = 9.81
 
 
 class TracerSettings(Settings):

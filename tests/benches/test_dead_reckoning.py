@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wakewise.benches.dead_reckoning import dead_reckoned, local_north_east_down
 from wakewise.errors import InputError
-from wakewise.estimation import dead_reckoned, local_north_east_down
 from wakewise.geometry import quat_from_euler, quat_from_rotvec
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[3] / "shared" / "data")) / "auv_dvl"

@@ -1,0 +1,99 @@
+"""One of each part that Wakewise takes from outside, as a package of somebody else's would hold them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+import wakewise as ww
+from wakewise.allocation import least_thrusts
+from wakewise.control import make_tracker, vehicle_layout
+from wakewise.operation.worlds import tank_world
+from wakewise.targets import Mesh
+from wakewise.vehicles import load_draft
+
+
+@dataclass(frozen=True)
+class BowRule:
+    """Controller: the PID of `dp`; the two bow thrusters never blow forward."""
+
+    tracker: object
+    layout: object
+    name: str = "bow-rule"
+
+    def init(self):
+        return self.tracker.init()
+
+    def step(self, state, dt_s, estimate, goal):
+        state, wrench_B = self.tracker.wrench(state, dt_s, estimate, goal, saturated=False)
+        return state, ww.Command(thrusts_N=least_thrusts(self.layout, wrench_B).thrusts_N, wrench_B=wrench_B)
+
+
+def bow_rule(task):
+    """Make the controller for what is to be controlled: vehicle, region, wake, settings, surroundings."""
+    layout = vehicle_layout(task.vehicle)
+    lower, upper = layout.lower_N.copy(), layout.upper_N.copy()
+    bow = (task.vehicle.thruster_positions_B_m[:, 0] > 0) & (np.abs(task.vehicle.thruster_axes_B[:, 2]) < 0.5)
+    # A jet leaves against the force: forward jets push astern.
+    astern = task.vehicle.thruster_axes_B[:, 0] < 0
+    upper[bow & astern], lower[bow & ~astern] = 0.0, 0.0
+    return BowRule(make_tracker(task.vehicle, task.settings), replace(layout, lower_N=lower, upper_N=upper))
+
+
+@dataclass(frozen=True)
+class TopHat:
+    """Wake model: a jet of even speed in a cone of 10 degrees, which keeps its momentum; no gradients."""
+
+    name: str = "top-hat"
+
+    def unit_velocity(self, points_W_m, origins_W_m, directions_W, area_m2):
+        away = points_W_m[None] - origins_W_m[:, None]
+        along = np.einsum("inx,ix->in", away, directions_W)
+        across = np.linalg.norm(away - along[..., None] * directions_W[:, None], axis=2)
+        radius = np.sqrt(area_m2 / np.pi)[:, None] + np.tan(np.radians(10.0)) * np.maximum(along, 0.0)
+        speed = np.where((along > 0) & (across < radius), 1.0 / np.sqrt(998.0 * np.pi) / radius, 0.0)
+        return speed[..., None] * directions_W[:, None]
+
+
+def read_mass_file(path):
+    """Vehicle format `.mass`: one number, the mass in kg of an otherwise usual BlueROV2 Heavy."""
+    return replace(load_draft("bluerov2-heavy"), name=path.stem, mass_kg=float(path.read_text()))
+
+
+def pyramid(seed):
+    """Target: a square pyramid, 16 cm wide and high, in a z-up frame on its bed."""
+    corners = 0.08 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [0, 0, 2.0]])
+    faces = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [0, 2, 1], [0, 3, 2]])
+    return Mesh(corners, faces)
+
+
+@dataclass(frozen=True)
+class Hover:
+    """Pilot: stay where the mission begins."""
+
+    X_WB: object
+
+    def goal(self, time_s, estimate):
+        return ww.Goal(X_WB=self.X_WB)
+
+
+def hover(parts):
+    """Make the pilot from the parts of the flight."""
+    return Hover(parts.start.X_WB)
+
+
+def still_tank(parts):
+    """World: the tank without any current."""
+    still = parts.scenario.replace(**{"tank.current.velocity_m_s": [0, 0, 0]})
+    return replace(tank_world(parts), settings=still.tank, name="still-tank")
+
+
+@dataclass(frozen=True)
+class Tide:
+    """Current: to and fro along north."""
+
+    uniform = True
+
+    def velocity(self, points_W_m, time_s):
+        return np.tile([0.02 * np.cos(2 * np.pi * time_s / 60.0), 0.0, 0.0], (len(points_W_m), 1))

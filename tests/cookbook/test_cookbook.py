@@ -1,0 +1,154 @@
+"""A package from outside the source tree adds one of each part, by entry points and by `package.module:name`."""
+
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wakewise as ww
+from wakewise import plugins
+from wakewise.cli.main import run
+from wakewise.errors import InputError
+
+ENTRY_POINTS = """
+[wakewise.controllers]
+bow-rule = reef_parts:bow_rule
+[wakewise.wake_models]
+top-hat = reef_parts:TopHat
+[wakewise.vehicle_formats]
+mass = reef_parts:read_mass_file
+[wakewise.targets]
+pyramid = reef_parts:pyramid
+[wakewise.pilots]
+hover = reef_parts:hover
+[wakewise.worlds]
+still-tank = reef_parts:still_tank
+[wakewise.currents]
+tide = reef_parts:Tide
+"""
+SMALL = {
+    "mission.elevations_deg": [30, 50],
+    "mission.views": [10, 8],
+    "mission.standoff_m": 0.4,
+    "mission.speed_m_s": 0.3,
+    "mission.acceleration_m_s2": 0.2,
+    "mission.settle_s": 1.0,
+    "imaging.width": 480,
+    "imaging.height": 360,
+    "target.kind": "brain",
+    "reconstruction.mesh": False,
+}
+
+
+@pytest.fixture
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The package as pip would leave it, on a path of its own."""
+    site = tmp_path / "site"
+    site.mkdir()
+    shutil.copy(Path(__file__).with_name("reef_parts.py"), site)
+    about = site / "reef_parts-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: reef-parts\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text(ENTRY_POINTS)
+    monkeypatch.syspath_prepend(str(site))
+    plugins._offered.cache_clear()
+    yield site
+    plugins._offered.cache_clear()
+    sys.modules.pop("reef_parts", None)
+
+
+def test_each_kind_is_found_by_its_name(installed: Path, tmp_path: Path) -> None:
+    """A scenario names them as it names ours; the parts are theirs, and every one of them is said to be."""
+    (tmp_path / "heavy.mass").write_text("14.0")
+    scenario = ww.Scenario.preset(
+        "quick",
+        **{
+            "method": "bow-rule",
+            "vehicle": str(tmp_path / "heavy.mass"),
+            "world": "still-tank",
+            "pilot": "hover",
+            "target.kind": "pyramid",
+            "control.wake.model": "top-hat",
+            "tank.current.file": "tide",
+        },
+    )
+    assert "bow-rule" in ww.methods()
+    parts = scenario.parts()
+    assert (parts.vehicle.name, parts.vehicle.mass_kg) == ("heavy", 14.0)
+    assert (parts.target.name, parts.wake.name, parts.world.name) == ("pyramid", "top-hat", "still-tank")
+    assert parts.control.levers.drift_m_s == pytest.approx((0.0, 0.0, 0.0), abs=0.01)
+    flight = ww.fly(parts, duration_s=2.0)
+    assert flight.parts.method == "bow-rule" and flight.figures["fallbacks"] == 0
+    assert set(parts.from_outside) == {"controller", "wake", "world", "pilot", "target", "vehicle", "current"}
+    assert "reef-parts 1.0" in parts.from_outside["controller"]
+    assert "differences" in parts.from_outside["wake"]
+    goals = flight.steps.select("goal_x_m", "goal_y_m", "goal_z_m").to_numpy()
+    assert np.ptp(goals, axis=0).max() == 0.0
+    bow = flight.steps.select("command_1_N", "command_2_N", "command_3_N", "command_4_N").to_numpy()
+    forward = [i for i, T in enumerate(parts.vehicle.thrusters) if T.p_BT_m[0] > 0 and abs(T.axis_B[2]) < 0.5]
+    astern = bow[:, forward] * np.array([parts.vehicle.thrusters[i].axis_B[0] for i in forward])
+    assert astern.min() >= -1e-9
+
+
+def test_a_planner_that_believes_in_a_foreign_wake_keeps_it_off_the_target(installed: Path) -> None:
+    """Without gradients of its own the model still steers plan and shares; D falls against the least thrusts."""
+    scenario = ww.Scenario.preset("quick", **{"control.wake.model": "reef_parts:TopHat", "target.points": 60})
+    parts = scenario.parts()
+    flight = ww.fly(parts, duration_s=1.5)
+    assert flight.parts.wake.name == "top-hat"
+    assert flight.steps["fallback"].str.contains("raised").sum() == 0
+    assert "by central differences" in parts.from_outside["wake"]
+
+
+@pytest.mark.slow
+def test_the_foreign_controllers_trial_says_so(installed: Path, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    """Scenario, figures, report and comparison name the method and that it came from outside."""
+    sets = [word for key, value in SMALL.items() for word in ("--set", f"{key}={json.dumps(value)}")]
+    out = tmp_path / "both"
+    assert run(["compare", "--methods", "dp,bow-rule", "--out", str(out), *sets, "--json"]) == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert set(figures["methods"]) == {"dp", "bow-rule"}
+    assert "reef-parts 1.0" in figures["methods"]["bow-rule"]["from_outside"]["controller"]
+    assert figures["methods"]["dp"]["from_outside"] == {}
+    assert "method: bow-rule" in (out / "bow-rule" / "scenario.yaml").read_text()
+    for page in (out / "bow-rule" / "report.html", out / "comparison.html"):
+        text = page.read_text(encoding="utf-8")
+        assert "bow-rule" in text and "from outside" in text, page
+
+
+def test_a_part_given_in_python_is_named_in_the_record(installed: Path, tmp_path: Path) -> None:
+    """A controller object replaces the scenario's method; the scenario left behind says so."""
+    import reef_parts
+
+    from wakewise.control import ControlTask
+    from wakewise.trials.trial import as_flown
+
+    parts = ww.Scenario.preset("quick").parts()
+    task = ControlTask(vehicle=parts.vehicle, region=parts.region, wake=parts.wake, settings=parts.control)
+    mine = parts.replace(controller=reef_parts.bow_rule(task))
+    left = as_flown(mine)
+    assert left.method == "bow-rule"
+    assert left.replaced == {"controller": "bow-rule (reef_parts.BowRule)"}
+    assert ww.Scenario.model_validate(left.model_dump()) == left
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"method": "reef_parts:nothing"}, "cannot be loaded, AttributeError"),
+        ({"method": "no_such_package:make"}, "cannot be loaded, ModuleNotFoundError"),
+        ({"method": "bow-role"}, "did you mean bow-rule"),
+        ({"world": "moon"}, "allowed are tank, paper, lattice, still-tank"),
+        ({"control.wake.model": "top-cat"}, "top-hat"),
+        ({"target.kind": "pyramids"}, "pyramids"),
+    ],
+)
+def test_what_is_not_there_is_said_in_one_line(installed: Path, changes: dict, words: str) -> None:
+    """A wrong name is told what there is; what cannot be imported is told why."""
+    with pytest.raises(InputError, match=words) as caught:
+        parts = ww.Scenario.preset("quick", **changes).parts()
+        _ = parts.target, parts.wake, parts.world, parts.controller
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,200 @@
+"""The core works where none of the extras' packages can be imported, and what needs one says so before it begins."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from wakewise.extras import EXTRAS
+
+BLOCKED = sorted({module for modules in EXTRAS.values() for module in modules})
+_WITHOUT = f"""
+import sys
+
+class Blocked:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {BLOCKED}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+
+sys.meta_path.insert(0, Blocked())
+"""
+
+
+def without_extras(script: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run Python lines in a process of their own, in which no package of an extra can be imported."""
+    return subprocess.run(
+        [sys.executable, "-c", _WITHOUT + script], cwd=folder, capture_output=True, text=True, timeout=600, check=False
+    )
+
+
+def test_rooms_of_the_core_and_all_settings_are_imported_without_extras(tmp_path):
+    """Scenario holds the settings of every room; the names of a lazy room that need no extra can be had."""
+    found = without_extras(
+        """
+import wakewise, wakewise.imaging, wakewise.reconstruction, wakewise.reports, wakewise.trials
+import wakewise.allocation, wakewise.control, wakewise.estimation, wakewise.importers, wakewise.lattice
+import wakewise.missions, wakewise.planning, wakewise.tank, wakewise.targets, wakewise.thrusters, wakewise.wake
+import wakewise.operation.build, wakewise.operation.flying, wakewise.operation.recorder
+import wakewise.studies.gentle.flight, wakewise.studies.wake_validation, wakewise.benches
+import wakewise.reports.vehicle, wakewise.reconstruction.nerf
+from wakewise.evaluation import flight_figures, trajectory_error, umeyama
+from wakewise.imaging import ImagingSettings
+from wakewise.operation import load_scenario
+from wakewise.reconstruction import read_cloud
+load_scenario("quick", None, {})
+""",
+        tmp_path,
+    )
+    assert found.returncode == 0, found.stderr
+
+
+@pytest.mark.slow
+def test_a_mission_is_planned_and_flown_without_extras(tmp_path):
+    """Two seconds in the tank leave a whole steps.parquet."""
+    found = without_extras(
+        """
+from pathlib import Path
+import polars
+from wakewise.operation import FlightRecorder, build_flight, build_mission, fly, load_scenario
+scenario = load_scenario("quick", None, {"method": "dp", "target.points": 60})
+mission = build_mission(scenario)
+flight = build_flight(scenario, mission)
+recorder = FlightRecorder(
+    route=mission.route, X_BC=mission.vehicle.X_BC, exposure_s=scenario.imaging.exposure_s, instants=2,
+    thrusters=len(mission.vehicle.thrusters), dt_s=0.02, witness=flight.witness,
+)
+fly(
+    pilot=flight.pilot, controller=flight.controller, estimator=flight.estimator, plant=flight.tank,
+    witness=flight.witness, start=flight.start, thrusters=len(mission.vehicle.thrusters), duration_s=2.0, dt_s=0.02,
+    record=recorder,
+)
+recorder.write(Path("."))
+steps = polars.read_parquet("steps.parquet")
+assert len(steps) == 100 and steps["time_s"][-1] > 1.9, steps
+assert steps["target_speed_mean_m_s"].max() > 0.0
+""",
+        tmp_path,
+    )
+    assert found.returncode == 0, found.stderr
+
+
+@pytest.mark.slow
+def test_commands_of_the_core_run_without_extras(tmp_path):
+    """Vehicles, allocation, the tank's flow and targets; the paper's planner can be imported."""
+    names = ",".join(f"thrust_{i + 1}_N" for i in range(8))
+    (tmp_path / "t.csv").write_text(f"time_s,{names}\n0,{','.join('1' * 8)}\n1,{','.join('1' * 8)}\n")
+    (tmp_path / "p.csv").write_text("x_m,y_m,z_m\n0.3,0,0.2\n")
+    (tmp_path / "w.csv").write_text("x_m,y_m,z_m,weight\n0.3,0.1,1.2,1\n")
+    found = without_extras(
+        """
+import json
+from contextlib import redirect_stdout
+from io import StringIO
+from wakewise.cli.main import run
+answers = {}
+for words in (
+    "vehicle check paper --json",
+    "vehicle show paper --out v.html --json",
+    "vehicle list --json",
+    "allocate --pose 0 0 0.6 0 0 0 --wrench 2 -1 0 0 0 0.2 --points w.csv --json",
+    "tank probe --thrusts t.csv --points p.csv --pose 0 0 0.2 0 0 0 --json",
+    "target show plate --points 40 --json",
+):
+    with redirect_stdout(StringIO()) as out:
+        code = run(words.split())
+    assert code == 0, words
+    answers[words.split(" --")[0]] = json.loads(out.getvalue())
+from wakewise.planning import PaperPlanner
+print(json.dumps(answers))
+""",
+        tmp_path,
+    )
+    assert found.returncode == 0, found.stderr
+    answers = json.loads(found.stdout)
+    assert answers["target show plate"]["region_points"] == 40
+    assert answers["allocate"]["gap"] <= 1e-5
+    assert (tmp_path / "v.html").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("words", "extras"),
+    [
+        ("scan --out runs/x", "photos,reports,logs"),
+        ("compare --out runs/x", "photos,reports,logs"),
+        ("reconstruct . --out runs/x", "photos"),
+        ("evaluate cloud.ply --reference cloud.ply", "photos"),
+        ("film runs/x", "photos,reports"),
+        ("degrade --out runs/x", "photos,reports"),
+        ("calibrate .", "photos"),
+        ("colour . --out runs/x", "photos"),
+        ("nerf . --out runs/x", "nerf,photos"),
+        ("target show plate --out runs/x.html", "reports,photos"),
+        ("wake validate --quick --out runs/x", "reports"),
+        ("bench gentle --plot runs/x.svg", "reports"),
+        ("bench imaging", "photos"),
+    ],
+)
+def test_a_command_says_in_one_line_which_extra_it_needs(words, extras, tmp_path):
+    """Exit code 2, the packages and how to install them; nothing is written."""
+    (tmp_path / "cloud.ply").write_text(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    )
+    found = without_extras(f"from wakewise.cli.main import run\nsys.exit(run({words.split()!r}))", tmp_path)
+    assert found.returncode == 2, found.stderr
+    (line,) = found.stderr.strip().splitlines()
+    assert line.startswith("wakewise: ")
+    assert f"pip install 'wakewise[{extras}]', or from a clone .venv/bin/pip install -e '.[{extras}]'" in line
+    assert not (tmp_path / "runs").exists()
+
+
+def test_python_is_told_which_extra_a_name_needs(tmp_path):
+    """The error of a room's door is an ImportError too, and names the room's name and the package."""
+    found = without_extras(
+        """
+from wakewise.errors import MissingExtra, WakewiseError
+assert issubclass(MissingExtra, WakewiseError) and issubclass(MissingExtra, ImportError)
+lines = []
+for room, name in (
+    ("imaging", "Scene"), ("reconstruction", "reconstruct"), ("reports", "write_report"), ("trials", "run_trial"),
+    ("operation", "photograph_flight"), ("reports.film", "write_film"),
+):
+    try:
+        exec(f"from wakewise.{room} import {name}")
+    except MissingExtra as refusal:
+        lines.append(str(refusal))
+        assert str(refusal).startswith(f"wakewise.{room}.{name} needs "), refusal
+assert len(lines) == 6, lines
+""",
+        tmp_path,
+    )
+    assert found.returncode == 0, found.stderr
+
+
+HEAVY = ("numpy", "scipy", "numba", "polars", "pydantic", "yaml", "rich", "matplotlib", "cv2", "trimesh")
+
+
+@pytest.mark.parametrize(
+    ("script", "heavy"),
+    [
+        ("import wakewise", HEAVY),
+        ("from wakewise.cli.main import run\nassert run(['--help']) == 0", HEAVY),
+        (
+            "from wakewise.operation import load_scenario\nload_scenario('quick', None, {})",
+            ("polars", "rich", "cv2", "embreex", "pycolmap", "trimesh", "networkx", "skimage", "scipy.stats", "osqp"),
+        ),
+    ],
+)
+def test_what_takes_long_to_import_is_imported_when_it_is_needed(script, heavy, tmp_path):
+    """The front door, the help of all commands, and a scenario read and checked."""
+    found = subprocess.run(
+        [sys.executable, "-c", f"import sys\n{script}\nprint('HEAVY', sorted(set({heavy}) & sys.modules.keys()))"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert found.returncode == 0, found.stderr
+    assert found.stdout.splitlines()[-1] == "HEAVY []"
