@@ -8,7 +8,9 @@ from wakewise.control.trim import ballasted, net_buoyancy_N, trim_advice
 parts = ww.Scenario.preset("quick", vehicle=sys.argv[1] if sys.argv[1:] else "paper", method="dp").parts()
 times = parts.route.exposures_s[:: len(parts.route.exposures_s) // 12]
 poses = tuple(parts.route.body(time, parts.vehicle.X_BC).X_WB for time in times)
-advice = trim_advice(parts.vehicle, poses, parts.region, parts.wake, unknown_N=parts.scenario.tank.trim_range_N)
+advice = trim_advice(
+    parts.vehicle, poses, parts.region, parts.wake, unknown_N=parts.scenario.tank.mismatch.trim_range_N
+)
 print(f"by the wake model, {len(poses)} poses held: {advice.words}")
 
 # A wake model knows neither walls nor what comes round again: ask the simulated tank, too.

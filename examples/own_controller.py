@@ -10,7 +10,7 @@ from wakewise.control import make_tracker, vehicle_layout
 class Mine:
     def __init__(self, parts):
         self.name, self.layout = "mine", vehicle_layout(parts.vehicle)
-        self.tracker = make_tracker(parts.vehicle, parts.scenario.control)
+        self.tracker = make_tracker(parts.vehicle, parts.control)
 
     def init(self):
         return self.tracker.init()

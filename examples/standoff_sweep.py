@@ -1,4 +1,4 @@
-"""How far off should I fly? Water speed at the target and position error over standoff."""
+"""How far off should I fly to leave the water still and keep my place?"""
 
 import sys
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import wakewise as ww
 from wakewise.studies.oracle import oracle_jets
 from wakewise.studies.wake_validation import sampled
-from wakewise.wake import model_names
+from wakewise.wake.models import OWN_MODELS
 from wakewise.wake.samples import read_samples
 from wakewise.wake.scores import score
 
@@ -17,7 +17,7 @@ else:
 for flow in flows:
     print(f"{flow.title}, {len(flow)} points: R2 (1 is perfect, 0 a flow of mean speed, below is worse than that)")
     print(f"{'model':<18}{'within 15 deg, 0.1-0.3 m':>26}{'within 30 deg, 0.1-0.5 m':>26}")
-    for name in model_names():
+    for name in OWN_MODELS:
         found = score(ww.wake_model(name), flow)
         cells = ("too few points" if r2 is None else f"{r2:.2f}" for r2 in (found.r2_core, found.r2_wake))
         print(f"{name:<18}" + "".join(f"{cell:>26}" for cell in cells))
