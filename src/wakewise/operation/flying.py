@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,6 +24,13 @@ from wakewise.operation.scenario import Scenario
 
 WATER_EVERY_S = 0.1
 """How often the water is asked about; in between the last answer stands."""
+
+_IN_WORDS = (
+    ("target_speed_mean_m_s", 1e3, "water at the target {:.2f} mm/s"),
+    ("position_rmse_mm", 1.0, "{:.1f} mm off its way"),
+    ("energy_kJ", 1.0, "{:.3f} kJ"),
+    ("duration_s", 1.0, "{:.0f} s"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +58,16 @@ class Flight:
         frame = self.steps.filter(pl.col("leg") != SETTLING)
         judged = frame if frame.height else self.steps
         return {"method": self.parts.method, "seed": self.parts.scenario.seed, **flight_figures(judged)}
+
+    def __str__(self) -> str:
+        """The flight in one line: the water at the target, the error of position, the energy, what went amiss."""
+        words = [
+            text.format(scale * float(value))
+            for key, scale, text in _IN_WORDS
+            if (value := self.figures[key]) is not None and math.isfinite(value)
+        ]
+        amiss = [f"{self.figures[key]} {key}" for key in ("collisions", "fallbacks") if self.figures[key]]
+        return f"{self.figures['method']}, seed {self.figures['seed']}: {', '.join([*words, *amiss])}"
 
     def write(self, folder: Path) -> None:
         """Write exposures.npz, timings.parquet; last steps.parquet, which says that the flight is whole.

@@ -1,0 +1,25 @@
+"""Is my own controller gentler than wake-aware?"""
+
+import sys
+
+import wakewise as ww
+from wakewise.allocation import least_thrusts
+from wakewise.control import make_tracker, vehicle_layout
+
+
+class Mine:
+    def __init__(self, parts):
+        self.name, self.layout = "mine", vehicle_layout(parts.vehicle)
+        self.tracker = make_tracker(parts.vehicle, parts.control)
+
+    def init(self):
+        return self.tracker.init()
+
+    def step(self, state, dt_s, estimate, goal):
+        state, wrench = self.tracker.wrench(state, dt_s, estimate, goal)
+        return state, ww.Command(thrusts_N=least_thrusts(self.layout, wrench).thrusts_N, wrench_B=wrench)
+
+
+parts = ww.Scenario.preset("quick").parts()
+for flown in (parts, parts.replace(controller=Mine(parts))):  # the same mission in the same water
+    print(ww.fly(flown, duration_s=float(sys.argv[1]) if sys.argv[1:] else None))

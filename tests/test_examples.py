@@ -1,0 +1,129 @@
+"""The examples: a question each, in one look, and what they say is what they do."""
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+SECONDS = "12.5"
+"""Of flight: half a second more than the mission's hover before the first leg, which no figure counts."""
+FLOWN = r"seed 1: water at the target \d+\.\d\d mm/s, \d+\.\d mm off its way, \d+\.\d{3} kJ, \d+ s"
+
+
+def run(name, folder, *arguments):
+    """What the example prints, run in an empty folder as a reader would."""
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / name), *arguments], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    return done.stdout
+
+
+def is_picture(path):
+    return path.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n" and path.stat().st_size > 10_000
+
+
+def test_there_are_eight():
+    """Eight questions."""
+    assert len(list(EXAMPLES.glob("*.py"))) == 8
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.stem)
+def test_an_example_is_read_in_one_look(path):
+    """At most 25 lines in all, and the first is the question as a docstring of one line."""
+    text = path.read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 25
+    question = ast.get_docstring(ast.parse(text)) or ""
+    assert text.splitlines()[0] == f'"""{question}"""' and question.endswith("?")
+
+
+def test_an_own_controller_flies_beside_ours(tmp_path):
+    """One line for each, by name."""
+    ours, mine = run("own_controller.py", tmp_path, SECONDS).splitlines()
+    assert re.match(f"wake-aware, {FLOWN}", ours) and re.match(f"mine, {FLOWN}", mine)
+
+
+def test_an_own_vehicle_says_what_it_can_do_and_flies(tmp_path):
+    """Rank and null space are those of the geometry, of a file as of a name."""
+    said = run("own_vehicle.py", tmp_path, "bluerov2-heavy", SECONDS)
+    assert "8 thrusters, rank 6 of 6, 2 thrusts to spare" in said and said.count("null space ") == 2
+    assert re.search(f"wake-aware, {FLOWN}", said)
+
+
+def test_the_gentle_thrusts_of_one_wrench_are_gentler_and_drawn(tmp_path):
+    """The speed at the target falls by more than half; the picture is there."""
+    speeds = [float(mm_s) for mm_s in re.findall(r"([\d.]+) mm/s", run("one_wrench.py", tmp_path))]
+    assert len(speeds) == 2 and speeds[1] < 0.5 * speeds[0]
+    assert is_picture(tmp_path / "one_wrench.png")
+
+
+def test_ballast_is_advised_and_tried_in_the_tank(tmp_path):
+    """Advice by the wake model, then two flights; less thrust to hold is less energy."""
+    advice, before, after = run("ballast.py", tmp_path, "paper", SECONDS).splitlines()
+    assert "12 poses held: move the centre of gravity" in advice
+    assert before.startswith("as it is: dp") and after.startswith("as advised: dp")
+    energies = [float(kJ) for line in (before, after) for kJ in re.findall(r"([\d.]+) kJ", line)]
+    assert energies[1] < energies[0]
+
+
+def test_wake_models_are_ranked_by_the_lattice(tmp_path):
+    """Both jets, every model; the printed cone of the paper is far off, a fitted one near."""
+    from wakewise.wake.models import OWN_MODELS
+
+    said = run("which_wake_model.py", tmp_path)
+    rows = [line.split() for line in said.splitlines()]
+    assert [row[0] for row in rows if row[0] in OWN_MODELS] == 2 * list(OWN_MODELS)
+    by_name = {row[0]: [float(r2) for r2 in row[1:]] for row in rows if row[0] in OWN_MODELS}
+    assert by_name["paper"][0] < -100 and min(by_name["fitted"]) > 0.5
+
+
+def test_wake_models_are_ranked_by_measured_velocities(tmp_path):
+    """A CSV file of velocities that `jet` made: `jet` explains all of them."""
+    import wakewise as ww
+
+    x, r = (grid.ravel() for grid in np.meshgrid(np.linspace(0.1, 0.5, 20), np.linspace(0.0, 0.1, 10)))
+    speeds = ww.wake_model("jet").speed(x, r, 1.0, 0.25 * np.pi * 0.06**2)
+    table = np.column_stack([x, r, np.ones(len(x)), speeds, np.full(len(x), 0.06)])
+    np.savetxt(tmp_path / "jet.csv", table, delimiter=",", header="x_m,r_m,thrust_N,u_m_s,disk_diameter_m", comments="")
+    said = run("which_wake_model.py", tmp_path, "jet.csv")
+    assert re.search(r"^jet +1\.00 +1\.00$", said, re.MULTILINE)
+
+
+@pytest.mark.slow
+def test_photographs_become_a_model_in_metres(tmp_path):
+    """Photographs with camera centres: all of them register and the model has a scale; a folder is all it takes."""
+    import wakewise as ww
+    from wakewise.studies.photo_sets import planned_views, write_photos
+
+    small = {"mission.elevations_deg": [45], "mission.views": [16], "imaging.width": 400, "imaging.height": 300}
+    scenario = ww.Scenario.preset("quick", **small)
+    target = scenario.parts().target
+    views = planned_views(target, scenario.mission, scenario.imaging.exposure_s, np.random.default_rng(1))
+    write_photos(tmp_path, views, None, scenario.imaging, target)
+    said = run("photographs_to_model.py", tmp_path, "images", "poses.csv")
+    figures = ast.literal_eval(said)
+    assert figures["images"] == figures["registered_images"] == 16 and figures["scale"] > 0.0
+    assert (tmp_path / "runs" / "photographs" / "model" / "dense.ply").exists()
+
+
+def test_a_sweep_over_standoff_is_drawn(tmp_path):
+    """Both methods, both figures, every standoff; farther off the water is stiller."""
+    rows = run("standoff_sweep.py", tmp_path, SECONDS, "0.5", "0.9").splitlines()
+    assert [row.split()[:2] for row in rows] == [
+        [method, key] for method in ("dp", "wake-aware") for key in ("target_speed_mean_m_s", "position_rmse_mm")
+    ]
+    near, far = ast.literal_eval(rows[0].split(maxsplit=2)[2]).values()
+    assert 0.0 < far < near
+    assert is_picture(tmp_path / "standoff_sweep.png")
+
+
+def test_an_own_target_is_flown_round(tmp_path):
+    """A mesh made in the script stands on the bed and is flown round by both methods."""
+    first, *flights = run("own_target.py", tmp_path, SECONDS).splitlines()
+    assert first.startswith("vase: ")
+    assert re.match(f"dp, {FLOWN}", flights[0]) and re.match(f"wake-aware, {FLOWN}", flights[1])

@@ -1,0 +1,102 @@
+"""The pages for readers: every line to paste is one that works, every link leads somewhere, the Python runs."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+import typer
+
+from wakewise.cli.main import app
+
+ROOT = Path(__file__).parents[1]
+PAGES = ["README.md", "CONTRIBUTING.md", "docs/README.md", "docs/python.md", "docs/extending.md"]
+
+
+def blocks(page, language=""):
+    """Code blocks of a page in this language."""
+    found, inside = [], None
+    for line in (ROOT / page).read_text(encoding="utf-8").splitlines(keepends=True):
+        if not line.startswith("```"):
+            if inside is not None:
+                inside[1].append(line)
+        elif inside is None:
+            inside = (line.strip("`\n"), [])
+        else:
+            found.append(inside)
+            inside = None
+    return ["".join(lines) for name, lines in found if name == language]
+
+
+def shell_lines():
+    """Every line of the pages that begins with `wakewise`."""
+    return [
+        (page, line)
+        for page in PAGES
+        for block in blocks(page)
+        for line in block.splitlines()
+        if line.startswith("wakewise ")
+    ]
+
+
+def parse(line):
+    """The command of a line takes its words: command, options and arguments exist and have the right form."""
+    words = shlex.split(line, comments=True)[1:]
+    command = typer.main.get_command(app)
+    while hasattr(command, "commands"):
+        assert words[0] in command.commands, f"no command {words[0]}"
+        command = command.commands[words.pop(0)]
+    if words != ["--help"]:
+        command.make_context(command.name, words)
+
+
+@pytest.mark.parametrize(("page", "line"), shell_lines())
+def test_a_line_to_paste_is_one_that_the_command_takes(page, line):
+    """Commands and options are those that exist."""
+    parse(line)
+
+
+def test_a_line_with_a_wrong_option_would_be_found():
+    """The test above can fail."""
+    with pytest.raises(Exception, match="No such option: --standof"):
+        parse("wakewise scan --standof 0.6")
+
+
+def test_make_lines_have_their_targets():
+    """What README says to make can be made."""
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    for block in blocks("README.md") + blocks("CONTRIBUTING.md"):
+        for target in re.findall(r"^make (\w+)", block, re.MULTILINE):
+            assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
+
+
+def test_the_environment_is_activated_before_the_first_command():
+    """Pasted from the top, every `wakewise` line finds its command."""
+    text = "".join(blocks("README.md"))
+    assert text.index("make setup") < text.index(". .venv/bin/activate") < text.index("\nwakewise ")
+
+
+def test_the_python_of_the_readme_is_the_example():
+    """Word for word, but for the argument that says how long."""
+    example = (ROOT / "examples" / "own_controller.py").read_text(encoding="utf-8")
+    shown = example.partition('"""\n\n')[2].replace("import sys\n\n", "")
+    shown = shown.replace(", duration_s=float(sys.argv[1]) if sys.argv[1:] else None", "")
+    assert blocks("README.md", "python")[0] == shown
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_of_a_page_lead_somewhere(page):
+    """Relative links name files or folders that are there."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    links = re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", text)
+    here = (ROOT / page).parent
+    for link in links:
+        assert link.startswith("http") or (here / link).exists(), link
+
+
+def test_the_index_names_every_page():
+    """No page and no decision of docs/ is missing from its index."""
+    index = (ROOT / "docs" / "README.md").read_text(encoding="utf-8")
+    pages = [*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "decisions").glob("*.md")]
+    missing = [page.name for page in pages if page.name != "README.md" and page.name not in index]
+    assert missing == []
