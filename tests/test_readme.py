@@ -1,5 +1,6 @@
 """The pages for readers: every line to paste is one that works, every link leads somewhere, the Python runs."""
 
+import ast
 import re
 import shlex
 from pathlib import Path
@@ -100,3 +101,38 @@ def test_the_index_names_every_page():
     pages = [*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "decisions").glob("*.md")]
     missing = [page.name for page in pages if page.name != "README.md" and page.name not in index]
     assert missing == []
+
+
+def test_the_python_of_docs_python_runs(tmp_path, monkeypatch):
+    """Pasted one after the other, the blocks run; whole trials, which take minutes, are left out."""
+    monkeypatch.chdir(tmp_path)
+    told = [block for block in blocks("docs/python.md", "python") if "ww.trial(" not in block]
+    names = {}
+    exec("\n".join(told).replace("duration_s=13.0", "duration_s=1.0"), names)
+    assert names["flight"].figures["target_speed_mean_m_s"] >= 0.0
+    assert names["gentle"].gap < 1e-6
+
+
+def bare(text):
+    """Classes and functions of a module by name, without their docstrings."""
+    found = {}
+    for node in ast.parse(text).body:
+        if isinstance(node, (ast.ClassDef, ast.FunctionDef)):
+            if isinstance(node.body[0], ast.Expr) and isinstance(node.body[0].value, ast.Constant):
+                del node.body[0]
+            found[node.name] = ast.dump(node)
+    return found
+
+
+def test_the_cookbook_is_the_module_that_is_tested():
+    """docs/extending.md shows what tests/cookbook installs and flies."""
+    (shown,) = blocks("docs/extending.md", "python")
+    assert bare(shown) == bare((ROOT / "tests" / "cookbook" / "reef_parts.py").read_text(encoding="utf-8"))
+
+
+def test_every_kind_of_plugin_is_in_the_docs():
+    """docs/extending.md names each group of entry points."""
+    from wakewise.plugins import GROUPS
+
+    text = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
+    assert [group for group in GROUPS.values() if f"`{group}`" not in text] == []
