@@ -36,10 +36,10 @@ def test_rooms_of_the_core_and_all_settings_are_imported_without_extras(tmp_path
 import wakewise, wakewise.imaging, wakewise.reconstruction, wakewise.reports, wakewise.trials
 import wakewise.allocation, wakewise.control, wakewise.estimation, wakewise.importers, wakewise.lattice
 import wakewise.missions, wakewise.planning, wakewise.tank, wakewise.targets, wakewise.thrusters, wakewise.wake
-import wakewise.operation.build, wakewise.operation.flying, wakewise.operation.recorder
+import wakewise.api, wakewise.operation.parts, wakewise.operation.flying, wakewise.operation.recorder
 import wakewise.studies.gentle.flight, wakewise.studies.wake_validation, wakewise.benches
 import wakewise.reports.vehicle, wakewise.reconstruction.nerf
-from wakewise.evaluation import flight_figures, trajectory_error, umeyama
+from wakewise.evaluation import flight_figures, umeyama
 from wakewise.imaging import ImagingSettings
 from wakewise.operation import load_scenario
 from wakewise.reconstruction import read_cloud
@@ -57,20 +57,9 @@ def test_a_mission_is_planned_and_flown_without_extras(tmp_path):
         """
 from pathlib import Path
 import polars
-from wakewise.operation import FlightRecorder, build_flight, build_mission, fly, load_scenario
-scenario = load_scenario("quick", None, {"method": "dp", "target.points": 60})
-mission = build_mission(scenario)
-flight = build_flight(scenario, mission)
-recorder = FlightRecorder(
-    route=mission.route, X_BC=mission.vehicle.X_BC, exposure_s=scenario.imaging.exposure_s, instants=2,
-    thrusters=len(mission.vehicle.thrusters), dt_s=0.02, witness=flight.witness,
-)
-fly(
-    pilot=flight.pilot, controller=flight.controller, estimator=flight.estimator, plant=flight.tank,
-    witness=flight.witness, start=flight.start, thrusters=len(mission.vehicle.thrusters), duration_s=2.0, dt_s=0.02,
-    record=recorder,
-)
-recorder.write(Path("."))
+import wakewise as ww
+flight = ww.fly(ww.Scenario.preset("quick", **{"method": "dp", "target.points": 60}), duration_s=2.0)
+flight.write(Path("."))
 steps = polars.read_parquet("steps.parquet")
 assert len(steps) == 100 and steps["time_s"][-1] > 1.9, steps
 assert steps["target_speed_mean_m_s"].max() > 0.0
@@ -106,7 +95,7 @@ for words in (
         code = run(words.split())
     assert code == 0, words
     answers[words.split(" --")[0]] = json.loads(out.getvalue())
-from wakewise.planning import PaperPlanner
+from wakewise.benches.paper_planner import PaperPlanner
 print(json.dumps(answers))
 """,
         tmp_path,

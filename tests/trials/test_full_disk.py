@@ -21,7 +21,6 @@ TINY = {
     "mission.elevations_deg": [40],
     "mission.views": [3],
     "target.kind": "brain",
-    "reconstruction.random_seed": 0,
 }
 OLD = "match: the disk of /x is full, 12.8 MB are left and about 21.5 MB needed; the stages before it are kept"
 

@@ -231,15 +231,9 @@ def test_the_gauss_newton_matrix_is_that_of_the_stacked_velocities(model, superp
     np.testing.assert_array_equal(blocks.hessian, blocks.hessian.T)
 
 
-def test_what_has_no_derivatives_is_refused():
-    """Models from elsewhere, thrusts of another number, NaN thrusts and a negative rounding are named."""
-
-    class Stream:
-        name = "stream"
-
+def test_what_has_no_derivatives_at_all_is_refused():
+    """Thrusts of another number, NaN thrusts and a negative rounding are named."""
     place = (*region(10), pose(), POSITIONS, AXES, AREAS)
-    with pytest.raises(InputError, match="wake model stream: has no derivatives"):
-        gram_with_derivatives(Stream(), *place)
     with pytest.raises(InputError, match=r"thrusts_N: shape \(3,\), allowed \(8,\)"):
         disturbance_slopes(WIDE, *place, np.zeros(3))
     with pytest.raises(InputError, match="thrusts_N: holds NaN"):

@@ -188,7 +188,6 @@ GONE: Mapping[str, str] = {
 """Dotted names of older scenarios that nothing says any more, and why."""
 
 METHODS_GONE: Mapping[str, str] = {
-    "tank.background_length_m": f"{_CONSTANT} (wakewise.tank.settings)",
     "planner": "gone: `wake-aware` with control.levers off",
     "planner-paper": "gone: `wakewise bench planner` has the paper's recipe",
 }

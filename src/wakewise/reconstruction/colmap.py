@@ -1,4 +1,7 @@
-"""COLMAP's blocking calls, quiet, watched and stoppable."""
+"""COLMAP's blocking calls, quiet, watched and stoppable.
+
+The one door to pycolmap: whoever needs it takes it from here, without the signal handlers that it sets on import.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +20,8 @@ from typing import TypeVar
 import pycolmap
 
 from wakewise.errors import EnvironmentFailure, StageError
+
+__all__ = ["RESERVE_MB", "be_quiet", "call", "keep_sigterm", "no_stderr", "pycolmap", "settle", "workroom"]
 
 T = TypeVar("T")
 # Room that a disk must keep while COLMAP writes its database: what it writes in about a second.

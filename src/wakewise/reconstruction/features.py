@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-import pycolmap
 
 from wakewise.errors import InputError, StageError
 from wakewise.files import whole_file
 from wakewise.interfaces import Progress
 from wakewise.processes import half_done
-from wakewise.reconstruction.colmap import call, settle, workroom
+from wakewise.reconstruction.colmap import call, pycolmap, settle, workroom
 from wakewise.reconstruction.lenses import Lens
 from wakewise.reconstruction.pairs import Pairs
 from wakewise.reconstruction.photos import Photo, PhotoStore

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pycolmap
 
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError, StageError
+from wakewise.reconstruction.colmap import pycolmap
 
 # Which parameters of COLMAP's models are fx, fy, cx, cy, k1, k2, p1, p2; -1 is a zero.
 LAYOUTS = {

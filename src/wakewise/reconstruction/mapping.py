@@ -10,14 +10,13 @@ from typing import Any
 
 import cv2
 import numpy as np
-import pycolmap
 
 from wakewise.arrays import Array, IntArray
 from wakewise.errors import InputError, StageError
 from wakewise.evaluation import robust_similarity
 from wakewise.files import whole_folder
 from wakewise.interfaces import Progress
-from wakewise.reconstruction.colmap import call, no_stderr, settle, workroom
+from wakewise.reconstruction.colmap import call, no_stderr, pycolmap, settle, workroom
 from wakewise.reconstruction.photos import PhotoStore
 from wakewise.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
 

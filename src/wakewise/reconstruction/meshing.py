@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pycolmap
 import trimesh
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -18,7 +17,7 @@ from wakewise.errors import StageError
 from wakewise.interfaces import Progress
 from wakewise.processes import half_done
 from wakewise.reconstruction.clouds import read_cloud, write_mesh
-from wakewise.reconstruction.colmap import call, no_stderr
+from wakewise.reconstruction.colmap import call, no_stderr, pycolmap
 from wakewise.reconstruction.settings import ReconstructionSettings
 from wakewise.reconstruction.stages import need_room
 

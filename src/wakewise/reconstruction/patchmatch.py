@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pycolmap
 from scipy.spatial import KDTree
 
 from wakewise.errors import InputError, StageError
 from wakewise.interfaces import Progress
 from wakewise.processes import half_done
 from wakewise.reconstruction.clouds import Cloud, read_cloud, write_cloud
-from wakewise.reconstruction.colmap import call
+from wakewise.reconstruction.colmap import call, pycolmap
 from wakewise.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
 from wakewise.reconstruction.stages import need_room
 from wakewise.reconstruction.views import Ball

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pycolmap
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.files import write_json
 from wakewise.interfaces import Progress, no_progress
 from wakewise.processes import alone
+from wakewise.reconstruction.colmap import pycolmap
 from wakewise.reconstruction.dense import densify
 from wakewise.reconstruction.features import check_sizes, database_bytes, match_photos
 from wakewise.reconstruction.lenses import Lens

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import pycolmap
 
 from wakewise.arrays import Array, IntArray, freeze
 from wakewise.errors import StageError
+from wakewise.reconstruction.colmap import pycolmap
 from wakewise.reconstruction.lenses import lens_of
 
 # Stereo is best near this angle between two views: less is imprecise, more looks too different. The band is what was

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import pycolmap
 from numpy.typing import NDArray
 
 from wakewise.arrays import Array, BoolArray, freeze
 from wakewise.errors import InputError, StageError
+from wakewise.reconstruction.colmap import pycolmap
 from wakewise.reconstruction.photos import decode
 from wakewise.reconstruction.views import Ball
 
