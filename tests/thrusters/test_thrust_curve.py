@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wakewise.errors import InputError
-from wakewise.thrusters.thrust_curve import CurveSide, ThrustCurve, curve_names, library_curve, load_curve
+from wakewise.thrusters.curve_library import curve_names, library_curve, load_curve
+from wakewise.thrusters.thrust_curve import CurveSide, ThrustCurve
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[3] / "shared" / "data"))
 T200 = library_curve("t200")

@@ -4,9 +4,9 @@ import json
 
 import numpy as np
 
+from wakewise.thrusters.curve_library import library_curve
 from wakewise.thrusters.lag_fit import identify_lag
 from wakewise.thrusters.rotor_lag import SecondOrderLag
-from wakewise.thrusters.thrust_curve import library_curve
 from wakewise.thrusters.thrust_table import parse_thrust_table
 from wakewise.thrusters.thruster_facts import curve_facts, lag_facts, usual_voltage
 

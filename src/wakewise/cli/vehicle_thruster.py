@@ -56,7 +56,7 @@ def thruster(
     """Show a thrust curve: limits, deadband, and pulses, thrusts, speed and power both ways."""
     from wakewise.files import write_text
     from wakewise.reports.vehicle.thrust_drawing import curve_svg
-    from wakewise.thrusters.thrust_curve import load_curve
+    from wakewise.thrusters.curve_library import load_curve
     from wakewise.thrusters.thruster_facts import curve_facts, usual_voltage
 
     curve = load_curve(table)
