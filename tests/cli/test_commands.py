@@ -79,3 +79,15 @@ def test_a_model_that_is_the_truth_scores_perfectly(capsys: pytest.CaptureFixtur
     assert score["completeness_1mm_pct"] > 99.0
     assert score["success"] is True
     assert "completeness_visible_pct" in score["why"]
+
+
+def test_help_names_every_method_and_every_wake_model() -> None:
+    """`--method` and `--wake-model` list what there is, so that nobody learns it from a refusal."""
+    from wakewise.control import METHODS
+    from wakewise.wake.models import OWN_MODELS
+
+    page = (Path(__file__).parents[2] / "docs" / "commands.md").read_text(encoding="utf-8")
+    scan = " ".join(page.split("## wakewise scan")[1].split("\n## ")[0].split())
+    allocate = " ".join(page.split("## wakewise allocate")[1].split("\n## ")[0].split())
+    assert [name for name in METHODS if name not in scan] == []
+    assert [name for name in OWN_MODELS if name not in allocate] == []

@@ -7,6 +7,7 @@ import wakewise as ww
 from wakewise.errors import InputError
 from wakewise.operation import PARTS
 from wakewise.operation import parts as module
+from wakewise.trials.trial import as_flown
 
 QUICK = ww.Scenario.preset("quick", **{"target.points": 60})
 
@@ -40,6 +41,16 @@ def test_fields_of_the_scenario_can_be_replaced_beside_parts():
     with pytest.raises(InputError, match="captain: no such field"):
         parts.replace(captain="me")
     assert {"vehicle", "target", "region", "route", "world", "estimator", "controller", "pilot", "wake"} <= set(PARTS)
+
+
+def test_a_part_that_a_scenario_cannot_name_is_asked_for_again():
+    """The scenario that such a trial leaves behind gives all its other parts, and says what it lacks."""
+    flown = QUICK.parts().replace(vehicle=ww.load_vehicle("bluerov2-heavy"), method="dp")
+    left = as_flown(flown).parts()
+    assert left.target.name == "branching"
+    with pytest.raises(InputError, match=r"vehicle: was given in Python \(bluerov2-heavy .*replace\(vehicle=\.\.\.\)"):
+        _ = left.vehicle
+    assert left.replace(vehicle=flown.vehicle).controller.name == "dp"
 
 
 def test_the_same_parts_fly_the_same_flight_twice():

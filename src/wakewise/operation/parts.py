@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from wakewise.control import ControlSettings, make_controller
 from wakewise.control.settings import told
+from wakewise.errors import InputError
 from wakewise.estimation import ErrorStateFilter
 from wakewise.importers import any_vehicle
 from wakewise.interfaces import BodyState, Controller, Estimator, Pilot, WakeModel, World
@@ -41,9 +42,17 @@ class part(cached_property[T]):  # noqa: N801  (a decorator, like cached_propert
 
     def __get__(self, instance: Any, owner: type | None = None) -> Any:
         """The part that was given, or the scenario's own, made once."""
-        if instance is None or self.attrname not in instance.given:
+        if instance is None:
             return super().__get__(instance, owner)
-        return instance.given[self.attrname]
+        if self.attrname in instance.given:
+            return instance.given[self.attrname]
+        once = instance.scenario.replaced.get(self.attrname or "")
+        if once is not None:  # the scenario of a trial that was flown with another part than it can name
+            raise InputError(
+                f"{self.attrname}: was given in Python ({once}), which a scenario's file cannot hold; "
+                f"give it again with replace({self.attrname}=...)"
+            )
+        return super().__get__(instance, owner)
 
 
 class Parts:

@@ -20,13 +20,14 @@ import websockets.asyncio.server
 from wakewise.arrays import Array, IntArray
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_multiply
+from wakewise.importers import any_vehicle
 from wakewise.reports.errors import ModelErrors
 from wakewise.reports.ink import error_colours
 from wakewise.reports.looks import coloured_model
 from wakewise.reports.trial import Photograph, Surface, Trial
 from wakewise.reports.vehicle.hull import hull_of
 from wakewise.reports.views import OUTLOOK
-from wakewise.vehicles import Vehicle, load_vehicle
+from wakewise.vehicles import Vehicle
 
 # NED to ENU: swap x and y, turn z round; a half turn about the line between x and y.
 R_UW = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
@@ -271,11 +272,11 @@ def _body_poses(trial: Trial) -> list[Pose]:
 
 def vehicle_of(trial: Trial) -> Vehicle | None:
     """Vehicle that the scenario names; None if it is not known here."""
-    name = trial.scenario.get("vehicle")
-    if not isinstance(name, str):
+    name, replaced = trial.scenario.get("vehicle"), trial.scenario.get("replaced") or {}
+    if not isinstance(name, str) or "vehicle" in replaced:
         return None
     try:
-        return load_vehicle(name)
+        return any_vehicle(name)
     except (InputError, OSError):
         return None
 

@@ -94,8 +94,11 @@ class Trial:
     @property
     def outside(self) -> str:
         """In words what of the flight was not the package's own; empty if all of it was."""
-        parts = [] if self.method in (*METHODS, "unknown method") else [f"controller from outside: {self.method}"]
         replaced = self.scenario.get("replaced")
+        named = self.method in (*METHODS, "unknown method") or (
+            isinstance(replaced, Mapping) and "controller" in replaced
+        )
+        parts = [] if named else [f"controller from outside: {self.method}"]
         if isinstance(replaced, Mapping):
             parts += [f"{part} replaced: {said}" for part, said in replaced.items()]
         elif replaced:
