@@ -5,7 +5,7 @@ import pytest
 
 import wakewise as ww
 from wakewise.errors import InputError
-from wakewise.operation import PARTS
+from wakewise.operation import PARTS, read_scenario, write_scenario
 from wakewise.operation import parts as module
 from wakewise.trials.trial import as_flown
 
@@ -51,6 +51,22 @@ def test_a_part_that_a_scenario_cannot_name_is_asked_for_again():
     with pytest.raises(InputError, match=r"vehicle: was given in Python \(bluerov2-heavy .*replace\(vehicle=\.\.\.\)"):
         _ = left.vehicle
     assert left.replace(vehicle=flown.vehicle).controller.name == "dp"
+
+
+def test_the_record_of_a_controller_of_ones_own_can_be_read(tmp_path):
+    """What it calls itself stands as the method; without that record no scenario may ask for such a name."""
+
+    class Mine:
+        name = "mine"
+
+    left = as_flown(QUICK.parts().replace(controller=Mine()))
+    write_scenario(tmp_path / "scenario.yaml", left, {})
+    again = read_scenario(tmp_path / "scenario.yaml")
+    assert again == left and (again.method, list(again.replaced)) == ("mine", ["controller"])
+    with pytest.raises(InputError, match="controller: was given in Python"):
+        _ = again.parts().controller
+    with pytest.raises(InputError, match="method: found 'mine'"):
+        QUICK.replace(method="mine")
 
 
 def test_the_same_parts_fly_the_same_flight_twice():

@@ -43,10 +43,10 @@ def from_outside(parts: Parts) -> dict[str, str]:
     """Parts of a flight that are not this package's own, in words: given in Python or named in the scenario."""
     found = {name: described(part) for name, part in parts.given.items() if not is_ours(part)}
     for name, (kind, named, own) in _named(parts.scenario).items():
-        if name in parts.given or named in own or not (named in offered(kind) or ":" in named):
+        is_file = Path(named).expanduser().exists()
+        if name in parts.given or named in own or is_file or not (named in offered(kind) or ":" in named):
             continue
-        origin = find(kind, named, own).origin
-        found[name] = f"{named} (from {origin})"
+        found[name] = f"{named} (from {find(kind, named, own).origin})"
     ending = Path(parts.scenario.vehicle).suffix.removeprefix(".").lower()
     if "vehicle" not in parts.given and ending in offered("vehicle format"):
         found["vehicle"] = f"{parts.scenario.vehicle} (read by {find('vehicle format', ending, {}).origin})"

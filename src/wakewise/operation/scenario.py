@@ -53,6 +53,10 @@ class Scenario(Settings):
 
     name: str = Field("scan", min_length=1, max_length=80, description="what the trial is called in its report")
     seed: int = Field(1, ge=0, description="every random draw of the trial follows from it")
+    replaced: dict[str, str] = Field(
+        default={},
+        description="parts that were given in Python in place of the scenario's own, in words; not to be set",
+    )
     method: str = Field("wake-aware", description="how thrusts are chosen: a method's name, or package.module:make")
     vehicle: str = Field("paper", description="library name or path of a vehicle file")
     world: str = Field("tank", description="where it is flown: tank, paper (circular), lattice, or package.module:make")
@@ -64,15 +68,13 @@ class Scenario(Settings):
     tank: TankSettings = TankSettings()
     imaging: ImagingSettings = ImagingSettings()
     reconstruction: ReconstructionSettings = ReconstructionSettings()
-    replaced: dict[str, str] = Field(
-        default={},
-        description="parts that were given in Python in place of the scenario's own, in words; not to be set",
-    )
 
     @field_validator("method", "world", "pilot")
     @classmethod
     def _known(cls, value: str, info: ValidationInfo) -> str:
         kind = str(info.field_name)
+        if kind == "method" and "controller" in info.data.get("replaced", {}):
+            return value  # what the controller that was given calls itself
         known = names(kind, _OWN[kind])
         if value not in known and ":" not in value:
             close = difflib.get_close_matches(value, known, 1)
