@@ -14,19 +14,9 @@ from wakewise.interfaces import Progress
 from wakewise.operation import read_scenario
 from wakewise.reconstruction import read_cloud
 from wakewise.reconstruction.nerf import FieldSettings, build_field
-from wakewise.trials.trial import REGION_SHARE
+from wakewise.trials.trial import MAIN_SURFACE_FIGURES, REGION_SHARE
 
-_FIGURES = (
-    "rmse_mm",
-    "rmse_cap_mm",
-    "accuracy_median_mm",
-    "completeness_pct",
-    "completeness_visible_pct",
-    "completeness_1mm_pct",
-    "completeness_2mm_pct",
-    "f_score",
-    "success",
-)
+_FIGURES = (*MAIN_SURFACE_FIGURES, "success")
 
 
 def is_trial(folder: Path) -> bool:

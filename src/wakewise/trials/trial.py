@@ -39,7 +39,7 @@ from wakewise.trials.metrics import Figures, Gathering, comparison
 from wakewise.trials.stages import Ledger, Quiet, Watch, of_the_computer
 from wakewise.trials.yardstick import add_yardsticks
 
-_SURFACE_FIGURES = (
+MAIN_SURFACE_FIGURES = (
     "rmse_mm",
     "rmse_cap_mm",
     "accuracy_median_mm",
@@ -48,6 +48,10 @@ _SURFACE_FIGURES = (
     "completeness_1mm_pct",
     "completeness_2mm_pct",
     "f_score",
+)
+"""Of a model against the truth, in the order of tables."""
+_SURFACE_FIGURES = (
+    *MAIN_SURFACE_FIGURES,
     "accuracy_p90_mm",
     "completeness_visible_1mm_pct",
     "completeness_visible_2mm_pct",
