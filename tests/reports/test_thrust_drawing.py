@@ -7,7 +7,7 @@ import pytest
 
 from wakewise.errors import InputError
 from wakewise.reports.vehicle.thrust_drawing import curve_svg
-from wakewise.thrusters.thrust_curve import library_curve
+from wakewise.thrusters.curve_library import library_curve
 from wakewise.thrusters.thrust_table import parse_thrust_table
 
 SVG = "{http://www.w3.org/2000/svg}"
