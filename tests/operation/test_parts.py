@@ -46,6 +46,7 @@ def test_fields_of_the_scenario_can_be_replaced_beside_parts():
 def test_a_part_that_a_scenario_cannot_name_is_asked_for_again():
     """The scenario that such a trial leaves behind gives all its other parts, and says what it lacks."""
     flown = QUICK.parts().replace(vehicle=ww.load_vehicle("bluerov2-heavy"), method="dp")
+    assert as_flown(flown).vehicle == "bluerov2-heavy"
     left = as_flown(flown).parts()
     assert left.target.name == "branching"
     with pytest.raises(InputError, match=r"vehicle: was given in Python \(bluerov2-heavy .*replace\(vehicle=\.\.\.\)"):

@@ -9,6 +9,7 @@ import numpy as np
 import polars as pl
 import yaml
 
+from wakewise.reports.report import report_page
 from wakewise.reports.trial import read_trial
 
 
@@ -61,6 +62,8 @@ def test_a_method_or_part_from_outside_is_named_and_hides_no_setting(made_up: Pa
     trial = read_trial(folder)
     assert trial.method == "mylab.steering:make"
     assert trial.outside == "controller from outside: mylab.steering:make; estimator replaced: mylab.Filter"
+    page = report_page(trial)
+    assert "run the script that gave them" in page and "wakewise scan" not in page.split('id="again"')[1]
     assert trial.bed_z_m == 1.6
 
 

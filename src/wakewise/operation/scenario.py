@@ -73,8 +73,8 @@ class Scenario(Settings):
     @classmethod
     def _known(cls, value: str, info: ValidationInfo) -> str:
         kind = str(info.field_name)
-        if kind == "method" and "controller" in info.data.get("replaced", {}):
-            return value  # what the controller that was given calls itself
+        if {"method": "controller"}.get(kind, kind) in info.data.get("replaced", {}):
+            return value  # what the part that was given calls itself
         known = names(kind, _OWN[kind])
         if value not in known and ":" not in value:
             close = difflib.get_close_matches(value, known, 1)

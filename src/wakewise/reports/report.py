@@ -349,6 +349,13 @@ def _again(trial: Trial) -> str:
             break
         known.append(line.lstrip("# ").strip())
     command = f"wakewise scan {shlex.quote(f'{trial.name}/scenario.yaml')} --out {shlex.quote(f'{trial.name}-again')}"
+    how = "The scenario file holds every setting; the same seed gives the same flight."
+    if trial.scenario.get("replaced"):
+        command = f"ww.trial(parts.replace(...), {trial.name + '-again'!r})"
+        how = (
+            "Some parts were given in Python, which a scenario file cannot hold: run the script that gave them. The "
+            "file has every other setting; the same seed and parts give the same flight."
+        )
     facts = [("seed", trial.seed), ("method", trial.method), ("versions", ", ".join(known) or "not recorded")]
     listed = "".join(f"<dt>{name}</dt><dd>{escape(value)}</dd>" for name, value in facts)
     scenario = missing("the scenario", absence(trial, "scenario.yaml"))
@@ -362,7 +369,7 @@ def _again(trial: Trial) -> str:
     return section(
         "again",
         "How to reproduce it",
-        "The scenario file holds every setting; the same seed gives the same flight.",
+        how,
         f'<pre class="command">{escape(command)}</pre><dl class="facts">{listed}</dl>{scenario}{note}',
     )
 

@@ -135,7 +135,12 @@ def as_flown(parts: Parts) -> Scenario:
     """The scenario that a trial leaves behind: what was given in Python in place of its own parts is named in it."""
     if not parts.given:
         return parts.scenario
-    return parts.scenario.model_copy(update={"method": parts.method, "replaced": parts.replaced})
+    scenario, given = parts.scenario, parts.given
+    told: dict[str, Any] = {"method": parts.method, "replaced": parts.replaced}
+    told |= {name: given[name].name for name in ("vehicle", "world") if name in given}
+    if "target" in given:
+        told["target"] = scenario.target.model_copy(update={"kind": given["target"].name})
+    return scenario.model_copy(update=told)
 
 
 def claim(folder: Path, scenario: Scenario) -> None:
