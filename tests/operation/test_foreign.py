@@ -128,6 +128,20 @@ def test_another_part_that_raises_ends_the_flight_in_one_line():
         ww.fly(PARTS.replace(pilot=Pilot(), method="dp"), duration_s=SECONDS)
 
 
+def test_memory_that_runs_out_is_blamed_on_no_part():
+    """It stays the computer's fault, to be told as such and flown again, though the pilot is from outside."""
+
+    @dataclass
+    class Pilot:
+        name: str = "hungry"
+
+        def goal(self, time_s, estimate):
+            raise MemoryError("Unable to allocate 214 GiB")
+
+    with pytest.raises(MemoryError, match="214 GiB"):
+        ww.fly(PARTS.replace(pilot=Pilot(), method="dp"), duration_s=SECONDS)
+
+
 def test_our_own_are_flown_as_they_are():
     """No guard round a controller of this package: it has its own."""
     own = PARTS.replace(method="dp")

@@ -163,7 +163,7 @@ def fly(
             record=record,
             progress=progress,
         )
-    except WakewiseError:
+    except (WakewiseError, MemoryError):  # for memory that ran out no part is to blame
         raise
     except Exception as fault:
         foreign = parts.from_outside
