@@ -123,7 +123,7 @@ class Gathering:
         result: Figures = {key: self.figures.get(key) for key in _FIGURES}
         result |= {key: value for key, value in self.figures.items() if key not in _FIGURES}
         why = {
-            key: self.reasons.get(key, "the stage that computes it did not")
+            key: self.reasons.get(key, "nothing in this trial measured it")
             for key, value in result.items()
             if value is None
         }
