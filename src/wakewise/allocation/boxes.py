@@ -10,14 +10,14 @@ from __future__ import annotations
 import heapq
 
 import numpy as np
-from numba import njit
 
 from wakewise.allocation.cells import CLOSED, examine
 from wakewise.allocation.coupled import descend, explore
 from wakewise.arrays import Array, IntArray
+from wakewise.compiled import njit
 
 
-@njit(cache=True)
+@njit
 def coordinates(null: Array, thrusts: Array) -> IntArray:
     """Thrusters, shape (k,), whose rows of `null` are independent, those of least |thrust| first."""
     n, k = null.shape
@@ -38,7 +38,7 @@ def coordinates(null: Array, thrusts: Array) -> IntArray:
     return chosen
 
 
-@njit(cache=True)
+@njit
 def box_search(
     G: Array,
     starts: Array,

@@ -10,10 +10,10 @@ sqrt(x y) <= (r x + y / r) / 2 holds with |T_i| at the corners, since |T_i| lies
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from wakewise.allocation.search import cost
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 
 CLOSED = 1e-5
 """Relative gap at which a search ends: a tenth of what the thrusters could show."""
@@ -21,7 +21,7 @@ CLOSED = 1e-5
 _ROUNDING_N = 1e-9
 
 
-@njit(cache=True)
+@njit
 def _terms(
     G: Array,
     signs: Array,
@@ -63,7 +63,7 @@ def _terms(
             cross[i, j] = worst
 
 
-@njit(cache=True)
+@njit
 def _tangent(
     cross: Array, single: Array, linear: Array, square: float, at: Array, signs: Array, slope: Array, size_slope: Array
 ) -> float:
@@ -92,7 +92,7 @@ def _tangent(
     return constant
 
 
-@njit(cache=True)
+@njit
 def _least_corner(
     concave: Array, constant: float, slope: Array, size_slope: Array, T: Array, count: int
 ) -> tuple[float, int]:
@@ -109,7 +109,7 @@ def _least_corner(
     return least, lowest
 
 
-@njit(cache=True)
+@njit
 def _gather(cross: Array, signs: Array, root: Array, roots: Array, count: int, single: Array, concave: Array) -> bool:
     """Join what hangs on the root of a thrust that comes close to zero into one term; False if nothing does.
 
@@ -144,7 +144,7 @@ def _gather(cross: Array, signs: Array, root: Array, roots: Array, count: int, s
     return True
 
 
-@njit(cache=True)
+@njit
 def _balance(
     concave: Array, linear: Array, square: float, along: Array, widths: Array, centre: Array, at: Array
 ) -> None:
@@ -175,7 +175,7 @@ def _balance(
             at[i] += along[i, c] * moved[c]
 
 
-@njit(cache=True)
+@njit
 def examine(
     G: Array,
     T: Array,

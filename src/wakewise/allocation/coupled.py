@@ -6,13 +6,13 @@ It builds on `search.line_minimum`, which is exact along a line; the cost f is d
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from wakewise.allocation.search import TOLERANCE, box_range, cost, line_minimum
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 
 
-@njit(cache=True)
+@njit
 def _move(
     G: Array, thrusts: Array, direction: Array, lower: Array, upper: Array, previous: Array, weights: Array
 ) -> float:
@@ -36,7 +36,7 @@ def _move(
     return 0.0
 
 
-@njit(cache=True)
+@njit
 def descend(
     G: Array, thrusts: Array, null: Array, lower: Array, upper: Array, previous: Array, weights: Array, sweeps: int
 ) -> float:
@@ -72,7 +72,7 @@ def descend(
     return cost(G, thrusts, previous, weights)
 
 
-@njit(cache=True)
+@njit
 def explore(
     G: Array, thrusts: Array, null: Array, lower: Array, upper: Array, previous: Array, weights: Array, rounds: int
 ) -> float:

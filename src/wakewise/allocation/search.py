@@ -17,9 +17,9 @@ value found: the minimum is global, and the gap is proven, not hoped for.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 
 TOLERANCE = 1e-7
 """Relative gap at which a line search stops: far below what a thruster can reproduce."""
@@ -29,7 +29,7 @@ _EVALUATIONS = 2000
 _STEEP = 1e300
 
 
-@njit(cache=True)
+@njit
 def cost(G: Array, thrusts: Array, previous: Array, weights: Array) -> float:
     """f(T) in the units of the weights; `weights` is (w_D, w_u, w_p)."""
     n = thrusts.size
@@ -45,7 +45,7 @@ def cost(G: Array, thrusts: Array, previous: Array, weights: Array) -> float:
     return total
 
 
-@njit(cache=True)
+@njit
 def box_range(base: Array, direction: Array, lower: Array, upper: Array) -> tuple[float, float]:
     """Interval of t that keeps base + t direction within the limits; empty (low > high) if there is none."""
     low, high = -np.inf, np.inf
@@ -59,7 +59,7 @@ def box_range(base: Array, direction: Array, lower: Array, upper: Array) -> tupl
     return low, high
 
 
-@njit(cache=True)
+@njit
 def _curved(t: float, a: Array, b: Array, cross: Array, single: Array, root: Array) -> tuple[float, float, float]:
     """Concave value, convex value and slope of the convex part at t, for |T_i| = a_i + b_i t."""
     m = a.size
@@ -88,7 +88,7 @@ def _curved(t: float, a: Array, b: Array, cross: Array, single: Array, root: Arr
     return concave, convex, slope
 
 
-@njit(cache=True)
+@njit
 def _floor(low: float, high: float, a: Array, b: Array, cross: Array, single: Array) -> float:
     """Crude lower bound of the convex part on [low, high]: every root at its largest."""
     m = a.size
@@ -102,7 +102,7 @@ def _floor(low: float, high: float, a: Array, b: Array, cross: Array, single: Ar
     return total
 
 
-@njit(cache=True)
+@njit
 def _lowest(linear: float, square: float, low: float, high: float) -> tuple[float, float]:
     """Where linear t + square t^2 (square >= 0) is least on [low, high], and that value."""
     straight = low if linear > 0.0 else high
@@ -110,7 +110,7 @@ def _lowest(linear: float, square: float, low: float, high: float) -> tuple[floa
     return t, linear * t + square * t * t
 
 
-@njit(cache=True)
+@njit
 def _bound(
     a: float, left: Array, b: float, right: Array, constant: float, linear: float, square: float
 ) -> tuple[float, float]:
@@ -139,7 +139,7 @@ def _bound(
     return t_best, best
 
 
-@njit(cache=True)
+@njit
 def line_minimum(
     G: Array,
     base: Array,
@@ -281,7 +281,7 @@ def line_minimum(
     return t_best, best, max(gap, TOLERANCE * abs(best))
 
 
-@njit(cache=True)
+@njit
 def coupling(G: Array, lines: Array) -> float:
     """Largest |G_ij| between thrusters of different lines, relative to the largest |G|; `lines` has shape (k, n)."""
     k, n = lines.shape
@@ -301,7 +301,7 @@ def coupling(G: Array, lines: Array) -> float:
     return between / largest if largest > 0.0 else 0.0
 
 
-@njit(cache=True)
+@njit
 def disjoint_search(
     G: Array, start: Array, lines: Array, lower: Array, upper: Array, previous: Array, weights: Array
 ) -> tuple[Array, float]:
@@ -327,7 +327,7 @@ def disjoint_search(
     return np.minimum(np.maximum(thrusts, lower), upper), gap
 
 
-@njit(cache=True)
+@njit
 def split_allocation(
     G: Array,
     inverse: Array,

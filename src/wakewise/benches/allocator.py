@@ -9,7 +9,6 @@ from typing import Any
 
 import daqp
 import numpy as np
-from numba import njit
 from scipy.optimize import LinearConstraint, minimize
 
 from wakewise.allocation import Layout, Weights, compile_layout, gentle_allocation, least_thrusts
@@ -17,6 +16,7 @@ from wakewise.allocation.allocate import COUPLING_LIMIT
 from wakewise.allocation.search import box_range, cost, coupling, split_allocation
 from wakewise.arrays import Array
 from wakewise.benches.cases import REGION, TARGET, VEHICLE, cases
+from wakewise.compiled import njit
 from wakewise.geometry import Pose, look_at, quat_from_matrix
 from wakewise.trials.timing import BenchOptions, timed_us
 from wakewise.wake import WakeSettings, disturbance, wake_model
@@ -80,7 +80,7 @@ def _speed(layout: Layout, problems: list[Problem], weights: Weights) -> dict[st
     }
 
 
-@njit(cache=True)
+@njit
 def _line_grid(
     G: Array, start: Array, line: Array, low: float, high: float, count: int, previous: Array, weights: Array
 ) -> float:
@@ -97,7 +97,7 @@ def _line_grid(
     return best
 
 
-@njit(cache=True)
+@njit
 def _square_grid(
     G: Array, start: Array, lines: Array, ends: Array, count: int, previous: Array, weights: Array
 ) -> float:

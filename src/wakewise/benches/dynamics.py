@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.geometry import quat_from_euler
 from wakewise.physics import GRAVITY_M_S2
 from wakewise.physics import TRIM_WATER_KG_M3 as RHO_KG_M3

@@ -17,10 +17,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
 from scipy import sparse
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.planning.condensing import add_commands, condense
 from wakewise.planning.kernels import RATE_N, horizon, rotation
 from wakewise.planning.planner import PlanModel, Planner
@@ -35,7 +35,7 @@ SQP_STEPS, QP_ITERATIONS, TOLERANCE = 5, 50, 1e-4
 _STEP = 1e-5
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def _turned(state, axis, step, moved):  # type: ignore[no-untyped-def]
     """State moved by `step` along position (0 to 2) or rotation vector (3 to 5)."""
     moved[:] = state
@@ -55,7 +55,7 @@ def _turned(state, axis, step, moved):  # type: ignore[no-untyped-def]
         moved[r] /= size
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def taylor_block(wake, scratch, state, thrusts, central, block):  # type: ignore[no-untyped-def]
     """Second derivatives of D of one stage by differences of its gradient: position, rotation vector, thrusts."""
     n = thrusts.shape[0]
@@ -86,7 +86,7 @@ def taylor_block(wake, scratch, state, thrusts, central, block):  # type: ignore
             block[axis, r] = (ahead[r] - behind[r]) / (2.0 * _STEP) if central else (ahead[r] - base[r]) / _STEP
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def taylor_blocks(wake, scratch, states, thrusts, blocks):  # type: ignore[no-untyped-def]
     """One-sided `taylor_block` of every stage."""
     for k in range(thrusts.shape[0]):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array, freeze
+from wakewise.compiled import njit
 from wakewise.control.settings import ControlSettings
 from wakewise.control.stability import Gains, stable_gain_scale, vehicle_axes, wished_gains
 from wakewise.interfaces import BodyState, Goal
@@ -152,7 +152,7 @@ def make_tracker(vehicle: Vehicle, settings: ControlSettings) -> Tracker:
     )
 
 
-@njit(cache=True)
+@njit
 def _turn(q: Array, v: Array, inverse: bool) -> Array:
     """Turn a vector by R(q), or by its inverse."""
     sign = -1.0 if inverse else 1.0
@@ -167,7 +167,7 @@ def _turn(q: Array, v: Array, inverse: bool) -> Array:
     )
 
 
-@njit(cache=True)
+@njit
 def _pid(  # type: ignore[no-untyped-def]
     p,
     q,

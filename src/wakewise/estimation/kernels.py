@@ -11,9 +11,9 @@ in W (0:3), turn, a rotation vector in B (3:6), then as in `mean`, each place on
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.estimation.resting import DRAG, at_rest, rest_effects, turn
 from wakewise.vehicles.kernels import INVERSE, LINEAR, QUADRATIC, damping, rate_kernel, rotate
 from wakewise.vehicles.runge_kutta import rk4_jacobian_kernel
@@ -22,7 +22,7 @@ MOVING, FORCE, MOMENT, GYRO, FELT, CURRENT, INERTIA, GAINS = 12, 12, 15, 18, 21,
 """Where each block of the error begins; the first is how many entries the equations of motion move."""
 
 
-@njit(cache=True)
+@njit
 def turned_by(q: Array, rotvec: Array) -> Array:
     """Unit quaternion q exp(rotvec): a further turn, expressed in the body."""
     angle = np.sqrt(rotvec[0] ** 2 + rotvec[1] ** 2 + rotvec[2] ** 2)
@@ -40,7 +40,7 @@ def turned_by(q: Array, rotvec: Array) -> Array:
     return result / np.sqrt(np.dot(result, result))
 
 
-@njit(cache=True)
+@njit
 def turn_between(q: Array, other: Array) -> Array:
     """Rotation vector, shorter way, that turns q into `other`, expressed in the body of q."""
     w = q[0] * other[0] + q[1] * other[1] + q[2] * other[2] + q[3] * other[3]
@@ -54,7 +54,7 @@ def turn_between(q: Array, other: Array) -> Array:
     return np.array([factor * x, factor * y, factor * z])
 
 
-@njit(cache=True)
+@njit
 def believed(packed: Array, mean: Array) -> Array:
     """The vehicle's packed numbers with the drag and the inertia that the mean now believes in, shape (20, 6)."""
     own = packed.copy()
@@ -70,7 +70,7 @@ def believed(packed: Array, mean: Array) -> Array:
     return own
 
 
-@njit(cache=True)
+@njit
 def pushed(own: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array) -> Array:
     """Wrench in B of thrusts, with the gains believed in, and of what the model does not explain, shape (6,)."""
     wrench = at_rest(own, mean, rest_q)
@@ -85,14 +85,14 @@ def pushed(own: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q:
     return wrench
 
 
-@njit(cache=True)
+@njit
 def _past(mean: Array) -> tuple[float, float, float, float, float, float]:
     """Twist relative to the water, in B."""
     x, y, z = rotate(-mean[3], mean[4], mean[5], mean[6], mean[25], mean[26], mean[27])
     return mean[7] - x, mean[8] - y, mean[9] - z, mean[10], mean[11], mean[12]
 
 
-@njit(cache=True)
+@njit
 def unexplained(packed: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array) -> Array:
     """Wrench in B, shape (6,), that the nominal vehicle in still water lacks to move as the mean has it."""
     vehicle = believed(packed, mean)
@@ -106,7 +106,7 @@ def unexplained(packed: Array, allocation: Array, mean: Array, thrusts_N: Array,
     return wrench
 
 
-@njit(cache=True)
+@njit
 def _inputs(own: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array) -> Array:
     inputs = np.empty(9)
     inputs[:6] = pushed(own, allocation, mean, thrusts_N, rest_q)
@@ -114,7 +114,7 @@ def _inputs(own: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q
     return inputs
 
 
-@njit(cache=True)
+@njit
 def _effects(own: Array, mean: Array, inputs: Array) -> Array:
     """Wrench, shape (6, 12), by the relative change of drag and of inertia in each degree of freedom."""
     rate = np.empty(13)
@@ -147,7 +147,7 @@ def _effects(own: Array, mean: Array, inputs: Array) -> Array:
     return effect
 
 
-@njit(cache=True)
+@njit
 def _add_current(F: Array, A: Array, mean: Array, dt_s: float) -> None:
     """Fill F's columns of the current: it acts as a velocity the other way, and turns in B."""
     q, w = mean[3:7], mean[10:13]
@@ -170,7 +170,7 @@ def _add_current(F: Array, A: Array, mean: Array, dt_s: float) -> None:
             F[9 + i, CURRENT + j] = change[3 + i]
 
 
-@njit(cache=True)
+@njit
 def moved(
     packed: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array, dt_s: float, errors: int
 ) -> Array:
@@ -214,7 +214,7 @@ def moved(
     return F
 
 
-@njit(cache=True)
+@njit
 def felt(
     packed: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array, down_B: Array, H: Array
 ) -> Array:
@@ -241,7 +241,7 @@ def felt(
     return force
 
 
-@njit(cache=True)
+@njit
 def predict(
     packed: Array,
     allocation: Array,
@@ -275,7 +275,7 @@ def predict(
     _fade(mean, P, dt_s, spread, lasts_s)
 
 
-@njit(cache=True)
+@njit
 def _fade(mean: Array, P: Array, dt_s: float, spread: Array, lasts_s: Array) -> None:
     for k in range(spread.shape[0]):
         i, kept = CURRENT + k, np.exp(-dt_s / lasts_s[k])
@@ -286,7 +286,7 @@ def _fade(mean: Array, P: Array, dt_s: float, spread: Array, lasts_s: Array) -> 
         P[i, i] += spread[k] ** 2 * (1.0 - kept * kept)
 
 
-@njit(cache=True)
+@njit
 def _add_noise(P: Array, q: Array, dt_s: float, noise: Array) -> None:
     linear, angular = noise[0] ** 2, noise[1] ** 2
     for i in range(3):
@@ -308,7 +308,7 @@ def _add_noise(P: Array, q: Array, dt_s: float, noise: Array) -> None:
             P[k, k] += noise[2 + block] ** 2 * dt_s
 
 
-@njit(cache=True)
+@njit
 def correct(mean: Array, P: Array, H: Array, residual: Array, R: Array, gate: float) -> float:
     """Kalman update in place by a measurement with rows H (m, E), residual (m,) and covariance R (m, m).
 

@@ -14,16 +14,16 @@ The current is `mean[25:28]`, `own` the vehicle's packed numbers with drag and i
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.vehicles.kernels import LINEAR, QUADRATIC, coriolis, damping, rotate
 
 DRAG = 27
 """Where the error's drag begins; inertia comes six places later."""
 
 
-@njit(cache=True)
+@njit
 def turn(q: Array, v: Array, sign: float) -> Array:
     """Vector R(q) v for sign = 1, R(q)' v for sign = -1."""
     w, x, y, z = q[0], sign * q[1], sign * q[2], sign * q[3]
@@ -31,13 +31,13 @@ def turn(q: Array, v: Array, sign: float) -> Array:
     return np.array([v[0] + w * tx + y * tz - z * ty, v[1] + w * ty + z * tx - x * tz, v[2] + w * tz + x * ty - y * tx])
 
 
-@njit(cache=True)
+@njit
 def _past_at_rest(mean: Array, rest_q: Array) -> tuple[float, float, float, float, float, float]:
     x, y, z = rotate(-rest_q[0], rest_q[1], rest_q[2], rest_q[3], mean[25], mean[26], mean[27])
     return -x, -y, -z, 0.0, 0.0, 0.0
 
 
-@njit(cache=True)
+@njit
 def at_rest(own: Array, mean: Array, rest_q: Array) -> Array:
     """Drag and Munk moment of the current on the vehicle at rest, as the equations of motion subtract them, shape (6,).
 
@@ -51,7 +51,7 @@ def at_rest(own: Array, mean: Array, rest_q: Array) -> Array:
     return wrench
 
 
-@njit(cache=True)
+@njit
 def rest_effects(own: Array, mean: Array, rest_q: Array) -> Array:
     """By what `at_rest`, with its force in B, changes with current (3), drag (6) and inertia (6), shape (6, 15)."""
     past, q = _past_at_rest(mean, rest_q), mean[3:7]

@@ -16,10 +16,10 @@ import cv2
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
-from numba import njit
 from numpy.typing import NDArray
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.film.wash import LIFE_S, Tracers
 from wakewise.geometry import Pose
 from wakewise.imaging import (
@@ -253,7 +253,7 @@ def _display(radiance: Image) -> Image:
     return srgb_encode((x * (1.0 + x / 6.25) / (1.0 + 0.72 * x)).astype(np.float64)).astype(np.float32)
 
 
-@njit(cache=True)
+@njit
 def _draw(glow: Any, pixels: Any, away_m: Any, strength: Any, colours: Any, depth_m: Any) -> None:
     """Add every trail as dots half a pixel apart, fainter toward its end, where nothing stands before it."""
     h, w, _ = glow.shape

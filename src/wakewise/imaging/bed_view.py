@@ -13,8 +13,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from wakewise.compiled import njit
 from wakewise.imaging.height_field import BLOCK, meet
 from wakewise.imaging.lens import IDEAL, ray_at
 from wakewise.imaging.lighting import lamps_on, spread_at
@@ -26,7 +26,7 @@ RUN = 128
 """Pixels shaded together."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def project_bed(bed: Any, row: Any, R_WC: Any, origin: Any, crossings: Any, boxes: Any) -> None:
     """Write the bed's crossings in the camera frame and their pixels, and the box of pixels of each block of cells.
 
@@ -61,7 +61,7 @@ def project_bed(bed: Any, row: Any, R_WC: Any, origin: Any, crossings: Any, boxe
             boxes[bi, bj, 0], boxes[bi, bj, 1], boxes[bi, bj, 2], boxes[bi, bj, 3] = u0, u1, v0, v1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def _beside(crossings: Any, i: int, j: int, left: float, right: float, up: float, down: float) -> bool:
     """Whether a cell's crossings are all beyond one side of the pyramid between four slopes."""
     beyond_left = beyond_right = beyond_up = beyond_down = True
@@ -74,7 +74,7 @@ def _beside(crossings: Any, i: int, j: int, left: float, right: float, up: float
     return bool(beyond_left or beyond_right or beyond_up or beyond_down)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def _draw_triangle(
     crossings: Any, ai: int, aj: int, bi: int, bj: int, ci: int, cj: int, name: int, x0: int, x1: int, y0: int, y1: int,
     first: int, row: Any, nearness: Any, names: Any,
@@ -109,7 +109,7 @@ def _draw_triangle(
                     names[into, x] = name
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def _draw_cells(
     crossings: Any, boxes: Any, row: Any, width: int, first: int, last: int, nearness: Any, names: Any
 ) -> None:
@@ -151,7 +151,7 @@ def _draw_cells(
                     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def draw_bed(
     first: int, last: int, row: Any, R_WC: Any, origin: Any, bed: Any, crossings: Any, boxes: Any, attributes: Any,
     maps: Any, power: float, lamps: Any, kind: Any, depth_m: Any, radiance: Any, lamp_radiance: Any, bed_kind: int,
@@ -236,7 +236,7 @@ def draw_bed(
                 lamp_radiance[y, x, 2] = blue * night
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def _between(attributes: Any, n: int, corner: int, u: float, v: float) -> tuple[float, float, float, float]:
     """Attributes at the place (u, v) of the cell whose least corner is `corner`."""
     a = np.uint64(corner)
@@ -252,7 +252,7 @@ def _between(attributes: Any, n: int, corner: int, u: float, v: float) -> tuple[
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def bed_colour(
     x: float, y: float, z: float, wx: float, wy: float, wz: float, footprint: float, n: int, i: int, j: int, u: float,
     v: float, attributes: Any, maps: Any, ax: float, ay: float, az: float, power: float, lamps: Any,

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from wakewise.compiled import njit
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
 from wakewise.imaging.camera import Camera
@@ -94,7 +94,7 @@ def motion_blur(image: Image, depth_m: Image, camera: Camera, poses: Sequence[Po
     return out
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def _split(first: int, last: int, planes: Any, image: Any) -> None:
     """An image (h, w, 3) as planes (3, h, w): along a plane's rows several pixels go through at once."""
     for y in range(first, last):
@@ -106,7 +106,7 @@ _HALF, _ONE = np.float32(0.5), np.float32(1.0)
 _THREE_HALVES, _TWO, _FIVE_HALVES = np.float32(1.5), np.float32(2.0), np.float32(2.5)
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(inline="always")
 def _cubic(t: Any) -> Any:
     """Weights of four neighbours at a fraction t: cubic convolution (Keys 1981, doi 10.1109/TASSP.1981.1163711).
 
@@ -120,7 +120,7 @@ def _cubic(t: Any) -> Any:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def _seen_at(lens: Any, turns: Any, shifts: Any, k: int, qx: float, qy: float, nearness: float) -> tuple[float, float]:
     """Pixel at which another frame sees what the middle one sees in the pixel (qx, qy) at 1 / nearness."""
     if lens[0] == IDEAL:
@@ -139,7 +139,7 @@ def _seen_at(lens: Any, turns: Any, shifts: Any, k: int, qx: float, qy: float, n
     return pixel_at(lens, x, y, max(z, lens[13] + 1e-3))
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def _source(
     lens: Any, turns: Any, shifts: Any, k: int, x: int, y: int, qx: float, qy: float, depth_m: Any
 ) -> tuple[float, float]:
@@ -157,7 +157,7 @@ def _source(
     return qx, qy
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def _sources(lens: Any, turns: Any, shifts: Any, k: int, y: int, depth_m: Any, nearness: Any, qx: Any, qy: Any) -> None:
     """Write `_source` of a row of pixels.
 
@@ -196,7 +196,7 @@ def _sources(lens: Any, turns: Any, shifts: Any, k: int, y: int, depth_m: Any, n
             qx[x], qy[x] = _source(lens, turns, shifts, k, x, y, x + 0.5, y + 0.5, depth_m)
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def _add_run(total: Any, pixels: Any, across: Any, down: Any) -> None:
     """Add to `total` (m,) the values between pixels (m + 3,) of one row at fractions `across`, times `down`."""
     for x in range(total.shape[0]):
@@ -204,7 +204,7 @@ def _add_run(total: Any, pixels: Any, across: Any, down: Any) -> None:
         total[x] += down[x] * (a0 * pixels[x] + a1 * pixels[x + 1] + a2 * pixels[x + 2] + a3 * pixels[x + 3])
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def _add_frame(totals: Any, planes: Any, columns: Any, rows: Any, across: Any, down: Any) -> None:
     """Add to `totals` (3, w) the values of the planes at pixels `columns`, `rows` plus fractions `across` and `down`.
 
@@ -237,7 +237,7 @@ def _add_frame(totals: Any, planes: Any, columns: Any, rows: Any, across: Any, d
         first = last
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def _average(first: int, last: int, out: Any, planes: Any, depth_m: Any, turns: Any, shifts: Any, lens: Any) -> None:
     """Mean over frames k of image[q_k(p)], where q_k solves seen_k(q) = p, in rows first..last-1."""
     h, w = depth_m.shape

@@ -10,10 +10,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from wakewise.arrays import Array, IntArray
+from wakewise.compiled import njit
 
 BLOCK = 8
 """Cells along a block's side."""
@@ -62,7 +62,7 @@ def grid_faces(n: int) -> IntArray:
     return np.concatenate([np.stack([a, c, b], axis=1), np.stack([a, d, c], axis=1)])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def cell_of(lines: Any, cell_at: Any, per_bin: float, x: float) -> int:
     """Cell along an axis in which x lies, the first or last if it is outside."""
     place = min(max(int((x - lines[0]) * per_bin), 0), cell_at.shape[0] - 1)
@@ -72,7 +72,7 @@ def cell_of(lines: Any, cell_at: Any, per_bin: float, x: float) -> int:
     return i
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def meet(
     lines: Any, per_cell: Any, cell_at: Any, z: Any, tops: Any, per_bin: float, top: float, bottom: float,
     ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, most: float,
@@ -192,7 +192,7 @@ def meet(
             return np.inf, 0, 0, 0.0, 0.0
 
 
-@njit(cache=True, nogil=True, inline="always", error_model="numpy")
+@njit(nogil=True, inline="always")
 def _on_triangle(z: Any, i: int, j: int, u: float, v: float, side: float) -> float:
     """Height at (u, v) of a cell's triangle at higher u (side > 0) or at higher v, extended beyond its borders."""
     a, c = np.float64(z[i, j]), np.float64(z[i + 1, j + 1])
@@ -203,7 +203,7 @@ def _on_triangle(z: Any, i: int, j: int, u: float, v: float, side: float) -> flo
     return a + v * (d - a) + u * (c - d)
 
 
-@njit(cache=True, nogil=True, inline="always", error_model="numpy")
+@njit(nogil=True, inline="always")
 def _surface(z: Any, i: int, j: int, u: float, v: float) -> float:
     """Height at (u, v) of a cell."""
     return _on_triangle(z, i, j, u, v, u - v)

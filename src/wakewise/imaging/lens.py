@@ -16,9 +16,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 
 IDEAL, DISTORTED, PORT = 0.0, 1.0, 2.0
 NEWTON_STEPS = 30
@@ -46,7 +46,7 @@ def lens_row(
     return np.array([kind, focal_px, focal_px, *centre_px, *distortion, air, glass, n_glass, n_water, air + glass])
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def distort(row: Any, x: float, y: float) -> tuple[float, float]:
     """Distorted slopes of ideal ones."""
     k1, k2, p1, p2 = row[5], row[6], row[7], row[8]
@@ -55,7 +55,7 @@ def distort(row: Any, x: float, y: float) -> tuple[float, float]:
     return x * m + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x), y * m + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def undistort(row: Any, xd: float, yd: float) -> tuple[float, float]:
     """Ideal slopes of distorted ones, by Newton's method on both at once."""
     k1, k2, p1, p2 = row[5], row[6], row[7], row[8]
@@ -77,14 +77,14 @@ def undistort(row: Any, xd: float, yd: float) -> tuple[float, float]:
     return x, y
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def refracted(slope: float, index: float) -> float:
     """Tangent of a ray's angle to the axis in a medium of `index`, of its tangent in air."""
     sine = slope / (index * math.sqrt(1.0 + slope * slope))
     return sine / math.sqrt(1.0 - sine * sine)
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def ray_at(row: Any, u: float, v: float) -> tuple[float, float, float]:
     """Ray (sx, sy, z0) in the water of a pixel."""
     x, y = (u - row[3]) / row[1], (v - row[4]) / row[2]
@@ -101,7 +101,7 @@ def ray_at(row: Any, u: float, v: float) -> tuple[float, float, float]:
     return x * water / slope, y * water / slope, row[13] - out / water
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def pixel_at(row: Any, x: float, y: float, z: float) -> tuple[float, float]:
     """Pixel of a point of the water in the camera frame; NaN for a point that is not before the camera."""
     if z <= row[13] or z <= 0.0:
@@ -118,7 +118,7 @@ def pixel_at(row: Any, x: float, y: float, z: float) -> tuple[float, float]:
     return row[1] * x + row[3], row[2] * y + row[4]
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def _slope_in_air(row: Any, aside: float, z: float) -> float:
     """Slope at which the ray to a point `aside` off the axis at depth z leaves the lens.
 
@@ -147,7 +147,7 @@ def _slope_in_air(row: Any, aside: float, z: float) -> float:
     return slope
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def rays_of(row: Any, pixels: Any) -> Any:
     """`ray_at` of pixels, shape (n, 2) to (n, 3)."""
     out = np.empty((pixels.shape[0], 3))
@@ -156,7 +156,7 @@ def rays_of(row: Any, pixels: Any) -> Any:
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def pixels_of(row: Any, points_C_m: Any) -> Any:
     """`pixel_at` of points, shape (n, 3) to (n, 2)."""
     out = np.empty((points_C_m.shape[0], 2))

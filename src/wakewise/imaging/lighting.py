@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from numba import njit
-
+from wakewise.compiled import njit
 from wakewise.imaging.lens import IDEAL, ray_at
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def lamps_on(
     x: float, y: float, z: float, nx: float, ny: float, nz: float, ax: float, ay: float, az: float, power: float,
     lamps: Any,
@@ -30,7 +29,7 @@ def lamps_on(
     return total
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def spread_at(row: Any, x: float, y: float, sx: float, sy: float) -> float:
     """Width of a pixel at unit depth: how fast the ray turns from pixel to pixel."""
     if row[0] == IDEAL:

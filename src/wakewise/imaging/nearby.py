@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array, IntArray
+from wakewise.compiled import njit
 from wakewise.imaging.lens import ray_at
 
 PIECE_M = 0.03
@@ -43,7 +43,7 @@ def bounding_spheres(parts: Sequence[tuple[Array, IntArray]]) -> Array:
     return np.concatenate(found)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def _cone(row: Any, x0: float, y0: float, x1: float, y1: float) -> tuple[float, float, float, float, float, float]:
     """Cone round the rays of a rectangle of pixels: unit axis, apex on the optical axis, half angle, apex's spread."""
     sx, sy, apex = ray_at(row, 0.5 * (x0 + x1), 0.5 * (y0 + y1))
@@ -57,7 +57,7 @@ def _cone(row: Any, x0: float, y0: float, x1: float, y1: float) -> tuple[float, 
     return ax, ay, az, apex, SLACK * math.acos(max(min(least, 1.0), -1.0)) + 1e-6, SLACK * spread
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def _meets(
     ax: float, ay: float, az: float, apex: float, cosine: float, sine: float, spread: float, x: float, y: float,
     z: float, radius: float,
@@ -69,7 +69,7 @@ def _meets(
     return bool(aside * cosine - along * sine <= radius + spread)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def may_meet(row: Any, width: int, height: int, spheres_C: Any, out: Any) -> None:
     """Write, for each tile of 8 x 8 pixels, whether a ray through it may meet a sphere.
 

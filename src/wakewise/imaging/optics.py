@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array, freeze
+from wakewise.compiled import njit
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.imaging.camera import Camera
@@ -204,7 +204,7 @@ def through_water(
     return out, silt_per_m
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def sample_grid(values: Any, origin: Any, spacing: float, x: float, y: float, z: float) -> float:
     """Trilinear value of a grid at a point; zero outside."""
     u, v, w = (x - origin[0]) / spacing, (y - origin[1]) / spacing, (z - origin[2]) / spacing
@@ -221,7 +221,7 @@ def sample_grid(values: Any, origin: Any, spacing: float, x: float, y: float, z:
     return low * (1 - c) + high * c
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def _march(
     first: int, last: int, table: Any, ranges: Any, stride: int, lens: Any, R_WC: Any, p: Any, values: Any, origin: Any,
     spacing: float, attenuation: float, signal: Any, veil_rate: Any, water_veil: Any, silt_veil: Any, water_back: Any,
@@ -289,14 +289,14 @@ def _march(
                 table[row, column, node, 0] = tau
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(inline="always")
 def _mean_decay(rate: float, length: float, kept: float) -> float:
     """Integral of exp(-rate s) over 0..length, of which `kept` = exp(-rate length) is left."""
     x = rate * length
     return length * (1.0 - 0.5 * x) if x < 1e-6 else (1.0 - kept) / rate
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(inline="always")
 def decayed(tau: float) -> float:
     """exp(-tau) of an optical depth, not negative: a 64th of it by series, then squared six times.
 
@@ -312,7 +312,7 @@ def decayed(tau: float) -> float:
     return y * y
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def _apply(
     first_row: int, last_row: int, out: Any, silt_per_m: Any, radiance: Any, lamp_radiance: Any, depth_m: Any,
     ranges: Any, table: Any, stride: int, lens: Any, signal: Any, veil_rate: Any, water_veil: Any,

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit, prange
 from wakewise.geometry import Pose
 from wakewise.imaging.blur import pose_at
 from wakewise.imaging.camera import Camera
@@ -110,7 +110,7 @@ def draw_flakes(
     return out
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(parallel=True)
 def _sample(values: Any, origin: Any, spacing: float, points: Any) -> Any:
     out = np.empty(points.shape[0])
     for i in prange(points.shape[0]):
@@ -118,7 +118,7 @@ def _sample(values: Any, origin: Any, spacing: float, points: Any) -> Any:
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def _splat(out: Any, depth_m: Any, track: Any, z: Any, radius: Any, cover: Any, colour: Any) -> None:
     """Blend flakes one after the other; a streak is drawn as overlapping disks that share the cover."""
     h, w = depth_m.shape

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.imaging.renderer import BAND_ROWS, Image, in_threads
 
 _TABLE_SIZE = 4096
@@ -62,7 +62,7 @@ def expose(
     return out
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def _encode(out: Any, radiance: Any, noise: Any, gains: Any, shot: Any, read: Any, table: Any) -> None:
     """Rows of interleaved channels, shape (h, 3 w), in single precision throughout; `read` is a variance."""
     zero, one, half = np.float32(0.0), np.float32(1.0), np.float32(0.5)

@@ -10,8 +10,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from wakewise.compiled import njit
 from wakewise.imaging.bed_view import FAR_M, bed_colour
 from wakewise.imaging.height_field import meet
 from wakewise.imaging.lens import ray_at
@@ -20,7 +20,7 @@ from wakewise.imaging.scene import BED, STONE, TARGET
 from wakewise.imaging.texture import coral_albedo, stone_albedo
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def aim(
     pixels: Any, across: int, width: int, row: Any, R_WC: Any, origin: Any, top: float, starts: Any, ways: Any,
     which: Any, spreads: Any,
@@ -54,7 +54,7 @@ def aim(
     return count
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def needs_more(kind: Any, depth_m: Any, first: int, last: int, out: Any) -> None:
     """Where one ray is not enough: not bed and not open water, or beside another kind or a step of 4 % in depth.
 
@@ -83,7 +83,7 @@ def needs_more(kind: Any, depth_m: Any, first: int, last: int, out: Any) -> None
             out[y, x] = other | ((own >= 0) & (step | (own != BED)))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def _solid_colour(
     what: int, triangle: int, u: float, v: float, x: float, y: float, z: float, wx: float, wy: float, wz: float,
     footprint: float, faces: Any, first_face: Any, normals: Any, light: Any, seed: int, ax: float, ay: float, az: float,
@@ -115,7 +115,7 @@ def _solid_colour(
     return red, green, blue, day, night
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def overlay(
     pixels: Any, row: Any, width: int, which: Any, starts: Any, ways: Any, spreads: Any, solids: Any, triangle: Any,
     u: Any, v: Any, distance: Any, faces: Any, first_face: Any, normals: Any, light: Any, seed: int, R_WC: Any,
@@ -151,7 +151,7 @@ def overlay(
         radiance[pixel, 2], lamp_radiance[pixel, 2] = blue * (day + night), blue * night
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def average(
     pixels: Any, across: int, which: Any, starts: Any, ways: Any, spreads: Any, solids: Any, triangle: Any, u: Any,
     v: Any, distance: Any, faces: Any, first_face: Any, normals: Any, light: Any, seed: int, bed: Any, attributes: Any,

@@ -14,8 +14,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
+
+from wakewise.compiled import njit, prange
 
 FINEST_CELL_M = 0.0015
 BED_TEXEL_M = 0.00075
@@ -25,7 +26,7 @@ BED_MAP_LEVELS = 6
 Maps = NDArray[np.uint16]
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(inline="always")
 def _finalise(h: int) -> float:
     """Scramble 32 bits and map them to [0, 1)."""
     h &= 0xFFFFFFFF
@@ -37,7 +38,7 @@ def _finalise(h: int) -> float:
     return h * (1.0 / 4294967296.0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def value_noise(x: float, y: float, z: float, seed: int) -> float:
     """Smooth noise in [0, 1] with mean 1/2 on the unit lattice."""
     xi, yi, zi = math.floor(x), math.floor(y), math.floor(z)
@@ -55,7 +56,7 @@ def value_noise(x: float, y: float, z: float, seed: int) -> float:
     return a + w * (b - a)
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def octaves(
     x: float, y: float, z: float, coarsest_m: float, finest_m: float, gain: float, footprint_m: float, seed: int
 ) -> float:
@@ -75,7 +76,7 @@ def octaves(
     return total / weight
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def coral_albedo(x: float, y: float, z: float, footprint_m: float, seed: int) -> tuple[float, float, float]:
     """Reflectance (r, g, b) of a coral at a point of the world.
 
@@ -90,7 +91,7 @@ def coral_albedo(x: float, y: float, z: float, footprint_m: float, seed: int) ->
     return q * (0.33 + 0.18 * hue), q * (0.225 + 0.22 * hue), q * (0.135 + 0.02 * hue)
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def stone_albedo(x: float, y: float, z: float, footprint_m: float, seed: int) -> tuple[float, float, float]:
     """Reflectance (r, g, b) of a stone at a point of the world; coarse noise gives each its own grey."""
     grain = octaves(x, y, z, 0.012, FINEST_CELL_M, 0.8, footprint_m, seed + 201)
@@ -99,7 +100,7 @@ def stone_albedo(x: float, y: float, z: float, footprint_m: float, seed: int) ->
     return q * 0.25, q * (0.235 - 0.03 * tone), q * (0.205 - 0.06 * tone)
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def sand_albedo(x: float, y: float, footprint_m: float, seed: int) -> tuple[float, float, float]:
     """Reflectance (r, g, b) of carbonate sand above or below a point: about 0.3-0.45 (Hochberg et al. 2003)."""
     stain = octaves(x, y, 0.0, 0.32, 0.04, 0.75, footprint_m, seed + 301)
@@ -112,7 +113,7 @@ def sand_albedo(x: float, y: float, footprint_m: float, seed: int) -> tuple[floa
     return q * 0.40, q * (0.365 - 0.03 * stain), q * (0.295 - 0.06 * stain)
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def bed_height(x: float, y: float, clear_m: float, seed: int) -> float:
     """Height in m of the sand above the nominal bed, at a point relative to the target's foot.
 
@@ -125,7 +126,7 @@ def bed_height(x: float, y: float, clear_m: float, seed: int) -> float:
     return 2.0 * amplitude * octaves(x, y, 0.0, 0.5, 0.06, 0.55, 0.0, seed + 401)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(parallel=True)
 def bed_heights(xy_m: Any, clear_m: float, seed: int) -> Any:
     """`bed_height` at points, shape (n, 2) to (n,)."""
     out = np.empty(xy_m.shape[0])
@@ -134,7 +135,7 @@ def bed_heights(xy_m: Any, clear_m: float, seed: int) -> Any:
     return out
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(parallel=True)
 def bake_bed(size: int, levels: int, texel_m: float, seed: int) -> Any:
     """Bake the sand's albedo into nested maps centred on the target's foot.
 
@@ -158,7 +159,7 @@ def bake_bed(size: int, levels: int, texel_m: float, seed: int) -> Any:
     return maps
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def _bilinear(maps: Any, level: int, texel_m: float, x: float, y: float) -> tuple[float, float, float]:
     size = maps.shape[1]
     per_texel, middle = 1.0 / texel_m, 0.5 * size - 0.5
@@ -176,7 +177,7 @@ def _bilinear(maps: Any, level: int, texel_m: float, x: float, y: float) -> tupl
     )
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(inline="always")
 def whole_log2(x: float) -> tuple[int, float]:
     """Logarithm to base 2 of x >= 1 as whole number and rest, from the bits; the rest is within 0.01.
 
@@ -187,7 +188,7 @@ def whole_log2(x: float) -> tuple[int, float]:
     return (bits >> 23) - 127, m * (4.0 - m) * (1.0 / 3.0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def baked_albedo(maps: Any, texel_m: float, x: float, y: float, footprint_m: float) -> tuple[float, float, float]:
     """Look the bed's albedo up at (x, y) from the target's foot, between the two levels that suit the footprint."""
     levels, size = maps.shape[0], maps.shape[1]

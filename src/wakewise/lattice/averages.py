@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
 from scipy.ndimage import map_coordinates
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit, prange
 
 MOMENTS = 8
 """What is averaged in every cell: p, u, v, w, uu, vv, ww, vw."""
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(parallel=True)
 def accumulate(field: np.ndarray, sums: Array) -> None:
     """Add the moments of one instant, `field` of shape (4, nx, ny, nz), to `sums`, shape (MOMENTS, nx, ny, nz)."""
     for x in prange(field.shape[1]):

@@ -21,10 +21,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import float32, njit, prange
+from numba import float32
 from numpy.typing import NDArray
 
 from wakewise.arrays import Array, IntArray
+from wakewise.compiled import njit, prange
 
 Lattice = NDArray[np.float32]
 
@@ -81,7 +82,7 @@ def smagorinsky_factor(constant: float) -> float:
     return 18 * math.sqrt(2) * constant**2
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", boundscheck=False)
+@njit(fastmath=True, boundscheck=False)
 def _collide(f: Lattice, tau_x: float, tau_yz: Lattice, e2: float) -> None:
     """Collide `PIECE` cells in place; population i of cell p is f[i * PIECE + p].
 
@@ -166,7 +167,7 @@ def _collide(f: Lattice, tau_x: float, tau_yz: Lattice, e2: float) -> None:
         f[17 * PIECE + p], f[18 * PIECE + p] = even + odd, even - odd
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", boundscheck=False)
+@njit(fastmath=True, boundscheck=False)
 def _fill_missing(f: Lattice, x: int, y: int, z: int, ny: int, nz: int, faces: IntArray) -> None:
     """Write what the cell beside a face will pull from beyond it into the halo, from the cell's own populations.
 
@@ -219,7 +220,7 @@ def _fill_missing(f: Lattice, x: int, y: int, z: int, ny: int, nz: int, faces: I
             f[i, a, b * mz + c] = WEIGHTS[i] * value
 
 
-@njit(cache=True, parallel=True, fastmath=True, error_model="numpy", boundscheck=False)
+@njit(parallel=True, fastmath=True, boundscheck=False)
 def fill_halo(f: Lattice, ny: int, nz: int, faces: IntArray) -> None:
     """Fill what the cells beside open faces and walls will pull; at rest the halo is zero, as is all else."""
     nx = f.shape[1] - 2
@@ -235,7 +236,7 @@ def fill_halo(f: Lattice, ny: int, nz: int, faces: IntArray) -> None:
                 _fill_missing(f, x, y, nz, ny, nz, faces)
 
 
-@njit(cache=True, parallel=True, fastmath=True, error_model="numpy", boundscheck=False)
+@njit(parallel=True, fastmath=True, boundscheck=False)
 def step(
     src: Lattice, dst: Lattice, ny: int, nz: int, tau_x: Lattice, tau_yz: Lattice, eddies: float, faces: IntArray
 ) -> None:
@@ -290,7 +291,7 @@ def wrap(f: Lattice, ny: int, nz: int, faces: IntArray) -> None:
         box[..., 0], box[..., -1] = box[..., -2], box[..., 1]
 
 
-@njit(cache=True, error_model="numpy", boundscheck=False)
+@njit(boundscheck=False)
 def push(
     src: Lattice,
     dst: Lattice,
@@ -352,7 +353,7 @@ def push(
             dst[i, x, at] = WEIGHTS[i] * value
 
 
-@njit(cache=True, parallel=True, fastmath=True, error_model="numpy", boundscheck=False)
+@njit(parallel=True, fastmath=True, boundscheck=False)
 def velocity(f: Lattice, ny: int, nz: int, out: Lattice) -> None:
     """Density and velocity of all cells inside: `out`, shape (4, nx, ny, nz), gets rho - 1, ux, uy, uz."""
     mz = nz + 2

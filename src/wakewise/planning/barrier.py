@@ -11,16 +11,16 @@ relaxed log barrier: C. Feller and C. Ebenbauer, IEEE Trans. Automatic Control 6
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 
 ROUNDED = 0.05
 """Sine of the tilt within which the corner nearest to a plane changes: |c| is rounded to sqrt(c^2 + 0.05^2), which
 is on the safe side. A level hull over a level floor would otherwise sit on a kink that no gradient can leave."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def barrier_value(h: float, reach: float, least: float) -> tuple[float, float, float]:
     """Phi and its first two derivatives at clearance h."""
     if h >= reach:
@@ -36,7 +36,7 @@ def barrier_value(h: float, reach: float, least: float) -> tuple[float, float, f
     return value, slope, curvature
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def plane_gap(p: Array, R: Array, half: Array, plane: Array, slope: Array) -> float:
     """Distance of the box's nearest corner to a plane (less up to 5 % of its half size); `slope`, (6,), by position
     in W and rotation vector in B.
@@ -59,7 +59,7 @@ def plane_gap(p: Array, R: Array, half: Array, plane: Array, slope: Array) -> fl
     return gap
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def sphere_gap(p: Array, R: Array, half: Array, sphere: Array, slope: Array) -> float:
     """Distance of the box to a sphere, negative when they meet; `slope` as in `plane_gap`."""
     d0, d1, d2 = sphere[0] - p[0], sphere[1] - p[1], sphere[2] - p[2]
@@ -90,7 +90,7 @@ def sphere_gap(p: Array, R: Array, half: Array, sphere: Array, slope: Array) -> 
     return distance - sphere[3]
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def add_barrier(  # type: ignore[no-untyped-def]
     p, R, half, planes, spheres, reach, least, weight, gradient, hessian
 ):
@@ -116,7 +116,7 @@ def add_barrier(  # type: ignore[no-untyped-def]
     return total, closest
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def least_gap(p: Array, R: Array, half: Array, planes: Array, spheres: Array) -> float:
     """Least clearance to planes and spheres; infinite where there are none."""
     closest, slope = np.inf, np.empty(6)

@@ -11,9 +11,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.planning.kernels import RATE_N, RHO, W_CHANGE, W_EFFORT, W_TWIST
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}
@@ -45,7 +45,7 @@ def condensed_room(stages: int, thrusters: int) -> Condensed:
     )
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def _mix6(out, c0, c1, c2, c3, c4, c5, X, first, count):  # type: ignore[no-untyped-def]
     """Add six multiples of rows of X, from row `first` on, to `out`."""
     a, b, c = X[first], X[first + 1], X[first + 2]
@@ -54,14 +54,14 @@ def _mix6(out, c0, c1, c2, c3, c4, c5, X, first, count):  # type: ignore[no-unty
         out[j] += c0 * a[j] + c1 * b[j] + c2 * c[j] + c3 * d[j] + c4 * e[j] + c5 * f[j]
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def _mix3(out, c0, c1, c2, X, first, count):  # type: ignore[no-untyped-def]
     a, b, c = X[first], X[first + 1], X[first + 2]
     for j in range(count):
         out[j] += c0 * a[j] + c1 * b[j] + c2 * c[j]
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def condense(table, work, room):  # type: ignore[no-untyped-def]
     """Fill room.H (lower) and room.g from the stage blocks of `work`; commands' own cost is added by `add_commands`."""
     N, n = work.T.shape
@@ -139,7 +139,7 @@ def condense(table, work, room):  # type: ignore[no-untyped-def]
     motion_gradient(table, work, room.g)
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def motion_gradient(table, work, g):  # type: ignore[no-untyped-def]
     """Exact gradient by the commands, backwards through motion and lag."""
     N, n = work.T.shape
@@ -158,7 +158,7 @@ def motion_gradient(table, work, g):  # type: ignore[no-untyped-def]
         costate[:] = fresh
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def add_commands(table, before, U, room, steps):  # type: ignore[no-untyped-def]
     """Add effort and change to the condensed problem; `steps`, (N n,), takes u_k - u_k-1.
 
@@ -182,7 +182,7 @@ def add_commands(table, before, U, room, steps):  # type: ignore[no-untyped-def]
                 H[here, here - n] -= curvature
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def add_rate_gradient(table, steps, n, g):  # type: ignore[no-untyped-def]
     """Add the gradient of the excess of rate."""
     for here in range(steps.shape[0]):

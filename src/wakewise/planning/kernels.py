@@ -16,9 +16,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.planning.barrier import add_barrier, least_gap
 from wakewise.vehicles.runge_kutta import rk4_jacobian_kernel, rk4_kernel
 from wakewise.wake.plan_disturbance import stage_disturbance
@@ -108,7 +108,7 @@ def plan_work(stages: int, thrusters: int) -> PlanWork:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def rotation(state, R):  # type: ignore[no-untyped-def]
     """R_WB of a state's quaternion."""
     w, x, y, z = state[3], state[4], state[5], state[6]
@@ -117,7 +117,7 @@ def rotation(state, R):  # type: ignore[no-untyped-def]
     R[2, 0], R[2, 1], R[2, 2] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def attitude_cost(state, wished, weight, tolerance, g, H):  # type: ignore[no-untyped-def]
     """Add weight max(0, |e| - tolerance)^2, e = 2 vec(q_ref^-1 q), to gradient g and Gauss-Newton H by the turn."""
     w, x, y, z = state[3], state[4], state[5], state[6]
@@ -155,7 +155,7 @@ def attitude_cost(state, wished, weight, tolerance, g, H):  # type: ignore[no-un
     return weight * over * over
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def horizon(table, wake, scratch, case, U, work, slopes):  # type: ignore[no-untyped-def]
     """Cost of commands U, (N, n); fills `work` (derivatives only with `slopes`). For `parts` see `CLOSEST`."""
     N, n = U.shape
@@ -261,7 +261,7 @@ def horizon(table, wake, scratch, case, U, work, slopes):  # type: ignore[no-unt
     return parts[0] + parts[1] + parts[2] + parts[3] + parts[4] + parts[5]
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def command_cost(table, before, U):  # type: ignore[no-untyped-def]
     """Effort, change and excess of rate of commands U, (N, n), after `before`, (n,)."""
     N, n = U.shape
@@ -275,7 +275,7 @@ def command_cost(table, before, U):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def set_reach(table, case):  # type: ignore[no-untyped-def]
     """Set the barrier's reach: where the reference itself is nearer than the settings' reach nothing is felt there.
 

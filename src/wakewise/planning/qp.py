@@ -19,9 +19,9 @@ from dataclasses import dataclass, replace
 import daqp
 import numpy as np
 import piqp
-from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}
 MANY_ACTIVE = 60
@@ -31,7 +31,7 @@ HINGE_ROUNDS = 8
 """Most quadratic problems per answer; the line search on the true cost takes care of what is left."""
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def factor(H, L):  # type: ignore[no-untyped-def]
     """L, lower triangular, with H = L'L, from the lower triangle of H; False if H is not positive definite.
 
@@ -78,7 +78,7 @@ def factor(H, L):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def newton(L, g, z):  # type: ignore[no-untyped-def]
     """Z = -H^-1 g from H = L'L."""
     size = g.shape[0]
@@ -96,7 +96,7 @@ def newton(L, g, z):  # type: ignore[no-untyped-def]
         z[m] = total / row[m]
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def mirror(H, full):  # type: ignore[no-untyped-def]
     """Copy the lower triangle of H to both triangles of `full`."""
     for i in range(H.shape[0]):
@@ -105,7 +105,7 @@ def mirror(H, full):  # type: ignore[no-untyped-def]
             full[j, i] = H[i, j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def inside(z, low, high):  # type: ignore[no-untyped-def]
     """Whether z keeps its bounds."""
     kept = True
@@ -114,7 +114,7 @@ def inside(z, low, high):  # type: ignore[no-untyped-def]
     return kept
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def open_hinges(z, steps, n, limit, state):  # type: ignore[no-untyped-def]
     """Set `state` to the sign of each hinge that is open at z, else 0; True if any changed."""
     changed = False
@@ -126,7 +126,7 @@ def open_hinges(z, steps, n, limit, state):  # type: ignore[no-untyped-def]
     return changed
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def with_hinges(H, g, steps, n, limit, rho, state, H_out, g_out):  # type: ignore[no-untyped-def]
     """Lower triangle and gradient of the problem with these hinges open; returns its constant."""
     constant = 0.0
@@ -148,7 +148,7 @@ def with_hinges(H, g, steps, n, limit, rho, state, H_out, g_out):  # type: ignor
     return constant
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def model_value(H, g, z):  # type: ignore[no-untyped-def]
     """G'z + 1/2 z'Hz from the lower triangle of H."""
     total = 0.0

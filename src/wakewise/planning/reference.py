@@ -8,9 +8,9 @@ after the place that has moved on. So the goal's change of twist is carried on, 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.interfaces import Goal
 
 RAMP_S = 0.5
@@ -41,7 +41,7 @@ def reference_of(goal: Goal, stages: int, stage_s: float, change_B: Array | None
     return reference
 
 
-@njit(cache=True)
+@njit
 def _carry_on(p, q, nu, change, stage_s, out):  # type: ignore[no-untyped-def]
     out[0, :3], out[0, 3:7], out[0, 7:] = p, q, nu
     twist, half, middle = np.empty(6), np.empty(4), np.empty(4)
@@ -75,7 +75,7 @@ def _carry_on(p, q, nu, change, stage_s, out):  # type: ignore[no-untyped-def]
         after[2] = before[2] + stage_s * (s + w * c + x * b - y * a)
 
 
-@njit(cache=True)
+@njit
 def _times(a, b, out):  # type: ignore[no-untyped-def]
     """Quaternion product."""
     out[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
@@ -84,7 +84,7 @@ def _times(a, b, out):  # type: ignore[no-untyped-def]
     out[3] = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]
 
 
-@njit(cache=True)
+@njit
 def between(a: Array, b: Array, share: float) -> Array:
     """State, shape (13,), a share of the way from one to the next: the pose along the turn, the rest straight."""
     state = (1.0 - share) * a + share * b

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from wakewise.arrays import Array, IntArray
+from wakewise.compiled import njit
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _slot_of(slots: NDArray[np.int32], cells: IntArray, x: int, y: int, z: int) -> int:
     """Where in the table a cell is, or the free place where it belongs (open addressing, linear probing)."""
     # Large odd multipliers, the upper bits folded down: neighbouring cells land far apart.
@@ -23,14 +23,14 @@ def _slot_of(slots: NDArray[np.int32], cells: IntArray, x: int, y: int, z: int) 
     return at
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _rehash(slots: NDArray[np.int32], cells: IntArray, used: int) -> None:
     """Enter the cells that are in use into an empty table."""
     for row in range(used):
         slots[_slot_of(slots, cells, cells[row, 0], cells[row, 1], cells[row, 2])] = row
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def _add(
     slots: NDArray[np.int32],
     cells: IntArray,

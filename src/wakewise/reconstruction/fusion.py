@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import small_gicp
-from numba import njit
 from scipy.spatial import KDTree
 
 from wakewise.arrays import Array, BoolArray, IntArray
+from wakewise.compiled import njit
 from wakewise.reconstruction.photos import Image
 from wakewise.reconstruction.stereo import DepthImage, DepthMap
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def _agree(
     depth: DepthImage,
     wanted: BoolArray,
@@ -99,7 +99,7 @@ def pack(depth_map: DepthMap) -> Array:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def _gather(
     depth: Array,
     votes: IntArray,

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from wakewise.arrays import Array, BoolArray, freeze
+from wakewise.compiled import njit
 from wakewise.reconstruction.photos import Image
 from wakewise.reconstruction.views import Ball, View
 
@@ -150,7 +150,7 @@ def _inside(depth_m: DepthImage, focal: float, centre_px: Array, middle_C_m: Arr
     return _in_ball(depth_m, float(focal), centre_px, middle_C_m, float(region.radius_m))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True)
 def _in_ball(depth_m: DepthImage, focal: float, centre_px: Array, middle_C_m: Array, radius_m: float) -> BoolArray:
     """Which pixels have a depth whose point lies in a ball of the camera's frame."""
     height, width = depth_m.shape

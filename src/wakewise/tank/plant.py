@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, matrix_from_quat
 from wakewise.interfaces import BodyState
@@ -199,7 +199,7 @@ class VehiclePlant:
         return inflow_factors(thrusts_N, along, vehicle.disk_areas_m2, self._density)
 
 
-@njit(cache=True)
+@njit
 def _lag_and_move(
     packed: Array,
     allocation: Array,

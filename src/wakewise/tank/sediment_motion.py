@@ -8,12 +8,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array, IntArray
+from wakewise.compiled import njit
 
 
-@njit(cache=True)
+@njit
 def stirred_cells(circles: Array, low: Array, cell: Array, margin_m: float, near: np.ndarray) -> None:
     """Mark the cells of a grid, shape (nx, ny), whose centres lie in circles (x, y, radius) widened by a margin."""
     nx, ny = near.shape
@@ -35,7 +35,7 @@ def stirred_cells(circles: Array, low: Array, cell: Array, margin_m: float, near
                     near[i, j] = True
 
 
-@njit(cache=True)
+@njit
 def carry(position: Array, u: Array, settling_m_s: float, dt_s: float, low: Array, depth: float) -> np.ndarray:
     """Move particles, shape (n, 3), in place with the water and down; return which of them reached the bed.
 
@@ -54,7 +54,7 @@ def carry(position: Array, u: Array, settling_m_s: float, dt_s: float, low: Arra
     return landed
 
 
-@njit(cache=True)
+@njit
 def mix(
     position: Array, kicks: Array, star: Array, low: Array, cell: Array, depth: float, dt_s: float, laws: Array
 ) -> None:
@@ -82,7 +82,7 @@ def mix(
         position[k, 2] = _between(position[k, 2] + drift_z * dt_s + size * kicks[k, 2], depth)
 
 
-@njit(cache=True)
+@njit
 def shared_among_nodes(position: Array, mass: Array, origin: Array, spacing: float, values: Array) -> None:
     """Add each particle's mass to the eight nodes round it, with weights linear in the distance (cloud in cell)."""
     for k in range(mass.shape[0]):
@@ -103,7 +103,7 @@ def shared_among_nodes(position: Array, mass: Array, origin: Array, spacing: flo
                         values[i + di, j + dj, h + dh] += mass[k] * weight
 
 
-@njit(cache=True)
+@njit
 def cells_of(position: Array, low: Array, cell: Array, nx: int, ny: int) -> tuple[IntArray, IntArray]:
     """Indices of the cells that places, shape (n, 2 or 3), are in or nearest to."""
     n = position.shape[0]
@@ -114,7 +114,7 @@ def cells_of(position: Array, low: Array, cell: Array, nx: int, ny: int) -> tupl
     return i, j
 
 
-@njit(cache=True)
+@njit
 def _turned_back(x: float, half: float) -> float:
     """Mirrored into -half to half if it is beyond."""
     if x > half:
@@ -124,7 +124,7 @@ def _turned_back(x: float, half: float) -> float:
     return min(max(x, -half), half)
 
 
-@njit(cache=True)
+@njit
 def _between(z: float, depth: float) -> float:
     """Mirrored into 0 to depth if it is beyond."""
     z = abs(z)

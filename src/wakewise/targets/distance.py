@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
 
 from wakewise.arrays import Array, IntArray
+from wakewise.compiled import njit, prange
 from wakewise.errors import InputError
 
 _LEAF = 4
 
 
-@njit(cache=True)
+@njit
 def _squared_to_triangle(p: Array, a: Array, b: Array, c: Array) -> float:
     """Squared distance from p to the triangle abc.
 
@@ -50,7 +50,7 @@ def _squared_to_triangle(p: Array, a: Array, b: Array, c: Array) -> float:
     return np.dot(q, q)
 
 
-@njit(cache=True)
+@njit
 def _squared_to_box(p: Array, low: Array, high: Array) -> float:
     """Squared distance from p to an axis-aligned box, zero inside."""
     total = 0.0
@@ -60,7 +60,7 @@ def _squared_to_box(p: Array, low: Array, high: Array) -> float:
     return total
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def _closest(
     points: Array, corners: Array, low: Array, high: Array, left: IntArray, first: IntArray, count: IntArray
 ) -> Array:
@@ -91,7 +91,7 @@ def _closest(
     return out
 
 
-@njit(cache=True)
+@njit
 def _halved(centres: Array) -> tuple[IntArray, IntArray, IntArray, IntArray]:
     """Tree over points: halve each node across its longest side until it is a leaf.
 
@@ -121,7 +121,7 @@ def _halved(centres: Array) -> tuple[IntArray, IntArray, IntArray, IntArray]:
     return order, left[:made], first[:made], count[:made]
 
 
-@njit(cache=True)
+@njit
 def _boxes(corners: Array, first: IntArray, count: IntArray) -> tuple[Array, Array]:
     """Lowest and highest corner of the box round the triangles of every node, shapes (nodes, 3)."""
     low, high = np.full((len(first), 3), np.inf), np.full((len(first), 3), -np.inf)

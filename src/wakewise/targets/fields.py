@@ -8,11 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit, prange
 from wakewise.targets.mesh import Mesh
 
 OUTSIDE_M = 1.0
@@ -52,7 +52,7 @@ def zero_surface(grid: Grid) -> Mesh:
     return Mesh(mesh.vertices_m, mesh.faces[:, ::-1]) if mesh.volume_m3 < 0 else mesh
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _lattice(i, j, k, seed):  # type: ignore[no-untyped-def]
     """Reproducible number in [0, 1) of a lattice corner: integer mixing after T. Wang's 32-bit hash."""
     h = (i * 73856093 ^ j * 19349663 ^ k * 83492791 ^ seed * 2654435761) & 0xFFFFFFFF
@@ -64,7 +64,7 @@ def _lattice(i, j, k, seed):  # type: ignore[no-untyped-def]
     return h / 4294967296.0
 
 
-@njit(cache=True)
+@njit
 def noise(x, y, z, seed):  # type: ignore[no-untyped-def]
     """Smooth value noise in [-1, 1] with features of size one: cubic fade between random lattice corners."""
     i, j, k = int(np.floor(x)), int(np.floor(y)), int(np.floor(z))
@@ -79,14 +79,14 @@ def noise(x, y, z, seed):  # type: ignore[no-untyped-def]
     return 2.0 * total - 1.0
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def smooth_min(a, b, k):  # type: ignore[no-untyped-def]
     """Lower of a and b with the corner rounded over the length k (quadratic polynomial)."""
     h = max(k - abs(a - b), 0.0) / k
     return min(a, b) - 0.25 * k * h * h
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def add_cones(values, origin, spacing, start, end, start_radius, end_radius, blend):  # type: ignore[no-untyped-def]
     """Unite round cones, from `start` to `end` (n, 3), with what is there; joints are filleted over `blend` metres."""
     for ix in prange(values.shape[0]):
@@ -111,7 +111,7 @@ def add_cones(values, origin, spacing, start, end, start_radius, end_radius, ble
                     values[ix, iy, iz] = smooth_min(values[ix, iy, iz], gap, blend)
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def roughen(values, origin, spacing, amplitude, feature, seed):  # type: ignore[no-untyped-def]
     """Shift the surface by noise of the given amplitude and feature size (metres), and half of it at half the size."""
     for ix in prange(values.shape[0]):
@@ -125,7 +125,7 @@ def roughen(values, origin, spacing, amplitude, feature, seed):  # type: ignore[
                     values[ix, iy, iz] += amplitude / 1.5 * bump
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def add_dome(values, origin, spacing, radii, relief, chart_spacing, lump, seed):  # type: ignore[no-untyped-def]
     """Unite an ellipsoid about the origin, of half axes `radii` (3,), whose skin carries a relief.
 
@@ -161,14 +161,14 @@ def add_dome(values, origin, spacing, radii, relief, chart_spacing, lump, seed):
                 values[ix, iy, iz] = min(values[ix, iy, iz], gap - height)
 
 
-@njit(cache=True)
+@njit
 def _sheet(u, v, length, flare, cup, wave, phase):  # type: ignore[no-untyped-def]
     """Height of a plate's middle sheet over its base plane: it flares outward, cups, and waves more towards the rim."""
     ruffle = wave * (u / length) ** 2 * np.sin(5.0 * np.arctan2(v, 0.35 * length + u) + phase)
     return -flare * u * u / length + cup * v * v / length + ruffle
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def add_plates(values, origin, spacing, base, along, across, shape, blend):  # type: ignore[no-untyped-def]
     """Unite fan-shaped plates that grow from `base` (n, 3) along `along` (n, 3) with `across` (n, 3) as their width.
 

@@ -13,9 +13,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
 
 from wakewise.arrays import Array, IntArray
+from wakewise.compiled import njit, prange
 from wakewise.targets.mesh import Mesh
 
 LEAF = 4
@@ -93,7 +93,7 @@ def _joined(level: Array, join: np.ufunc) -> Array:
     return np.ascontiguousarray(np.concatenate(levels[::-1]))
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _entry(low, high, start, inverse, best):  # type: ignore[no-untyped-def]
     """Where a ray enters a box, infinity if it does not before `best`."""
     near, far = 0.0, best
@@ -103,7 +103,7 @@ def _entry(low, high, start, inverse, best):  # type: ignore[no-untyped-def]
     return near if near <= far * (1.0 + 1e-12) else np.inf
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(parallel=True)
 def _cast(low, high, corners, faces, starts, ways, face, distance):  # type: ignore[no-untyped-def]
     """Fill `face` and `distance`, both (n,), for rays from `starts` along `ways`, both (n, 3)."""
     first_leaf = low.shape[0] // 2

@@ -22,12 +22,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 from scipy.optimize import Bounds, minimize
 from scipy.spatial import KDTree
 from scipy.spatial.distance import cdist
 
 from wakewise.arrays import Array, BoolArray, IntArray
+from wakewise.compiled import njit
 from wakewise.errors import InputError
 
 LIKENESS_M = 0.06
@@ -198,7 +198,7 @@ def sampling_error_pct(sample: Array, reference: Array, negligible: float = NEGL
     return 100.0 * np.abs(sample - reference) / np.maximum(reference, negligible * reference.max())
 
 
-@njit(cache=True, fastmath=True)
+@njit(fastmath=True)
 def _likeness_sums(points: Array, sources: Array, masses: Array) -> tuple[Array, Array]:
     """Sum of masses times likeness at every point, shape (n,), and its gradient, shape (n, 3)."""
     value, slope = np.empty(len(points)), np.empty((len(points), 3))

@@ -9,9 +9,9 @@ tuples, so that nothing is allocated. No reordering of sums is allowed (no fastm
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 
 Three = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]
@@ -20,7 +20,7 @@ INVERSE, LINEAR, QUADRATIC, STATIC = 6, 12, 18, 19
 """First row of each block in `packed`; the mass matrix starts at 0."""
 
 
-@njit(cache=True)
+@njit
 def rotate(w: float, x: float, y: float, z: float, a: float, b: float, c: float) -> Three:
     """R(q) (a, b, c); with -w in place of w it is the inverse turn."""
     return (
@@ -30,7 +30,7 @@ def rotate(w: float, x: float, y: float, z: float, a: float, b: float, c: float)
     )
 
 
-@njit(cache=True)
+@njit
 def rotate_by_quat(
     w: float, x: float, y: float, z: float, a: float, b: float, c: float
 ) -> tuple[Three, Three, Three, Three]:
@@ -43,7 +43,7 @@ def rotate_by_quat(
     )
 
 
-@njit(cache=True)
+@njit
 def times(packed: Array, row: int, n: Six) -> Six:
     """Product of the symmetric matrix at `row` (M or its inverse) with a vector."""
     a, b, c, d, e, f = n
@@ -89,14 +89,14 @@ def times(packed: Array, row: int, n: Six) -> Six:
     )
 
 
-@njit(cache=True)
+@njit
 def _drag(packed: Array, i: int, n: Six) -> float:
     m = packed[LINEAR + i]
     linear = m[0] * n[0] + m[1] * n[1] + m[2] * n[2] + m[3] * n[3] + m[4] * n[4] + m[5] * n[5]
     return linear + packed[QUADRATIC, i] * abs(n[i]) * n[i]
 
 
-@njit(cache=True)
+@njit
 def damping(packed: Array, n: Six) -> Six:
     """D(nu_r) nu_r at nu_r = n."""
     return (
@@ -109,7 +109,7 @@ def damping(packed: Array, n: Six) -> Six:
     )
 
 
-@njit(cache=True)
+@njit
 def coriolis(packed: Array, n: Six) -> Six:
     """C(nu_r) nu_r at nu_r = n, through the momentum h = M n: (omega x h_v, omega x h_w + v x h_v)."""
     a, b, c, d, e, f = times(packed, 0, n)
@@ -124,7 +124,7 @@ def coriolis(packed: Array, n: Six) -> Six:
     )
 
 
-@njit(cache=True)
+@njit
 def restoring(packed: Array, down: Three) -> Six:
     """Wrench of weight and buoyancy, `down` being the world's z axis in B: ((W - B) down, a x down)."""
     x, y, z = down
@@ -132,7 +132,7 @@ def restoring(packed: Array, down: Three) -> Six:
     return net * x, net * y, net * z, b * z - c * y, c * x - a * z, a * y - b * x
 
 
-@njit(cache=True)
+@njit
 def rate_kernel(packed: Array, state: Array, inputs: Array, rate: Array) -> None:
     """Write the time derivative of `state` to `rate`, shape (13,)."""
     w, x, y, z = state[3], state[4], state[5], state[6]
@@ -162,7 +162,7 @@ def rate_kernel(packed: Array, state: Array, inputs: Array, rate: Array) -> None
     rate[10], rate[11], rate[12] = a[3], a[4], a[5]
 
 
-@njit(cache=True)
+@njit
 def quasi_linear(packed: Array, n: Six, scale: float, N: Array, column: int) -> None:
     """Write scale (C(n) + D(n)), Fossen's matrices with C skew, to the six columns of N from `column` on."""
     a, b, c, d, e, f = times(packed, 0, n)
@@ -176,7 +176,7 @@ def quasi_linear(packed: Array, n: Six, scale: float, N: Array, column: int) -> 
     _add_skew(N, 3, column + 3, -scale, d, e, f)
 
 
-@njit(cache=True)
+@njit
 def add_quasi_linear_change(packed: Array, n: Six, x: Six, scale: float, N: Array, column: int) -> None:
     """Add scale Q to six columns of N, where Q delta is the change of (C(n) + D(n)) x when n changes by delta.
 
@@ -195,7 +195,7 @@ def add_quasi_linear_change(packed: Array, n: Six, x: Six, scale: float, N: Arra
         N[i, column + i] += scale * packed[QUADRATIC, i] * np.sign(n[i]) * x[i]
 
 
-@njit(cache=True)
+@njit
 def _add_skew(N: Array, row: int, column: int, scale: float, a: float, b: float, c: float) -> None:
     N[row, column + 1] -= scale * c
     N[row, column + 2] += scale * b
@@ -205,7 +205,7 @@ def _add_skew(N: Array, row: int, column: int, scale: float, a: float, b: float,
     N[row + 2, column + 1] += scale * a
 
 
-@njit(cache=True)
+@njit
 def rate_jacobian_kernel(packed: Array, state: Array, inputs: Array, F: Array, W: Array) -> None:
     """Write d rate / d (quaternion, twist) to F, shape (13, 12), and d wrench / d (...) to W, shape (6, 12).
 
@@ -258,7 +258,7 @@ def rate_jacobian_kernel(packed: Array, state: Array, inputs: Array, F: Array, W
     _add_skew(F, 7, 7, 1.0, bx, by, bz)
 
 
-@njit(cache=True)
+@njit
 def _attitude_column(packed: Array, W: Array, k: int, b: Three, down: Three) -> None:
     g = restoring(packed, down)
     W[0, k] = g[0] - (W[0, 4] * b[0] + W[0, 5] * b[1] + W[0, 6] * b[2])
@@ -269,7 +269,7 @@ def _attitude_column(packed: Array, W: Array, k: int, b: Three, down: Three) -> 
     W[5, k] = g[5] - (W[5, 4] * b[0] + W[5, 5] * b[1] + W[5, 6] * b[2])
 
 
-@njit(cache=True)
+@njit
 def _subtract_cross(F: Array, k: int, omega: Three, b: Three) -> None:
     F[7, k] -= omega[1] * b[2] - omega[2] * b[1]
     F[8, k] -= omega[2] * b[0] - omega[0] * b[2]

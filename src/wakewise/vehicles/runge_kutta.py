@@ -8,15 +8,15 @@ of position are known beforehand. They are carried through the stages side by si
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.vehicles.kernels import INVERSE, rate_jacobian_kernel, rate_kernel
 
 COLUMNS = 16
 
 
-@njit(cache=True)
+@njit
 def rk4_kernel(packed: Array, state: Array, inputs: Array, dt_s: float) -> None:
     """Advance `state`, shape (13,), in place by one classical Runge-Kutta step."""
     k = np.empty((5, 13))
@@ -31,7 +31,7 @@ def rk4_kernel(packed: Array, state: Array, inputs: Array, dt_s: float) -> None:
     normalise(state)
 
 
-@njit(cache=True)
+@njit
 def normalise(state: Array) -> float:
     """Give the quaternion of a state unit length and return the length that it had."""
     length = np.sqrt(state[3] ** 2 + state[4] ** 2 + state[5] ** 2 + state[6] ** 2)
@@ -40,7 +40,7 @@ def normalise(state: Array) -> float:
     return length
 
 
-@njit(cache=True)
+@njit
 def rk4_jacobian_kernel(packed: Array, state: Array, inputs: Array, dt_s: float, A: Array, B: Array) -> None:
     """Advance `state` as `rk4_kernel` does; write the derivatives by state, A (12, 12), and by wrench, B (12, 6)."""
     k = np.empty((5, 13))
@@ -78,7 +78,7 @@ def rk4_jacobian_kernel(packed: Array, state: Array, inputs: Array, dt_s: float,
     _to_error_state(state, total, normalise(state), K[1], A, B)
 
 
-@njit(cache=True)
+@njit
 def _propagate(packed: Array, F: Array, X: Array, K: Array) -> None:
     # Ten products written out: the compiler then works on neighbouring columns together, in a fixed order of sums.
     for i in range(13):
@@ -102,21 +102,21 @@ def _propagate(packed: Array, F: Array, X: Array, K: Array) -> None:
             K[7 + i, 9 + j] += packed[INVERSE + i, j]
 
 
-@njit(cache=True)
+@njit
 def _move(start: Array, reach: float, K: Array, moved: Array) -> None:
     for i in range(10):
         for c in range(COLUMNS):
             moved[i, c] = start[i, c] + reach * K[3 + i, c]
 
 
-@njit(cache=True)
+@njit
 def _combine(a: Array, b: Array, c: Array, d: Array, sixth: float, total: Array) -> None:
     for i in range(13):
         for k in range(COLUMNS):
             total[i, k] = sixth * (a[i, k] + 2.0 * b[i, k] + 2.0 * c[i, k] + d[i, k])
 
 
-@njit(cache=True)
+@njit
 def _to_error_state(state: Array, total: Array, length: float, turn: Array, A: Array, B: Array) -> None:
     # A change dq of the quaternion before it was normalised turns the body by 2 vec(q^-1 dq) / |q|.
     scale = 2.0 / length

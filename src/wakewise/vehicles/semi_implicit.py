@@ -20,16 +20,16 @@ Computations, 4th ed., section 4.3).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.vehicles.kernels import Six, Three, add_quasi_linear_change, quasi_linear, restoring, rotate, times
 from wakewise.vehicles.runge_kutta import COLUMNS
 
 GAMMA = 1.0 - np.sqrt(0.5)
 
 
-@njit(cache=True)
+@njit
 def semi_implicit_kernel(
     packed: Array, state: Array, inputs: Array, dt_s: float, factors: Array, velocities: Array, turns: Array
 ) -> None:
@@ -83,7 +83,7 @@ def semi_implicit_kernel(
         state[7 + i] += b[i]
 
 
-@njit(cache=True)
+@njit
 def semi_implicit_jacobian_kernel(packed: Array, state: Array, inputs: Array, dt_s: float, A: Array, B: Array) -> None:
     """Advance `state`; write the derivatives by error state, A (12, 12), and by wrench, B (12, 6).
 
@@ -157,12 +157,12 @@ def semi_implicit_jacobian_kernel(packed: Array, state: Array, inputs: Array, dt
         A[i, i] = 1.0
 
 
-@njit(cache=True)
+@njit
 def _six(column: Array) -> Six:
     return column[0, 0], column[1, 0], column[2, 0], column[3, 0], column[4, 0], column[5, 0]
 
 
-@njit(cache=True)
+@njit
 def _mean(first: Array, last: Array) -> Six:
     # The integral of the velocity over the step as the two stages give it, divided by the step.
     a, b = 1.0 - GAMMA, GAMMA
@@ -176,7 +176,7 @@ def _mean(first: Array, last: Array) -> Six:
     )
 
 
-@njit(cache=True)
+@njit
 def _factorise(packed: Array, n: Six, reach: float, LU: Array) -> None:
     # LU factors of M + reach N(n), in place.
     quasi_linear(packed, n, reach, LU, 0)
@@ -190,7 +190,7 @@ def _factorise(packed: Array, n: Six, reach: float, LU: Array) -> None:
                 LU[i, j] -= LU[i, k] * LU[k, j]
 
 
-@njit(cache=True)
+@njit
 def _solve(LU: Array, X: Array) -> None:
     for i in range(6):
         for j in range(i):
@@ -204,7 +204,7 @@ def _solve(LU: Array, X: Array) -> None:
             X[i, k] /= LU[i, i]
 
 
-@njit(cache=True)
+@njit
 def _turn(q: Array, dt_s: float, p: float, s: float, r: float, turned: Array) -> None:
     # Cayley's map: q (1, omega dt / 2), normalised; equal to the exponential map to second order.
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -215,7 +215,7 @@ def _turn(q: Array, dt_s: float, p: float, s: float, r: float, turned: Array) ->
     turned[0], turned[1], turned[2], turned[3] = dw / length, dx / length, dy / length, dz / length
 
 
-@njit(cache=True)
+@njit
 def _turn_change(dt_s: float, n: Six, before: Array, d_velocity: Array, after: Array) -> None:
     # With a = omega dt / 2: R(a)' delta + 2 / (1 + a'a) (I - S(a)) da, all expressed in the body.
     a, b, c = 0.5 * dt_s * n[3], 0.5 * dt_s * n[4], 0.5 * dt_s * n[5]
@@ -230,7 +230,7 @@ def _turn_change(dt_s: float, n: Six, before: Array, d_velocity: Array, after: A
         after[2, k] = rz + scale * (dz - a * dy + b * dx)
 
 
-@njit(cache=True)
+@njit
 def _force_change(packed: Array, q: Array, turn: Array, force: Array) -> None:
     # Wrench and restoring wrench; the world's down axis in B changes by down x delta.
     x, y, z = rotate(-q[0], q[1], q[2], q[3], 0.0, 0.0, 1.0)
@@ -243,7 +243,7 @@ def _force_change(packed: Array, q: Array, turn: Array, force: Array) -> None:
         force[i, 9 + i] += 1.0
 
 
-@njit(cache=True)
+@njit
 def _add_cross(block: Array, scale: float, v: Three, turn: Array) -> None:
     x, y, z = v
     for k in range(COLUMNS):
@@ -253,7 +253,7 @@ def _add_cross(block: Array, scale: float, v: Three, turn: Array) -> None:
         block[2, k] += scale * (x * b - y * a)
 
 
-@njit(cache=True)
+@njit
 def _add_product(matrix: Array, X: Array, scale: float, Y: Array) -> None:
     for i in range(6):
         for j in range(6):
@@ -261,7 +261,7 @@ def _add_product(matrix: Array, X: Array, scale: float, Y: Array) -> None:
                 Y[i, k] += scale * matrix[i, j] * X[j, k]
 
 
-@njit(cache=True)
+@njit
 def _add_scaled(X: Array, scale: float, Y: Array) -> None:
     for i in range(6):
         for k in range(COLUMNS):

@@ -25,9 +25,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.errors import InputError
 from wakewise.interfaces import WakeModel
 from wakewise.physics import FRESH_WATER_KG_M3
@@ -85,7 +85,7 @@ class FloorJet:
         return np.asarray(velocity + wall_velocity(points_W_m, origins_W_m, directions, area_m2, self.numbers))
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def _strike(origin, dx, dy, dz, area, bed_z):  # type: ignore[no-untyped-def]
     """(lands, H, strike x, strike y, r0, d r0 / d H) of one jet: how far it goes, and where it meets the bed."""
     if dz < LEAST_SINE or origin[2] >= bed_z:
@@ -97,7 +97,7 @@ def _strike(origin, dx, dy, dz, area, bed_z):  # type: ignore[no-untyped-def]
     return True, H, origin[0] + H * dx, origin[1] + H * dy, share * far, share * (H / far) ** 5
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def wall_velocity(points, origins, directions, areas, floor):  # type: ignore[no-untyped-def]
     """Velocity of the wall jets per square root of newton, shape (m, n, 3), of jets along `directions`, (m, 3)."""
     n, m = points.shape[0], origins.shape[0]
@@ -119,7 +119,7 @@ def wall_velocity(points, origins, directions, areas, floor):  # type: ignore[no
     return velocity
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def add_wall(block, count, p, origin, dx, dy, dz, area, floor, V, dV):  # type: ignore[no-untyped-def]
     """Add sqrt(w) u of the wall jet of a jet along (dx, dy, dz) to `V`, (3, BLOCK).
 
@@ -165,7 +165,7 @@ def add_wall(block, count, p, origin, dx, dy, dz, area, floor, V, dV):  # type: 
             dV[r, 1, j] += factor * (grown * y + y_moved)
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def fill_velocities(  # type: ignore[no-untyped-def]
     block, count, p, origins, axes, areas, own, kind, numbers, floor, scratch, hits, rows, column, slope, V, dV
 ):

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from wakewise.compiled import njit
 from wakewise.wake.floor import fill_velocities
 from wakewise.wake.kernels import as_tuple, own_constants
 from wakewise.wake.stage import thrust_roots, turn_gradient, turn_hessian
 from wakewise.wake.sums import BLOCK, FAST, check_jets, dot, load_block, place
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def floor_gram_sum(points, weights, p, q, positions_B, axes_B, areas, kind, parameters, floor, slopes):  # type: ignore[no-untyped-def]
     """G, (2 m, 2 m), dG by position in W and rotation vector in B, (6, 2 m, 2 m) (zeros unless `slopes`), the check."""
     n, m = points.shape[0], positions_B.shape[0]
@@ -47,7 +47,7 @@ def floor_gram_sum(points, weights, p, q, positions_B, axes_B, areas, kind, para
     return G, dG, check
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def floor_stage_sum(  # type: ignore[no-untyped-def]
     points, weights, p, q, positions_B, axes_B, areas, kind, parameters, floor, thrusts, smooth, coherent, hessian
 ):
@@ -94,7 +94,7 @@ def floor_stage_sum(  # type: ignore[no-untyped-def]
     return D, gradient, H, check
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def _add_products(J, m, count, gradient, H, hessian):  # type: ignore[no-untyped-def]
     """Add 2 J'r to the gradient and 2 J'J to the lower triangle of H, r being the last row of J; returns r'r."""
     square = 0.0

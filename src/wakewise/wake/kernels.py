@@ -11,9 +11,9 @@ on each thruster's disk. Units SI throughout.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 
 PRINTED_CONE, POWER_CONE, ROUND_JET = 0, 1, 2
 """Kinds of kernel: the paper's cone without powers to take, the cone with any powers, and the turbulent round jet."""
@@ -80,7 +80,7 @@ def jet_parameters(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def own_constants(kind, parameters, areas):  # type: ignore[no-untyped-def]
     """What each disk adds, shape (m, 6): three constants of the kernel and three of its reach.
 
@@ -104,7 +104,7 @@ def own_constants(kind, parameters, areas):  # type: ignore[no-untyped-def]
     return own
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def speed_and_slope(kind, numbers, c0, c1, c2, x, r2):  # type: ignore[no-untyped-def]
     """(f, alpha, beta) at a point within reach, x > 0 along the jet and squared distance r2 from the disk's centre."""
     if kind == ROUND_JET:
@@ -118,7 +118,7 @@ def speed_and_slope(kind, numbers, c0, c1, c2, x, r2):  # type: ignore[no-untype
     return _cone(numbers, c0, x, r2)
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def _cone(numbers, c0, x, r2):  # type: ignore[no-untyped-def]
     p, m, low, high = numbers[1], numbers[2], numbers[4], numbers[5]
     inverse = 1.0 / r2
@@ -137,7 +137,7 @@ def _cone(numbers, c0, x, r2):  # type: ignore[no-untyped-def]
     return f, by_cosine * inverse_r, -f * p / soft - by_cosine * cosine * inverse
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def _jet(numbers, x0, b0, limit6, x, r2):  # type: ignore[no-untyped-def]
     slope = numbers[4]
     b = b0 + slope * x
@@ -172,13 +172,13 @@ def _jet(numbers, x0, b0, limit6, x, r2):  # type: ignore[no-untyped-def]
     return f, by_x - beta * x, beta
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def as_tuple(p):  # type: ignore[no-untyped-def]
     """The kernel's numbers as values rather than an array, which lets the compiler keep them at hand."""
     return (p[0], p[1], p[2], p[3], p[4], p[5], p[6])
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def fill_split_speed(points, origins, axes, areas, kind, parameters, speed):  # type: ignore[no-untyped-def]
     """Speeds at points, shape (n, 3), for either sign of m thrusts, into `speed`, zeros of shape (n, 2 m).
 
@@ -197,7 +197,7 @@ def fill_split_speed(points, origins, axes, areas, kind, parameters, speed):  # 
                 speed[j, i if along < 0.0 else m + i] = f
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def fill_speed(along, across, areas, kind, parameters, speed):  # type: ignore[no-untyped-def]
     """Speed per square root of newton at `along` and `across` the axis of single jets, all arrays of shape (n,)."""
     own, numbers = own_constants(kind, parameters, areas), as_tuple(parameters)

@@ -11,9 +11,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.wake.floor_sums import floor_stage_sum
 from wakewise.wake.kernels import as_tuple, speed_and_slope
 from wakewise.wake.stage import smooth_root
@@ -45,7 +45,7 @@ def wake_scratch(points: int, thrusters: int) -> WakeScratch:
     )
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def _dot(a, b, count):  # type: ignore[no-untyped-def]
     total = 0.0
     for j in range(count):
@@ -53,7 +53,7 @@ def _dot(a, b, count):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def may_reach(own, tx, ty, tz, ax, ay, az, mx, my, mz, radius):  # type: ignore[no-untyped-def]
     """False if neither jet of a thruster at t can reach any point of a sphere round m, all in B."""
     ex, ey, ez = mx - tx, my - ty, mz - tz
@@ -64,7 +64,7 @@ def may_reach(own, tx, ty, tz, ax, ay, az, mx, my, mz, radius):  # type: ignore[
     return across - radius <= np.sqrt(max(widest, 0.0))
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def _plain_cone(q, roots, count, tx, ty, tz, ax, ay, az, c0, low, high, f_row, g):  # type: ignore[no-untyped-def]
     """Signed speed by the force axis (negative astern of T > 0) into `f_row`, the gradient of |f| into `g`, (3, P)."""
     narrow = 1.0 / (high - low) if high > low else 1e12
@@ -92,7 +92,7 @@ def _plain_cone(q, roots, count, tx, ty, tz, ax, ay, az, c0, low, high, f_row, g
         g[2, j] = a * az + b * ez
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def _any_jet(q, roots, count, tx, ty, tz, ax, ay, az, own, kind, numbers, f_row, g):  # type: ignore[no-untyped-def]
     """As `_plain_cone`, for every kind of jet."""
     for j in range(count):
@@ -115,7 +115,7 @@ def _any_jet(q, roots, count, tx, ty, tz, ax, ay, az, own, kind, numbers, f_row,
             g[2, j] = 0.0
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def stage_disturbance(table, scratch, p, quat, R, thrusts, slopes, gradient, H):  # type: ignore[no-untyped-def]
     """D; with `slopes` also its gradient, (6 + n,), and 2 J'J, (6 + n, 6 + n), both overwritten.
 
@@ -146,7 +146,7 @@ def stage_disturbance(table, scratch, p, quat, R, thrusts, slopes, gradient, H):
     return _free_jets(table, scratch, p, R, thrusts, slopes, gradient, H)
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def _free_jets(table, scratch, p, R, thrusts, slopes, gradient, H):  # type: ignore[no-untyped-def]
     q, sums, S, jets, pose, active = scratch
     count, n = q.shape[1], thrusts.shape[0]
@@ -233,7 +233,7 @@ def _free_jets(table, scratch, p, R, thrusts, slopes, gradient, H):  # type: ign
     return D
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def _pose_rows(count, q, gx, gy, gz, out, x):  # type: ignore[no-untyped-def]
     """Rows by position (in B) and rotation vector of a quantity with gradient (gx, gy, gz) by the point in B."""
     for j in range(count):
@@ -248,7 +248,7 @@ def _pose_rows(count, q, gx, gy, gz, out, x):  # type: ignore[no-untyped-def]
         out[5, x, j] = a * qy - b * qx
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def _products(axes, active, active_count, count, q, sums, S, jets, pose, gradient, H):  # type: ignore[no-untyped-def]
     for x in range(3):
         used = False
@@ -297,7 +297,7 @@ def _products(axes, active, active_count, count, q, sums, S, jets, pose, gradien
                 H[6 + i, 6 + k] = 2.0 * cosine * _dot(jets[i], jets[k], count)
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def _add_six(row, s0, s1, s2, s3, s4, s5, factor):  # type: ignore[no-untyped-def]
     row[0] += factor * s0
     row[1] += factor * s1
@@ -307,7 +307,7 @@ def _add_six(row, s0, s1, s2, s3, s4, s5, factor):  # type: ignore[no-untyped-de
     row[5] += factor * s5
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def _alone(  # type: ignore[no-untyped-def]
     i, count, q, f_row, g, ahead, ahead_slope, astern, astern_slope, slopes, gradient, H
 ):
@@ -345,7 +345,7 @@ def _alone(  # type: ignore[no-untyped-def]
     return D
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def _to_world(R, gradient, H):  # type: ignore[no-untyped-def]
     """Fill the upper triangle from the lower and take rows and columns 0 to 2 from B to W."""
     size = H.shape[0]

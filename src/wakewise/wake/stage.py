@@ -11,13 +11,13 @@ the Gauss-Newton matrix 2 J'J.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from wakewise.compiled import njit
 from wakewise.wake.kernels import as_tuple, own_constants
 from wakewise.wake.sums import BLOCK, FAST, check_jets, dot, fill_rows, load_block, place, pose_slopes
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def smooth_root(thrust, smooth):  # type: ignore[no-untyped-def]
     """Root of the part of a thrust above zero, and its derivative: see `wakewise.wake.gradients`."""
     if smooth == 0.0:
@@ -35,7 +35,7 @@ def smooth_root(thrust, smooth):  # type: ignore[no-untyped-def]
     return root, (above / length) / quarter - 0.5 * root * thrust / square
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def thrust_roots(thrusts, smooth):  # type: ignore[no-untyped-def]
     """Roots s of the 2 m split thrusts, and the derivative of each by its own signed thrust."""
     m = thrusts.shape[0]
@@ -47,7 +47,7 @@ def thrust_roots(thrusts, smooth):  # type: ignore[no-untyped-def]
     return root, slope
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def stage_sum(  # type: ignore[no-untyped-def]
     points, weights, p, q, positions_B, axes_B, areas, kind, parameters, thrusts, smooth, coherent, hessian
 ):
@@ -124,7 +124,7 @@ def stage_sum(  # type: ignore[no-untyped-def]
     return D, gradient, H, check
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def turn_gradient(R, gradient):  # type: ignore[no-untyped-def]
     """Take elements 3 to 5 from W to B axes."""
     a, b, c = gradient[3], gradient[4], gradient[5]
@@ -132,7 +132,7 @@ def turn_gradient(R, gradient):  # type: ignore[no-untyped-def]
         gradient[3 + r] = R[0, r] * a + R[1, r] * b + R[2, r] * c
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def turn_hessian(R, H):  # type: ignore[no-untyped-def]
     """Fill the upper triangle of H from the lower, and take rows and columns 3 to 5 from W to B axes."""
     size = H.shape[0]

@@ -11,8 +11,8 @@ Rows: row i of G is thruster i with T > 0, whose jet goes along -axis; row m + i
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from wakewise.compiled import njit
 from wakewise.wake.kernels import as_tuple, own_constants, speed_and_slope
 
 BLOCK = 256
@@ -21,7 +21,7 @@ PERPENDICULAR = 1e-14
 """Cosine under which two jets count as perpendicular: rounding of unit vectors leaves up to some 1e-16."""
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def load_block(points, weights, start, count, block):  # type: ignore[no-untyped-def]
     """Points x, y, z and roots of weights into rows 0 to 3 of `block`; returns NaN if any of them is not finite."""
     check = 0.0
@@ -35,7 +35,7 @@ def load_block(points, weights, start, count, block):  # type: ignore[no-untyped
     return check
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def check_jets(p, q, origins, axes, areas):  # type: ignore[no-untyped-def]
     """0 for a sound pose and sound thrusters; NaN if anything is not finite or an area is not more than 0."""
     check = 0.0
@@ -50,7 +50,7 @@ def check_jets(p, q, origins, axes, areas):  # type: ignore[no-untyped-def]
     return check
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def dot(a, b, count):  # type: ignore[no-untyped-def]
     """Sum of products of the first `count` elements."""
     total = 0.0
@@ -59,7 +59,7 @@ def dot(a, b, count):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def fill_rows(block, count, origins, axes, own, kind, numbers, slopes, scratch, hits, rows, column):  # type: ignore[no-untyped-def]
     """Rows of sqrt(w) times f, and if `slopes` alpha and beta, of the jets that reach one of the block's points.
 
@@ -111,7 +111,7 @@ def fill_rows(block, count, origins, axes, own, kind, numbers, slopes, scratch, 
     return filled
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def cosines(axes):  # type: ignore[no-untyped-def]
     """d_i . d_k of the 2 m jets' directions, shape (2 m, 2 m); zero for what is perpendicular but for rounding."""
     m = axes.shape[0]
@@ -129,7 +129,7 @@ def cosines(axes):  # type: ignore[no-untyped-def]
     return table
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def gram_sum(points, weights, origins, axes, areas, kind, parameters):  # type: ignore[no-untyped-def]
     """G, shape (2 m, 2 m), and a number that is NaN if a point or weight is not finite or a weight is negative."""
     n, m = points.shape[0], origins.shape[0]
@@ -154,7 +154,7 @@ def gram_sum(points, weights, origins, axes, areas, kind, parameters):  # type: 
     return G, check
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def place(p, q, positions_B, axes_B):  # type: ignore[no-untyped-def]
     """(R_WB, origins in W, axes in W) of thrusters on a body at p with unit quaternion q = (w, x, y, z)."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -173,7 +173,7 @@ def place(p, q, positions_B, axes_B):  # type: ignore[no-untyped-def]
     return R, origins, axes
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def pose_slopes(block, count, p, origin, axis, sign, alpha, beta, slope):  # type: ignore[no-untyped-def]
     """Rows 0 to 5 of `slope`: derivatives of one jet's sqrt(w) f by the vehicle's position and by a turn, both in W.
 
@@ -197,7 +197,7 @@ def pose_slopes(block, count, p, origin, axis, sign, alpha, beta, slope):  # typ
         slope[5, j] = gx * qy - gy * qx
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(fastmath=FAST)
 def gram_slope_sum(points, weights, p, q, positions_B, axes_B, areas, kind, parameters):  # type: ignore[no-untyped-def]
     """G, shape (2 m, 2 m), its derivatives by position in W and rotation vector in B, (6, 2 m, 2 m), and the check."""
     n, m = points.shape[0], positions_B.shape[0]

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array, freeze
+from wakewise.compiled import njit
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.interfaces import WakeModel
@@ -63,7 +63,7 @@ class WakeView:
         )
 
 
-@njit(cache=True)
+@njit
 def _placed(p: Array, q: Array, positions_B: Array, axes_B: Array) -> tuple[Array, Array]:
     """Thruster origins and axes in the world, shape (m, 3) each, of a body at p with unit quaternion q."""
     w, x, y, z = q[0], q[1], q[2], q[3]

@@ -22,9 +22,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array, IntArray
+from wakewise.compiled import njit
 from wakewise.water.bedjets_sums import (
     COLUMNS,
     LOG_WIDTH,
@@ -136,7 +136,7 @@ def packed_rings(rings: Rings, least_m: float = 0.0, per_height: float = 0.0, st
     return rows
 
 
-@njit(cache=True)
+@njit
 def _fill(
     rows: Array, centre: Array, R: Array, impulse: Array, heading: Array, kappa: Array, least: float, per_height: float
 ) -> None:
@@ -236,7 +236,7 @@ def coarsened(rings: Rings) -> Rings:
     return Rings(centre, radius, impulse, lean).take(keep)
 
 
-@njit(cache=True)
+@njit
 def _merge_rings(
     centre: Array,
     radius: Array,
@@ -279,7 +279,7 @@ def _merge_rings(
     return found
 
 
-@njit(cache=True)
+@njit
 def _sum_layers(centre: Array, radius: Array, strength: Array, heading: Array, kappa: Array, out: Array) -> None:
     """For each ring, strengths weighted with nearness in log radius, centre and direction, over its radius."""
     n, per_L = radius.shape[0], 1.0 / LOG_WIDTH

@@ -13,9 +13,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array, IntArray
+from wakewise.compiled import njit
 
 WALL_JET_SPREAD = 0.093  # delta over R for which the layer below, entrainment included, is half as fast at 0.09 R
 LOG_WIDTH = 0.3  # L: neighbouring rings overlap; it sets how sharp a front is, not how fast
@@ -52,7 +52,7 @@ def _exp(x: Any) -> Any:
     return e * e
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@njit(nogil=True, fastmath=True)
 def sum_planes(points: Array, planes: Array, starts: IntArray, rings: Array, kind: Array, out: Array) -> None:
     """Sum over rings of several planes; arguments as in `planes_velocity`, `kind` of the precision of the sums."""
     work = np.zeros((6, _BLOCK), kind.dtype)
@@ -274,7 +274,7 @@ def _feel(
     return count
 
 
-@njit(cache=True)
+@njit
 def finish_rows(rows: Array) -> None:
     """Fill in the columns of packed rings that follow from centre, R, A, heading, kappa, thickness and height."""
     for j in range(rows.shape[0]):
@@ -290,7 +290,7 @@ def finish_rows(rows: Array) -> None:
         rows[j, 10] = min(HIGHEST, left) * R * math.exp(widest)
 
 
-@njit(cache=True)
+@njit
 def log_i0(x: float) -> float:
     """Logarithm of the modified Bessel function I0, to 2e-7: Abramowitz and Stegun 1964, 9.8.1 and 9.8.2."""
     if x < 3.75:
@@ -303,7 +303,7 @@ def log_i0(x: float) -> float:
     return x + math.log(s / math.sqrt(x))
 
 
-@njit(cache=True)
+@njit
 def leaning(lean: Array) -> tuple[Array, Array]:
     """Heading, shape (n, 2), and concentration kappa, shape (n,), of mean direction vectors, shape (n, 2).
 
@@ -323,7 +323,7 @@ def leaning(lean: Array) -> tuple[Array, Array]:
     return heading, kappa
 
 
-@njit(cache=True)
+@njit
 def log_i0s(x: Array) -> Array:
     """`log_i0` of each, shape (n,)."""
     out = np.empty(x.shape[0])
@@ -332,7 +332,7 @@ def log_i0s(x: Array) -> Array:
     return out
 
 
-@njit(cache=True)
+@njit
 def log_overlap(
     heading_a: Array, kappa_a: float, bessel_a: float, heading_b: Array, kappa_b: float, bessel_b: float
 ) -> float:
@@ -345,7 +345,7 @@ def log_overlap(
     return log_i0(0.5 * math.sqrt(x * x + y * y)) - 0.5 * (bessel_a + bessel_b)
 
 
-@njit(cache=True)
+@njit
 def with_images(packed: Array, walls: Array, least_m_s: float) -> Array:
     """Append images in one wall after another, so that corners hold too; rows as packed by `packed_rings`."""
     n = packed.shape[0]

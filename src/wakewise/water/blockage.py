@@ -13,9 +13,9 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array, IntArray, freeze
+from wakewise.compiled import njit
 from wakewise.targets import Target
 from wakewise.water.induction import FixedSources, smooth_share
 
@@ -108,7 +108,7 @@ class Blockage:
         return float(np.sqrt(np.mean(after**2) / max(np.mean(before**2), 1e-30)))
 
 
-@njit(cache=True)
+@njit
 def _near(points: Array, middle: Array, reach: float) -> IntArray:
     found = np.empty(points.shape[0], np.int64)
     count = 0

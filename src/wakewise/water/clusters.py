@@ -16,9 +16,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array, IntArray
+from wakewise.compiled import njit
 from wakewise.water.chunks import over_points
 from wakewise.water.induction import SINGLE, impulse_sums, impulse_velocity
 
@@ -47,7 +47,7 @@ def in_space(points_W_m: Array) -> IntArray:
     return order
 
 
-@njit(cache=True)
+@njit
 def _hilbert(points: Array, key: np.ndarray) -> None:
     low, high = points[0].copy(), points[0].copy()
     for p in range(points.shape[0]):
@@ -136,7 +136,7 @@ class ImpulseField:
         _sum(points_W_m, self.rows, self.starts, self.clusters, SINGLE, out)
 
 
-@njit(cache=True)
+@njit
 def _cells(X: Array, sigma: Array, key: np.ndarray) -> None:
     """Which cell each impulse is in; cells grow where there would be more than keys."""
     low, high = X[0].copy(), X[0].copy()
@@ -156,7 +156,7 @@ def _cells(X: Array, sigma: Array, key: np.ndarray) -> None:
         key[j] = 2 * at + (1 if sigma[j] > _SMALL_M else 0)
 
 
-@njit(cache=True)
+@njit
 def _clusters(X: Array, m: Array, sigma: Array, key: np.ndarray, order: IntArray) -> tuple[np.ndarray, IntArray, Array]:
     """Rows and clusters of an `ImpulseField`, and where each cluster starts."""
     n = order.shape[0]
@@ -196,7 +196,7 @@ def _clusters(X: Array, m: Array, sigma: Array, key: np.ndarray, order: IntArray
     return rows, starts[: count + 1].copy(), out
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@njit(nogil=True, fastmath=True)
 def _sum(points: Array, rows: np.ndarray, starts: IntArray, clusters: Array, K: np.ndarray, out: Array) -> None:
     near, far = np.empty((7, rows.shape[1]), np.float32), np.empty((6, rows.shape[1]), np.float32)
     farther = np.empty((6, clusters.shape[0]), np.float32)

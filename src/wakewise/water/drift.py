@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array, IntArray
+from wakewise.compiled import njit
 from wakewise.water.closure import CORE_END_D, FIRST_D, PUFF_SPREAD, Spreading
 from wakewise.water.faces import Face
 from wakewise.water.parcels import Parcels
@@ -23,7 +23,7 @@ GUST_MEMORY = 1.0  # integral time of the turbulence, in sigma over speed at the
 _HELD_SIGMA, HELD_S = 0.05, 0.2
 
 
-@njit(cache=True)
+@njit
 def due(flow: Array, held_s: Array, sigma: Array, dt_s: float) -> IntArray:
     """Parcels at which the water must be looked at before a step of dt_s; the times of the others go on."""
     found = np.empty(sigma.shape[0], np.int64)
@@ -67,7 +67,7 @@ def gust_memory(sigma_m: Array, speed_m_s: Array, dt_s: float) -> Array:
     return memory
 
 
-@njit(cache=True, error_model="numpy")
+@njit
 def _drift(
     X: Array,
     sigma: Array,
@@ -124,7 +124,7 @@ def _drift(
                 X[i, k] = 2 * walls[f, 2] - X[i, k]
 
 
-@njit(cache=True)
+@njit
 def slugs(
     impulses_m4_s: Array,
     dt_s: float,

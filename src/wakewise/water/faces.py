@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array, IntArray
+from wakewise.compiled import njit
 
 LEAST_IMAGE_M_S = 5e-5
 """Images in walls and surface that would not reach this speed there are left out; the bed's are all kept."""
@@ -115,7 +115,7 @@ class Room:
         return X, m, sigma
 
 
-@njit(cache=True)
+@njit
 def _mirror(
     X: Array, m: Array, sigma: Array, axis: int, at: Array, side: IntArray, least: Array
 ) -> tuple[Array, Array, Array]:

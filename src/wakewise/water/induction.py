@@ -24,9 +24,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.water.chunks import over_points
 
 _SCALE = 12.0
@@ -89,7 +89,7 @@ def _sum(kernel: Any, points_W_m: Array, rows: list[Any], exact: bool) -> Array:
     return out
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@njit(nogil=True, fastmath=True)
 def _impulses(
     points: Array, X: Array, Y: Array, Z: Array, MX: Array, MY: Array, MZ: Array, S: Array, K: Array, out: Array
 ) -> None:
@@ -126,7 +126,7 @@ def impulse_sums(
         out[i, 0], out[i, 1], out[i, 2] = u, v, up
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@njit(nogil=True, fastmath=True)
 def _sources(points: Array, X: Array, Y: Array, Z: Array, Q: Array, S: Array, K: Array, out: Array) -> None:
     p0, p1, p2, p3, p4, p5, p6, p7, p8, p9 = K[0], K[1], K[2], K[3], K[4], K[5], K[6], K[7], K[8], K[9]
     one, per_scale = K[19], K[22]

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array, IntArray
+from wakewise.compiled import njit
 from wakewise.water.bedjets import STRIKE_HEIGHT, Rings, rings_from_strikes
 from wakewise.water.parcels import CENTRE_SPEED, Parcels
 
@@ -136,7 +136,7 @@ class Meetings:
         return sheet
 
 
-@njit(cache=True)
+@njit
 def _meeting_pairs(X: Array, m: Array, sigma: Array, stream: IntArray) -> IntArray:
     """Pairs that blow at each other nearly on one line and are as near as a jet is to the wall that it strikes."""
     n = sigma.shape[0]

@@ -10,9 +10,9 @@ import math
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array, IntArray
+from wakewise.compiled import njit
 from wakewise.water.closure import disk_share, first_sigma_m
 from wakewise.water.faces import Room
 from wakewise.water.induction import impulse_velocity
@@ -198,7 +198,7 @@ def _merged(parcels: Parcels, order: IntArray, label: IntArray, spacing: float) 
     return out.take(keep)
 
 
-@njit(cache=True)
+@njit
 def _merge_pairs(
     order: IntArray,
     X: Array,

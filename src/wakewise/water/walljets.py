@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from wakewise.arrays import Array, IntArray
+from wakewise.compiled import njit
 from wakewise.water.bedjets import Rings, coarsened, grown, layer_speed, packed_rings, planes_velocity, with_ring_images
 from wakewise.water.bedjets_sums import COLUMNS, sum_planes
 from wakewise.water.faces import Face, Room
@@ -133,7 +133,7 @@ def _per_height(face: Face, room: Room) -> float:
     return 1.0 / abs(opposite[0].at_m - face.at_m) if opposite else 0.0
 
 
-@njit(cache=True)
+@njit
 def _to_world(centre: Array, frame: Array) -> Array:
     """Places in a plane's frame, shape (n, 2), in the world, shape (n, 3)."""
     out = np.empty((centre.shape[0], 3))
@@ -144,7 +144,7 @@ def _to_world(centre: Array, frame: Array) -> Array:
     return out
 
 
-@njit(cache=True)
+@njit
 def _to_plane(vectors: Array, frame: Array) -> Array:
     """Vectors of the world, shape (n, 3), in a plane's frame."""
     out = np.empty((vectors.shape[0], 3))
@@ -155,7 +155,7 @@ def _to_plane(vectors: Array, frame: Array) -> Array:
     return out
 
 
-@njit(cache=True)
+@njit
 def _inside(places: Array, radius: Array, faces: Array) -> np.ndarray:
     """Which rings' centres are no farther behind any face (axis, side, depth) than half their radius."""
     keep = np.ones(radius.shape[0], np.bool_)

@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from pydantic import Field
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.interfaces import Flow
 from wakewise.settings import Settings
 from wakewise.studies.piv.tracers import Sheet, TracerSettings, carried, seed_sheet
@@ -87,7 +87,7 @@ def picture(columns: Array, rows: Array, peak: Array, camera: CameraSettings, rn
     return np.asarray(np.clip(np.rint(light), 0, 255), dtype=np.uint8)
 
 
-@njit(cache=True)
+@njit
 def _add_spots(columns, rows, peak, sigma, light):  # type: ignore[no-untyped-def]
     """Add spots to `light`; a pixel gets the mean of the Gaussian over its area, by differences of erf."""
     height, width = light.shape

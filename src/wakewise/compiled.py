@@ -1,0 +1,127 @@
+"""`njit` as the kernels of this package use it: kept on disk, and compiled anew when anything they are made of changes.
+
+A kernel holds the code of the kernels that it calls and the constants that it names. Numba looks at the kernel's own
+file only when it asks whether what it kept is still right, so a change in a callee would go unheard. Here the question
+is asked of the file and of every file of the package that it imports, and those import in turn. Numba's index of what
+it kept is read, changed and written with no lock, so that of two processes that compile at once one can leave the
+other's code under a wrong name; here they wait for each other.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core import caching
+
+PACKAGE = Path(__file__).resolve().parent
+LOCK = "kernels.lock"
+_IMPORTS = re.compile(r"^\s*from (wakewise[\w.]*) import (\([^)]*\)|[^\n#]*)", re.MULTILINE)
+
+prange = numba.prange
+
+
+def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
+    """`numba.njit`, kept on disk, with NumPy's rules for division by zero unless `options` say otherwise."""
+
+    def decorate(work: Callable[..., Any]) -> Any:
+        # No kernel is handed to C as a callback, and what that takes is a share of each compilation.
+        kernel = numba.njit(**{"error_model": "numpy", "no_cfunc_wrapper": True} | options)(work)
+        kernel._cache = KernelCache(work)  # as Dispatcher.enable_caching does it with Numba's own
+        return kernel
+
+    return decorate if function is None else decorate(function)
+
+
+class _OfAllItsFiles:
+    """What makes one of Numba's locators ask about all of a kernel's files."""
+
+    _py_file: str
+
+    def get_source_stamp(self) -> bytes:
+        """Digest of the kernel's file and all that it imports from the package."""
+        return digest(Path(self._py_file).resolve())
+
+
+class _GivenFolder(_OfAllItsFiles, caching.UserProvidedCacheLocator):
+    """Keeps kernels in the folder of NUMBA_CACHE_DIR."""
+
+
+class _BesideSource(_OfAllItsFiles, caching.InTreeCacheLocator):
+    """Keeps kernels in `__pycache__` beside their source."""
+
+
+class _UserFolder(_OfAllItsFiles, caching.UserWideCacheLocator):
+    """Keeps kernels in the user's cache."""
+
+
+class _Impl(caching.CompileResultCacheImpl):
+    _locator_classes = [_GivenFolder, _BesideSource, _UserFolder]  # noqa: RUF012  (as Numba has it)
+
+
+class KernelCache(caching.FunctionCache):
+    """Numba's cache of one kernel, with the two remedies that this page begins with."""
+
+    _impl_class = _Impl
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep what was compiled for a signature, while no other process does the same in that folder."""
+        with _alone(Path(self.cache_path)):
+            super().save_overload(sig, data)
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Wait until no other process is in the block with this folder; without locks, go on at once."""
+    try:
+        import fcntl
+    except ImportError:
+        yield
+        return
+    handle = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        with suppress(OSError):  # a file system that knows no locks
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
+
+
+@cache
+def digest(path: Path) -> bytes:
+    """SHA-256 over the contents of a file and of all files of the package that it imports, near and far."""
+    whole = hashlib.sha256()
+    for file in sorted(_reached(path)):
+        name = file.relative_to(PACKAGE) if PACKAGE in file.parents else file.name
+        whole.update(f"{name}\0".encode() + hashlib.sha256(file.read_bytes()).digest())
+    return whole.digest()
+
+
+def _reached(path: Path) -> set[Path]:
+    """A file and those that it imports, and so on."""
+    found: set[Path] = set()
+    waiting = [path]
+    while waiting:
+        file = waiting.pop()
+        if file not in found:
+            found.add(file)
+            waiting.extend(imported(file))
+    return found
+
+
+@cache
+def imported(path: Path) -> frozenset[Path]:
+    """Files of the package that a file imports by `from wakewise... import ...`, wherever in it that stands."""
+    found: set[Path] = set()
+    for module, names in _IMPORTS.findall(path.read_text(encoding="utf-8")):
+        place = PACKAGE.joinpath(*module.split(".")[1:])
+        for candidate in (place, *(place / name for name in re.findall(r"\w+", names))):
+            found.update(file for file in (candidate.with_suffix(".py"), candidate / "__init__.py") if file.exists())
+    return frozenset(found - {PACKAGE / "__init__.py"})
