@@ -37,6 +37,7 @@ check: setup
 	$(BIN)/lint-imports
 
 test: check
+	$(BIN)/wakewise warm
 	$(BIN)/pytest -n 2
 
 bench: setup

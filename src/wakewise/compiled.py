@@ -15,6 +15,7 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,12 @@ PACKAGE = Path(__file__).resolve().parent
 LOCK = "kernels.lock"
 _IMPORTS = re.compile(r"^\s*from (wakewise[\w.]*) import (\([^)]*\)|[^\n#]*)", re.MULTILINE)
 
+_ARRAY = re.compile(r"(const )?(\w+)\[(\d)([CFA])\]")
+
+TypeWords = str | list[Any] | dict[str, list[Any]]
+
 prange = numba.prange
+types: Any = numba.types
 
 
 def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
@@ -35,9 +41,16 @@ def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
         # No kernel is handed to C as a callback, and what that takes is a share of each compilation.
         kernel = numba.njit(**{"error_model": "numpy", "no_cfunc_wrapper": True} | options)(work)
         kernel._cache = KernelCache(work)  # as Dispatcher.enable_caching does it with Numba's own
+        typed = kernel.get_call_template
+        kernel.get_call_template = lambda args, kws: typed(tuple(map(_widened, args)), kws)
         return kernel
 
     return decorate if function is None else decorate(function)
+
+
+def _widened(kind: Any) -> Any:
+    """A whole number's type without its value: one kernel calls another with 0 and with 1 and needs it but once."""
+    return types.unliteral(kind) if isinstance(kind, types.IntegerLiteral) else kind
 
 
 class _OfAllItsFiles:
@@ -125,3 +138,49 @@ def imported(path: Path) -> frozenset[Path]:
         for candidate in (place, *(place / name for name in re.findall(r"\w+", names))):
             found.update(file for file in (candidate.with_suffix(".py"), candidate / "__init__.py") if file.exists())
     return frozenset(found - {PACKAGE / "__init__.py"})
+
+
+def type_of(kind: Any) -> TypeWords:
+    """A type of Numba's in words that JSON holds and `type_from` reads.
+
+    `float64`; `const float64[2C]` for a read-only array; a list for a tuple; {class: [...]} for a named one.
+
+    Raises
+    ------
+    ValueError
+        If it is none of the types that kernels here are called with from Python.
+    """
+    if isinstance(kind, types.Array) and kind.aligned:
+        return f"{'' if kind.mutable else 'const '}{kind.dtype}[{kind.ndim}{kind.layout}]"
+    if isinstance(kind, types.BaseNamedTuple):
+        record = kind.instance_class
+        return {f"{record.__module__}.{record.__qualname__}": [type_of(part) for part in kind]}
+    if isinstance(kind, types.BaseTuple):
+        return [type_of(part) for part in kind]
+    if isinstance(kind, types.Number | types.Boolean | types.NoneType) and not isinstance(kind, types.Literal):
+        return str(kind)
+    raise ValueError(f"a kernel was called with {kind!r}, which cannot be listed")
+
+
+def type_from(words: TypeWords) -> Any:
+    """Type of Numba's from what `type_of` made of it."""
+    if isinstance(words, dict):
+        ((name, parts),) = words.items()
+        module, _, record = name.rpartition(".")
+        return types.BaseTuple.from_types([type_from(part) for part in parts], getattr(import_module(module), record))
+    if isinstance(words, list):
+        return types.BaseTuple.from_types([type_from(part) for part in words])
+    if array := _ARRAY.fullmatch(words):
+        const, dtype, ndim, layout = array.groups()
+        return types.Array(getattr(types, dtype), int(ndim), layout, readonly=bool(const))
+    return getattr(types, words)
+
+
+@njit(inline="always")
+def assign(target: Any, source: Any) -> None:
+    """`target[:] = source` for vectors of one length, within a kernel.
+
+    Numba's own slice assignment brings the making of a message about shapes into each kernel: seconds to compile.
+    """
+    for i in range(target.size):
+        target[i] = source[i]

@@ -39,7 +39,7 @@ def needs_folder(package: Path, environment: MutableMapping[str, str], can_write
     rooms = [room for room in package.iterdir() if room.is_dir() and room.name != "__pycache__"]
     if all(can_write(room / "__pycache__") for room in (package, *rooms)):
         return False
-    return not can_write(_user_cache(environment))
+    return not can_write(user_cache(environment))
 
 
 def can_be_written(folder: Path) -> bool:
@@ -70,7 +70,7 @@ def _is_private(folder: Path) -> bool:
     return stat.S_ISDIR(facts.st_mode) and mine and not facts.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
-def _user_cache(environment: MutableMapping[str, str]) -> Path:
+def user_cache(environment: MutableMapping[str, str]) -> Path:
     """Numba's folder in the user's cache."""
     home = Path(environment.get("HOME") or os.path.expanduser("~"))  # noqa: PTH111  (Path.home fails without a home)
     if sys.platform == "darwin":

@@ -205,7 +205,8 @@ def gentle_allocation(
     n = layout.B.shape[1]
     requested = frozen(wrench_B, (6,), "wrench")
     G = frozen(gram, (2 * n, 2 * n), "Gram matrix")
-    previous = np.zeros(n) if previous_N is None else frozen(previous_N, (n,), "previous thrusts")
+    # Copies, here and of the lines: kernels are compiled for arrays that may be written to, and not again for others.
+    previous = np.zeros(n) if previous_N is None else frozen(previous_N, (n,), "previous thrusts").copy()
     if budget < 1:
         raise InputError(f"budget: {budget} boxes, must be at least 1")
     if priority is not None:
@@ -215,7 +216,7 @@ def gentle_allocation(
     scale = 1.0
     if len(layout.lines) == layout.k > 0:
         done, thrusts, gap = split_allocation(
-            G, layout.inverse, requested, layout.lines, lower, upper, previous, packed, COUPLING_LIMIT
+            G, layout.inverse, requested, layout.lines.copy(), lower, upper, previous, packed, COUPLING_LIMIT
         )
         method = "lines"
     else:

@@ -14,10 +14,10 @@ import numpy as np
 from wakewise.allocation.cells import CLOSED, examine
 from wakewise.allocation.coupled import descend, explore
 from wakewise.arrays import Array, IntArray
-from wakewise.compiled import njit
+from wakewise.compiled import assign, njit
 
 
-@njit
+@njit(inline="always")
 def coordinates(null: Array, thrusts: Array) -> IntArray:
     """Thrusters, shape (k,), whose rows of `null` are independent, those of least |thrust| first."""
     n, k = null.shape
@@ -34,7 +34,7 @@ def coordinates(null: Array, thrusts: Array) -> IntArray:
         chosen[c] = pick
         row = left[pick] / np.sqrt(np.dot(left[pick], left[pick]))
         for i in range(n):
-            left[i] -= np.dot(left[i], row) * row
+            assign(left[i], left[i] - np.dot(left[i], row) * row)
     return chosen
 
 
@@ -80,7 +80,7 @@ def box_search(
     free = coordinates(null, best)
     rows = np.empty((k, k))
     for c in range(k):
-        rows[c] = null[free[c]]
+        assign(rows[c], null[free[c]])
     along = null @ np.linalg.inv(rows)
     # How much a side loosens the bound, per newton: by what its thrusters disturb, and a little by their number.
     looseness, share = np.zeros(k), 0.1 * weights[0] * np.trace(G) / n

@@ -13,7 +13,7 @@ import numpy as np
 
 from wakewise.allocation.search import cost
 from wakewise.arrays import Array
-from wakewise.compiled import njit
+from wakewise.compiled import assign, njit
 
 CLOSED = 1e-5
 """Relative gap at which a search ends: a tenth of what the thrusters could show."""
@@ -63,7 +63,7 @@ def _terms(
             cross[i, j] = worst
 
 
-@njit
+@njit(inline="always")
 def _tangent(
     cross: Array, single: Array, linear: Array, square: float, at: Array, signs: Array, slope: Array, size_slope: Array
 ) -> float:
@@ -92,7 +92,7 @@ def _tangent(
     return constant
 
 
-@njit
+@njit(inline="always")
 def _least_corner(
     concave: Array, constant: float, slope: Array, size_slope: Array, T: Array, count: int
 ) -> tuple[float, int]:
@@ -109,7 +109,7 @@ def _least_corner(
     return least, lowest
 
 
-@njit
+@njit(inline="always")
 def _gather(cross: Array, signs: Array, root: Array, roots: Array, count: int, single: Array, concave: Array) -> bool:
     """Join what hangs on the root of a thrust that comes close to zero into one term; False if nothing does.
 
@@ -144,7 +144,7 @@ def _gather(cross: Array, signs: Array, root: Array, roots: Array, count: int, s
     return True
 
 
-@njit
+@njit(inline="always")
 def _balance(
     concave: Array, linear: Array, square: float, along: Array, widths: Array, centre: Array, at: Array
 ) -> None:
@@ -175,7 +175,7 @@ def _balance(
             at[i] += along[i, c] * moved[c]
 
 
-@njit
+@njit(inline="always")
 def examine(
     G: Array,
     T: Array,
@@ -238,7 +238,7 @@ def examine(
             here = cost(G, T[r], previous, weights)
             if here < value:
                 value = here
-                best[:] = T[r]
+                assign(best, T[r])
     slope, size_slope, at, single = np.empty(n), np.empty(n), centre.copy(), np.zeros(n)
     bound, corner = -np.inf, 0
     if square > 0.0:

@@ -9,7 +9,7 @@ import numpy as np
 
 from wakewise.allocation.search import TOLERANCE, box_range, cost, line_minimum
 from wakewise.arrays import Array
-from wakewise.compiled import njit
+from wakewise.compiled import assign, njit
 
 
 @njit
@@ -31,7 +31,7 @@ def _move(
         trial[i] = min(max(thrusts[i] + t * direction[i], lower[i]), upper[i])
     after = cost(G, trial, previous, weights)
     if after < before:
-        thrusts[:] = trial
+        assign(thrusts, trial)
         return before - after
     return 0.0
 
@@ -56,7 +56,7 @@ def descend(
                     row -= held[h] * np.dot(row, held[h])
                 size = np.sqrt(np.dot(row, row))
                 if size > 1e-9:
-                    held[count] = row / size
+                    assign(held[count], row / size)
                     count += 1
         if count > 0:
             for c in range(k):
@@ -72,7 +72,7 @@ def descend(
     return cost(G, thrusts, previous, weights)
 
 
-@njit
+@njit(inline="always")
 def explore(
     G: Array, thrusts: Array, null: Array, lower: Array, upper: Array, previous: Array, weights: Array, rounds: int
 ) -> float:
@@ -99,7 +99,7 @@ def explore(
                 found = descend(G, trial, null, lower, upper, previous, weights, 4)
                 if found < value * (1.0 - 1e-9):
                     value = found
-                    thrusts[:] = trial
+                    assign(thrusts, trial)
         if value >= before:
             break
     return value

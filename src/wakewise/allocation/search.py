@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.compiled import njit
+from wakewise.compiled import assign, njit
 
 TOLERANCE = 1e-7
 """Relative gap at which a line search stops: far below what a thruster can reproduce."""
@@ -235,9 +235,9 @@ def line_minimum(
             if value < best:
                 t_best, best = t, value
             if side == 0:
-                lefts[0] = node
+                assign(lefts[0], node)
             else:
-                rights[0] = node
+                assign(rights[0], node)
         if stop - start < 1e-12:
             continue
         targets[0], bounds[0] = _bound(start, lefts[0], stop, rights[0], constant, linear, square)
@@ -260,10 +260,10 @@ def line_minimum(
             value = constant + linear * t + square * t * t + node[0] + node[1]
             if value < best:
                 t_best, best = t, value
-            rights[top + 1] = rights[top]
+            assign(rights[top + 1], rights[top])
             ends[top + 1, 0], ends[top + 1, 1] = t, high_t
-            lefts[top + 1] = node
-            rights[top] = node
+            assign(lefts[top + 1], node)
+            assign(rights[top], node)
             ends[top, 1] = t
             for child in range(top, top + 2):
                 targets[child], bounds[child] = _bound(

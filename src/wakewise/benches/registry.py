@@ -10,6 +10,7 @@ from wakewise.trials.timing import BenchOptions
 
 BENCHES = {
     "allocator": "exact allocation against SciPy's SLSQP and the pseudo-inverse",
+    "cold": "what a user waits for at first: import, --help, compiling, first flight, second flight",
     "disturbance": "the Gram matrix of D against the sum over points",
     "estimator": "the filter in the default tank: error, consistency, ten seconds without a camera",
     "dynamics": "one step of the vehicle, with and without Jacobians",

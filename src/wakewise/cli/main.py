@@ -29,6 +29,7 @@ from wakewise.cli import (
     target,
     vehicle,
     wake,
+    warm,
 )
 from wakewise.errors import InputError, MissingExtra, WakewiseError
 
@@ -51,6 +52,7 @@ app.command("colour")(colour.colour)
 app.command("nerf")(nerf.nerf)
 app.command("allocate")(allocate.allocate)
 app.command("bench")(bench.bench)
+app.command("warm")(warm.warm)
 app.add_typer(vehicle.app, name="vehicle")
 app.add_typer(tank.app, name="tank")
 app.add_typer(target.app, name="target")

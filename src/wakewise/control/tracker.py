@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wakewise.arrays import Array, freeze
-from wakewise.compiled import njit
+from wakewise.compiled import assign, njit
 from wakewise.control.settings import ControlSettings
 from wakewise.control.stability import Gains, stable_gain_scale, vehicle_axes, wished_gains
 from wakewise.interfaces import BodyState, Goal
@@ -200,16 +200,16 @@ def _pid(  # type: ignore[no-untyped-def]
     if w < 0.0:
         factor = -factor
     error = np.empty(6)
-    error[:3] = _turn(q, goal_p - p, True)
+    assign(error[:3], _turn(q, goal_p - p, True))
     error[3], error[4], error[5] = factor * x, factor * y, factor * z
-    twist_B[:3] = _turn(q_BG, goal_nu[:3], False)
-    twist_B[3:] = _turn(q_BG, goal_nu[3:], False)
+    assign(twist_B[:3], _turn(q_BG, goal_nu[:3], False))
+    assign(twist_B[3:], _turn(q_BG, goal_nu[3:], False))
     # Weight against buoyancy is a world force: express the goal's feed-forward force in B, its moment as at the goal.
     feed_B = feed_G.copy()
-    feed_B[:3] = _turn(q_BG, feed_G[:3], False)
+    assign(feed_B[:3], _turn(q_BG, feed_G[:3], False))
     integral = np.empty(6)
-    integral[:3] = _turn(q, force_W, True)
-    integral[3:] = moment_B
+    assign(integral[:3], _turn(q, force_W, True))
+    assign(integral[3:], moment_B)
     for i in range(6):
         base = kp[i] * error[i] + kd[i] * (twist_B[i] - nu[i]) + feed_B[i]
         step = ki[i] * error[i] * dt_s
@@ -217,5 +217,5 @@ def _pid(  # type: ignore[no-untyped-def]
         if not (saturated and step * (base + integral[i]) > 0.0):
             integral[i] = min(max(integral[i] + step, -limit[i]), limit[i])
         wrench[i] = base + integral[i]
-    new_force_W[:] = _turn(q, integral[:3].copy(), False)
-    new_moment_B[:] = integral[3:]
+    assign(new_force_W, _turn(q, integral[:3], False))
+    assign(new_moment_B, integral[3:])

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.compiled import njit
+from wakewise.compiled import assign, njit
 from wakewise.estimation.resting import DRAG, at_rest, rest_effects, turn
 from wakewise.vehicles.kernels import INVERSE, LINEAR, QUADRATIC, damping, rate_kernel, rotate
 from wakewise.vehicles.runge_kutta import rk4_jacobian_kernel
@@ -106,15 +106,15 @@ def unexplained(packed: Array, allocation: Array, mean: Array, thrusts_N: Array,
     return wrench
 
 
-@njit
+@njit(inline="always")
 def _inputs(own: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array) -> Array:
     inputs = np.empty(9)
-    inputs[:6] = pushed(own, allocation, mean, thrusts_N, rest_q)
-    inputs[6:] = mean[25:28]
+    assign(inputs[:6], pushed(own, allocation, mean, thrusts_N, rest_q))
+    assign(inputs[6:], mean[25:28])
     return inputs
 
 
-@njit
+@njit(inline="always")
 def _effects(own: Array, mean: Array, inputs: Array) -> Array:
     """Wrench, shape (6, 12), by the relative change of drag and of inertia in each degree of freedom."""
     rate = np.empty(13)
@@ -147,7 +147,7 @@ def _effects(own: Array, mean: Array, inputs: Array) -> Array:
     return effect
 
 
-@njit
+@njit(inline="always")
 def _add_current(F: Array, A: Array, mean: Array, dt_s: float) -> None:
     """Fill F's columns of the current: it acts as a velocity the other way, and turns in B."""
     q, w = mean[3:7], mean[10:13]
@@ -185,13 +185,16 @@ def moved(
     A, B = np.empty((MOVING, MOVING)), np.empty((MOVING, 6))
     rk4_jacobian_kernel(own, mean[:13], inputs, dt_s, A, B)
     halfway = mean.copy()
-    halfway[:13] = 0.5 * (before[:13] + mean[:13])
-    halfway[3:7] /= np.sqrt(np.dot(halfway[3:7], halfway[3:7]))
+    assign(halfway[:13], 0.5 * (before[:13] + mean[:13]))
+    assign(halfway[3:7], halfway[3:7] / np.sqrt(np.dot(halfway[3:7], halfway[3:7])))
     effect = _effects(own, halfway, inputs)
     F = np.zeros((MOVING, errors))
-    F[:, :MOVING] = A
+    for i in range(MOVING):
+        assign(F[i, :MOVING], A[i])
     _add_current(F, A, before, dt_s)
-    F[:, DRAG:GAINS] = B @ effect
+    driven = B @ effect
+    for i in range(MOVING):
+        assign(F[i, DRAG:GAINS], driven[i])
     resting = B @ rest_effects(own, before, rest_q)
     for i in range(MOVING):
         for j in range(3):
@@ -275,7 +278,7 @@ def predict(
     _fade(mean, P, dt_s, spread, lasts_s)
 
 
-@njit
+@njit(inline="always")
 def _fade(mean: Array, P: Array, dt_s: float, spread: Array, lasts_s: Array) -> None:
     for k in range(spread.shape[0]):
         i, kept = CURRENT + k, np.exp(-dt_s / lasts_s[k])
@@ -286,7 +289,7 @@ def _fade(mean: Array, P: Array, dt_s: float, spread: Array, lasts_s: Array) -> 
         P[i, i] += spread[k] ** 2 * (1.0 - kept * kept)
 
 
-@njit
+@njit(inline="always")
 def _add_noise(P: Array, q: Array, dt_s: float, noise: Array) -> None:
     linear, angular = noise[0] ** 2, noise[1] ** 2
     for i in range(3):
@@ -328,7 +331,7 @@ def correct(mean: Array, P: Array, H: Array, residual: Array, R: Array, gate: fl
             P[j, i] = P[i, j]
     for i in range(3):
         mean[i] += change[i]
-    mean[3:7] = turned_by(mean[3:7], change[3:6])
+    assign(mean[3:7], turned_by(mean[3:7], change[3:6]))
     for i in range(6, P.shape[0]):
         mean[1 + i] += change[i]
     # No vehicle has a tenth, or ten times, of the drag and inertia that it is believed to have.

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.compiled import njit
+from wakewise.compiled import assign, njit
 from wakewise.vehicles.kernels import LINEAR, QUADRATIC, coriolis, damping, rotate
 
 DRAG = 27
@@ -46,8 +46,8 @@ def at_rest(own: Array, mean: Array, rest_q: Array) -> Array:
     past = _past_at_rest(mean, rest_q)
     drag, munk = damping(own, past), coriolis(own, past)
     wrench = np.empty(6)
-    wrench[:3] = turn(rest_q, np.array([drag[0], drag[1], drag[2]]), 1.0)
-    wrench[3:] = np.array([drag[3] + munk[3], drag[4] + munk[4], drag[5] + munk[5]])
+    assign(wrench[:3], turn(rest_q, np.array([drag[0], drag[1], drag[2]]), 1.0))
+    assign(wrench[3:], np.array([drag[3] + munk[3], drag[4] + munk[4], drag[5] + munk[5]]))
     return wrench
 
 
@@ -68,7 +68,7 @@ def rest_effects(own: Array, mean: Array, rest_q: Array) -> Array:
                 effect[i, j] += own[LINEAR + i, k] * seen[k]
             if i < 3:
                 effect[i, j] += 2.0 * own[QUADRATIC, i] * abs(v[i]) * seen[i]
-        effect[3:, j] += np.cross(seen, h) + np.cross(v, M @ seen)
+        assign(effect[3:, j], effect[3:, j] + np.cross(seen, h) + np.cross(v, M @ seen))
     for i in range(6):
         effect[i, 3 + i] = drag[i] / (1.0 + mean[1 + DRAG + i])
     for i in range(3):
@@ -77,7 +77,7 @@ def rest_effects(own: Array, mean: Array, rest_q: Array) -> Array:
         for j in range(3):
             change[i] += share * M[i, j] * v[j]
             change[j] += share * M[j, i] * v[i]
-        effect[3:, 9 + i] = np.cross(v, change)
+        assign(effect[3:, 9 + i], np.cross(v, change))
     for j in range(9):
-        effect[:3, j] = turn(q, turn(rest_q, effect[:3, j].copy(), 1.0), -1.0)
+        assign(effect[:3, j], turn(q, turn(rest_q, effect[:3, j].copy(), 1.0), -1.0))
     return effect

@@ -21,6 +21,10 @@ from wakewise.operation.parts import Parts
 from wakewise.operation.preflight import check_begin
 from wakewise.operation.recorder import FlightRecorder
 from wakewise.operation.scenario import Scenario
+from wakewise.warming import warm
+
+FLIGHT_JOBS = ("plan", "fly")
+"""What is compiled before a flight, if it is not yet (see `wakewise.warming`)."""
 
 WATER_EVERY_S = 0.1
 """How often the water is asked about; in between the last answer stands."""
@@ -126,11 +130,12 @@ def fly(
     """
     parts = flight if isinstance(flight, Parts) else flight.parts()
     scenario, vehicle, route = parts.scenario, parts.vehicle, parts.route
+    warm(FLIGHT_JOBS, progress)
     if checked:
         _ = parts.preflight
     else:
         check_begin(parts)
-    progress(0, 1, "compiling, about a minute the first time")
+    progress(0, 1, "at the start")
     plant, witness = parts.world.begin()
     dt_s, thrusters = 1.0 / scenario.control.rate_hz, len(vehicle.thrusters)
     recorder = FlightRecorder(

@@ -20,7 +20,7 @@ ROUNDED = 0.05
 is on the safe side. A level hull over a level floor would otherwise sit on a kink that no gradient can leave."""
 
 
-@njit
+@njit(inline="always")
 def barrier_value(h: float, reach: float, least: float) -> tuple[float, float, float]:
     """Phi and its first two derivatives at clearance h."""
     if h >= reach:
@@ -90,7 +90,7 @@ def sphere_gap(p: Array, R: Array, half: Array, sphere: Array, slope: Array) -> 
     return distance - sphere[3]
 
 
-@njit
+@njit(inline="always")
 def add_barrier(  # type: ignore[no-untyped-def]
     p, R, half, planes, spheres, reach, least, weight, gradient, hessian
 ):
@@ -116,7 +116,7 @@ def add_barrier(  # type: ignore[no-untyped-def]
     return total, closest
 
 
-@njit
+@njit(inline="always")
 def least_gap(p: Array, R: Array, half: Array, planes: Array, spheres: Array) -> float:
     """Least clearance to planes and spheres; infinite where there are none."""
     closest, slope = np.inf, np.empty(6)

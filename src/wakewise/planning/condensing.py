@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.compiled import njit
+from wakewise.compiled import assign, njit
 from wakewise.planning.kernels import RATE_N, RHO, W_CHANGE, W_EFFORT, W_TWIST
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}
@@ -155,7 +155,7 @@ def motion_gradient(table, work, g):  # type: ignore[no-untyped-def]
             fresh[c] = work.gx[k, c]
             for r in range(12):
                 fresh[c] += work.A[k, r, c] * costate[r]
-        costate[:] = fresh
+        assign(costate, fresh)
 
 
 @njit

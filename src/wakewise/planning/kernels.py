@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.compiled import njit
+from wakewise.compiled import assign, njit
 from wakewise.planning.barrier import add_barrier, least_gap
 from wakewise.vehicles.runge_kutta import rk4_jacobian_kernel, rk4_kernel
 from wakewise.wake.plan_disturbance import stage_disturbance
@@ -117,7 +117,7 @@ def rotation(state, R):  # type: ignore[no-untyped-def]
     R[2, 0], R[2, 1], R[2, 2] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
 
 
-@njit
+@njit(inline="always")
 def attitude_cost(state, wished, weight, tolerance, g, H):  # type: ignore[no-untyped-def]
     """Add weight max(0, |e| - tolerance)^2, e = 2 vec(q_ref^-1 q), to gradient g and Gauss-Newton H by the turn."""
     w, x, y, z = state[3], state[4], state[5], state[6]
@@ -167,8 +167,8 @@ def horizon(table, wake, scratch, case, U, work, slopes):  # type: ignore[no-unt
     state = case.state.copy()
     parts[:] = 0.0
     parts[6] = np.inf
-    X[0] = state
-    inputs[6:] = case.current_W
+    assign(X[0], state)
+    assign(inputs[6:], case.current_W)
     mu = case.barrier[0]
     for k in range(N + 1):
         rotation(state, R)
@@ -197,7 +197,7 @@ def horizon(table, wake, scratch, case, U, work, slopes):  # type: ignore[no-unt
                     for c in range(n):
                         work.R[k, r, c] = table.majorise * H[6 + r, 6 + c]
         gx = work.gx[k]
-        gx[:6] = g[:6]
+        assign(gx[:6], g[:6])
         gx[6:] = 0.0
         if k > 0:
             wished = case.reference[k]
@@ -256,12 +256,12 @@ def horizon(table, wake, scratch, case, U, work, slopes):  # type: ignore[no-unt
                     work.B[k, r, i] = total
         else:
             rk4_kernel(table.packed, state, inputs, h)
-        X[k + 1] = state
+        assign(X[k + 1], state)
     parts[5] = command_cost(table, case.command, U)
     return parts[0] + parts[1] + parts[2] + parts[3] + parts[4] + parts[5]
 
 
-@njit
+@njit(inline="always")
 def command_cost(table, before, U):  # type: ignore[no-untyped-def]
     """Effort, change and excess of rate of commands U, (N, n), after `before`, (n,)."""
     N, n = U.shape

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.compiled import njit
+from wakewise.compiled import assign, njit
 from wakewise.interfaces import Goal
 
 RAMP_S = 0.5
@@ -43,7 +43,9 @@ def reference_of(goal: Goal, stages: int, stage_s: float, change_B: Array | None
 
 @njit
 def _carry_on(p, q, nu, change, stage_s, out):  # type: ignore[no-untyped-def]
-    out[0, :3], out[0, 3:7], out[0, 7:] = p, q, nu
+    assign(out[0, :3], p)
+    assign(out[0, 3:7], q)
+    assign(out[0, 7:], nu)
     twist, half, middle = np.empty(6), np.empty(4), np.empty(4)
     for k in range(1, out.shape[0]):
         before, after = out[k - 1], out[k]
@@ -92,11 +94,11 @@ def between(a: Array, b: Array, share: float) -> Array:
     back = np.array([a[3], -a[4], -a[5], -a[6]])
     _times(back, b[3:7], turn)
     if turn[0] < 0.0:
-        turn[:] = -turn
+        assign(turn, -turn)
     sine = np.sqrt(turn[1] ** 2 + turn[2] ** 2 + turn[3] ** 2)
     angle = share * np.arctan2(sine, turn[0])
     scale = np.sin(angle) / sine if sine > 1e-12 else share
     half[0] = np.cos(angle)
-    half[1:] = scale * turn[1:]
+    assign(half[1:], scale * turn[1:])
     _times(a[3:7], half, state[3:7])
     return state

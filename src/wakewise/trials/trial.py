@@ -32,12 +32,17 @@ from wakewise.operation import (
     read_scenario,
     write_scenario,
 )
+from wakewise.operation.flying import FLIGHT_JOBS
 from wakewise.processes import alone
 from wakewise.reconstruction import read_cloud, read_lens, reconstruct
 from wakewise.targets import write_mesh
 from wakewise.trials.metrics import Figures, Gathering, comparison
 from wakewise.trials.stages import Ledger, Quiet, Watch, of_the_computer
 from wakewise.trials.yardstick import add_yardsticks
+from wakewise.warming import Warming
+
+JOBS = (*FLIGHT_JOBS, "photograph", "reconstruct")
+"""What is compiled for a trial, if it is not yet; the later ones while the vehicle flies."""
 
 MAIN_SURFACE_FIGURES = (
     "rmse_mm",
@@ -83,21 +88,27 @@ def run_trial(flight: Parts | Scenario, folder: Path, watch: Watch | None = None
     watch = watch or Quiet()
     parts = flight if isinstance(flight, Parts) else flight.parts()
     scenario = as_flown(parts)
-    _ = parts.preflight
-    claim(folder, scenario)
-    with alone(folder):
-        return _run(parts, scenario, folder, watch)
+    with Warming(JOBS) as warming:
+        if not warming.is_done(FLIGHT_JOBS):
+            with watch.stage("compile") as progress:
+                warming.wait(FLIGHT_JOBS, progress)
+        _ = parts.preflight
+        claim(folder, scenario)
+        with alone(folder):
+            return _run(parts, scenario, folder, watch, warming)
 
 
-def _run(parts: Parts, scenario: Scenario, folder: Path, watch: Watch) -> Figures:
+def _run(parts: Parts, scenario: Scenario, folder: Path, watch: Watch, warming: Warming) -> Figures:
     ledger = Ledger(folder / "stages.json")
 
     def stage(name: str, product: str, work: Callable[[Callable[..., None]], None]) -> None:
         if (folder / product).exists():
             watch.skipped(name)
             return
-        with watch.stage(name) as progress, ledger.account(name):
-            work(progress)
+        with watch.stage(name) as progress:
+            warming.wait((name,), progress)
+            with ledger.account(name):
+                work(progress)
 
     _forget_what_was_not_measured(folder)
     stage("plan", "planned.csv", lambda _: write_plan(parts, folder))

@@ -102,21 +102,21 @@ def _propagate(packed: Array, F: Array, X: Array, K: Array) -> None:
             K[7 + i, 9 + j] += packed[INVERSE + i, j]
 
 
-@njit
+@njit(inline="always")
 def _move(start: Array, reach: float, K: Array, moved: Array) -> None:
     for i in range(10):
         for c in range(COLUMNS):
             moved[i, c] = start[i, c] + reach * K[3 + i, c]
 
 
-@njit
+@njit(inline="always")
 def _combine(a: Array, b: Array, c: Array, d: Array, sixth: float, total: Array) -> None:
     for i in range(13):
         for k in range(COLUMNS):
             total[i, k] = sixth * (a[i, k] + 2.0 * b[i, k] + 2.0 * c[i, k] + d[i, k])
 
 
-@njit
+@njit(inline="always")
 def _to_error_state(state: Array, total: Array, length: float, turn: Array, A: Array, B: Array) -> None:
     # A change dq of the quaternion before it was normalised turns the body by 2 vec(q^-1 dq) / |q|.
     scale = 2.0 / length

@@ -119,7 +119,7 @@ def wall_velocity(points, origins, directions, areas, floor):  # type: ignore[no
     return velocity
 
 
-@njit
+@njit(inline="always")
 def add_wall(block, count, p, origin, dx, dy, dz, area, floor, V, dV):  # type: ignore[no-untyped-def]
     """Add sqrt(w) u of the wall jet of a jet along (dx, dy, dz) to `V`, (3, BLOCK).
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wakewise.compiled import njit
+from wakewise.compiled import assign, njit
 from wakewise.wake.floor import fill_velocities
 from wakewise.wake.kernels import as_tuple, own_constants
 from wakewise.wake.stage import thrust_roots, turn_gradient, turn_hessian
@@ -41,13 +41,13 @@ def floor_gram_sum(points, weights, p, q, positions_B, axes_B, areas, kind, para
             for r in range(3):
                 for row in range(3):
                     turn[r] += R[row, r] * dG[3 + row, a, c]
-            dG[3:, a, c] = turn
+            assign(dG[3:, a, c], turn)
             G[c, a] = G[a, c]
-            dG[:, c, a] = dG[:, a, c]
+            assign(dG[:, c, a], dG[:, a, c])
     return G, dG, check
 
 
-@njit(fastmath=FAST)
+@njit(inline="always", fastmath=FAST)
 def floor_stage_sum(  # type: ignore[no-untyped-def]
     points, weights, p, q, positions_B, axes_B, areas, kind, parameters, floor, thrusts, smooth, coherent, hessian
 ):

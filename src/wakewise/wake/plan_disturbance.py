@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.compiled import njit
+from wakewise.compiled import assign, njit
 from wakewise.wake.floor_sums import floor_stage_sum
 from wakewise.wake.kernels import as_tuple, speed_and_slope
 from wakewise.wake.stage import smooth_root
@@ -53,7 +53,7 @@ def _dot(a, b, count):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit
+@njit(inline="always")
 def may_reach(own, tx, ty, tz, ax, ay, az, mx, my, mz, radius):  # type: ignore[no-untyped-def]
     """False if neither jet of a thruster at t can reach any point of a sphere round m, all in B."""
     ex, ey, ez = mx - tx, my - ty, mz - tz
@@ -64,7 +64,7 @@ def may_reach(own, tx, ty, tz, ax, ay, az, mx, my, mz, radius):  # type: ignore[
     return across - radius <= np.sqrt(max(widest, 0.0))
 
 
-@njit(fastmath=FAST)
+@njit(inline="always", fastmath=FAST)
 def _plain_cone(q, roots, count, tx, ty, tz, ax, ay, az, c0, low, high, f_row, g):  # type: ignore[no-untyped-def]
     """Signed speed by the force axis (negative astern of T > 0) into `f_row`, the gradient of |f| into `g`, (3, P)."""
     narrow = 1.0 / (high - low) if high > low else 1e12
@@ -92,7 +92,7 @@ def _plain_cone(q, roots, count, tx, ty, tz, ax, ay, az, c0, low, high, f_row, g
         g[2, j] = a * az + b * ez
 
 
-@njit(fastmath=FAST)
+@njit(inline="always", fastmath=FAST)
 def _any_jet(q, roots, count, tx, ty, tz, ax, ay, az, own, kind, numbers, f_row, g):  # type: ignore[no-untyped-def]
     """As `_plain_cone`, for every kind of jet."""
     for j in range(count):
@@ -140,13 +140,14 @@ def stage_disturbance(table, scratch, p, quat, R, thrusts, slopes, gradient, H):
             slopes,
         )
         if slopes:
-            gradient[:] = first
-            H[:, :] = second
+            assign(gradient, first)
+            for i in range(len(H)):
+                assign(H[i], second[i])
         return D
     return _free_jets(table, scratch, p, R, thrusts, slopes, gradient, H)
 
 
-@njit(fastmath=FAST)
+@njit(inline="always", fastmath=FAST)
 def _free_jets(table, scratch, p, R, thrusts, slopes, gradient, H):  # type: ignore[no-untyped-def]
     q, sums, S, jets, pose, active = scratch
     count, n = q.shape[1], thrusts.shape[0]
@@ -233,7 +234,7 @@ def _free_jets(table, scratch, p, R, thrusts, slopes, gradient, H):  # type: ign
     return D
 
 
-@njit(fastmath=FAST)
+@njit(inline="always", fastmath=FAST)
 def _pose_rows(count, q, gx, gy, gz, out, x):  # type: ignore[no-untyped-def]
     """Rows by position (in B) and rotation vector of a quantity with gradient (gx, gy, gz) by the point in B."""
     for j in range(count):
@@ -248,7 +249,7 @@ def _pose_rows(count, q, gx, gy, gz, out, x):  # type: ignore[no-untyped-def]
         out[5, x, j] = a * qy - b * qx
 
 
-@njit(fastmath=FAST)
+@njit(inline="always", fastmath=FAST)
 def _products(axes, active, active_count, count, q, sums, S, jets, pose, gradient, H):  # type: ignore[no-untyped-def]
     for x in range(3):
         used = False
@@ -307,7 +308,7 @@ def _add_six(row, s0, s1, s2, s3, s4, s5, factor):  # type: ignore[no-untyped-de
     row[5] += factor * s5
 
 
-@njit(fastmath=FAST)
+@njit(inline="always", fastmath=FAST)
 def _alone(  # type: ignore[no-untyped-def]
     i, count, q, f_row, g, ahead, ahead_slope, astern, astern_slope, slopes, gradient, H
 ):
@@ -345,7 +346,7 @@ def _alone(  # type: ignore[no-untyped-def]
     return D
 
 
-@njit
+@njit(inline="always")
 def _to_world(R, gradient, H):  # type: ignore[no-untyped-def]
     """Fill the upper triangle from the lower and take rows and columns 0 to 2 from B to W."""
     size = H.shape[0]

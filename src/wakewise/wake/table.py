@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wakewise.arrays import Array
+from wakewise.arrays import Array, frozen
 from wakewise.errors import InputError
 from wakewise.interfaces import WakeModel
 from wakewise.wake.cones import PaperJet, PowerJet
@@ -76,7 +76,9 @@ def wake_table(
         raise InputError("region: needs points with weights that are not negative, and at least one more than 0")
     share = np.array(weights, dtype=np.float64) / total
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    areas = np.array(areas_m2)
+    areas = frozen(
+        areas_m2, (None,), "areas"
+    )  # read-only as a vehicle's are, so that kernels are compiled for one kind
     return WakeTable(
         points=np.ascontiguousarray(points.T),
         rows=points,

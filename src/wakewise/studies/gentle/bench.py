@@ -31,6 +31,7 @@ from wakewise.studies.gentle.flight import FIGURES, Trial, World, fly_trial
 from wakewise.studies.gentle.levers import Entry, entries, method_trial
 from wakewise.studies.gentle.store import FlightStore, store_folder
 from wakewise.trials.timing import BenchOptions
+from wakewise.warming import warm
 
 METHODS = ("dp", "pseudo-inverse", "unaware", "smooth", "wake-aware")
 WORLDS: tuple[World, ...] = ("parcels", "paper")
@@ -111,6 +112,7 @@ def fly_all(trials: dict[Key, Trial], options: BenchOptions) -> tuple[dict[Key, 
     options.progress(kept, len(trials), f"{kept} flights known already")
     if not missing:
         return rows, failures, kept
+    warm(progress=options.progress)  # else each of the processes would
     began = time.monotonic()
     with _pool(options.workers) as pool:
         waiting: dict[Future[Row], Key] = {pool.submit(fly_trial, trials[key]): key for key in missing}
