@@ -58,8 +58,8 @@ def note_all(folder: Path) -> None:
         for job, work in JOBS.items():
             print(f"{job} ...", file=sys.stderr, flush=True)
             work(folder)
-    lines = ",\n".join(json.dumps(row) for row in rows)
-    LIST.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+            lines = ",\n".join(json.dumps(row) for row in rows)
+            LIST.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
     print(f"{len(rows)} kernels, {sum(row['cost_s'] for row in rows):.0f} s", file=sys.stderr)
 
 
@@ -106,7 +106,7 @@ def _more(folder: Path) -> None:  # noqa: ARG001
     for vehicle in ("bluerov2", "bluerov2-heavy"):
         ww.fly(_scenario(vehicle=vehicle), duration_s=1.0)
     for kind in ("branching", "plate"):
-        _scenario(**{"target.kind": kind}).parts().target.region  # noqa: B018
+        _ = _scenario(**{"target.kind": kind}).parts().region
 
 
 JOBS = {"plan": _plan, "fly": _fly, "photograph": _photograph, "reconstruct": _reconstruct, "more": _more}

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import IO, Any, Self
 
 from wakewise.errors import InputError
-from wakewise.numba_cache import VARIABLE, user_cache
+from wakewise.numba_cache import VARIABLE, can_be_written, user_cache
 
 TypeWords = str | list[Any] | dict[str, list[Any]]
 LIST = Path(__file__).with_name("kernels.json")
@@ -237,7 +237,7 @@ def _note(job: str) -> Path:
     """File that is there once all kernels of a job are kept; its name holds what they were made from."""
     given = os.environ.get(VARIABLE)
     beside = Path(__file__).parent / "__pycache__"
-    place = Path(given) if given else beside if os.access(beside, os.W_OK) else user_cache(os.environ)
+    place = Path(given) if given else beside if can_be_written(beside) else user_cache(os.environ)
     return place / f"wakewise-{job}-{_made_from(job)}.warm"
 
 
