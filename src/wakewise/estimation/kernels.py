@@ -18,6 +18,7 @@ from wakewise.estimation.resting import DRAG, at_rest, rest_effects, turn
 from wakewise.vehicles.kernels import INVERSE, LINEAR, QUADRATIC, damping, rate_kernel, rotate
 from wakewise.vehicles.runge_kutta import rk4_jacobian_kernel
 
+_INSTANT_S = 1e-7
 MOVING, FORCE, MOMENT, GYRO, FELT, CURRENT, INERTIA, GAINS = 12, 12, 15, 18, 21, 24, 33, 39
 """Where each block of the error begins; the first is how many entries the equations of motion move."""
 
@@ -217,7 +218,6 @@ def moved(
     return F
 
 
-@njit
 def felt(
     packed: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array, down_B: Array, H: Array
 ) -> Array:
@@ -225,9 +225,14 @@ def felt(
 
     dv/dt + omega x v - down_B, with gravity `down_B` in B; writes its Jacobian to H, shape (3, E).
     """
-    after, instant_s = mean.copy(), 1e-7
-    F = moved(packed, allocation, after, thrusts_N, rest_q, instant_s, H.shape[1])
-    v, w = mean[7:10], mean[10:13]
+    after = mean.copy()
+    F = moved(packed, allocation, after, np.array(thrusts_N), rest_q, _INSTANT_S, H.shape[1])
+    return np.asarray(_felt(mean, after, F, down_B, H))
+
+
+@njit
+def _felt(mean: Array, after: Array, F: Array, down_B: Array, H: Array) -> Array:
+    v, w, instant_s = mean[7:10], mean[10:13], _INSTANT_S
     force = np.empty(3)
     for i in range(3):
         a, b = (i + 1) % 3, (i + 2) % 3
@@ -244,7 +249,6 @@ def felt(
     return force
 
 
-@njit
 def predict(
     packed: Array,
     allocation: Array,
@@ -265,7 +269,16 @@ def predict(
     both of shape (E - 24,).
     """
     q = mean[3:7].copy()
-    F = moved(packed, allocation, mean, thrusts_N, rest_q, dt_s, P.shape[0])
+    # Two kernels: that of the motion is the largest of the room, and `felt` calls it as well.
+    F = moved(packed, allocation, mean, np.array(thrusts_N), rest_q, dt_s, P.shape[0])
+    _spread(mean, P, F, q, dt_s, noise, spread, lasts_s)
+
+
+@njit
+def _spread(
+    mean: Array, P: Array, F: Array, q: Array, dt_s: float, noise: Array, spread: Array, lasts_s: Array
+) -> None:
+    """Carry the covariance on by the Jacobian F, and let noise and the Markov processes at it."""
     top = F @ P
     block = top @ F.T
     for i in range(MOVING):
@@ -317,18 +330,40 @@ def correct(mean: Array, P: Array, H: Array, residual: Array, R: Array, gate: fl
 
     Returns the squared Mahalanobis distance of the residual; where it exceeds `gate` nothing is changed.
     """
+    m, errors = H.shape
     PH = P @ H.T
     S = H @ PH + R
-    weighted = np.linalg.solve(S, residual)
-    distance = np.dot(residual, weighted)
+    # S = L L'; with X = PH / L', the gain's part of the covariance is X X', the change X (residual / L).
+    distance = 0.0
+    for i in range(m):
+        for j in range(i + 1):
+            total = S[i, j]
+            for k in range(j):
+                total -= S[i, k] * S[j, k]
+            S[i, j] = np.sqrt(total) if i == j else total / S[j, j]
+    whitened = np.empty(m)
+    for i in range(m):
+        total = residual[i]
+        for k in range(i):
+            total -= S[i, k] * whitened[k]
+        whitened[i] = total / S[i, i]
+        distance += whitened[i] ** 2
     if distance > gate:
         return distance
-    change = PH @ weighted
-    P -= PH @ np.linalg.solve(S, np.ascontiguousarray(PH.T))
-    for i in range(P.shape[0]):
-        for j in range(i):
-            P[i, j] = 0.5 * (P[i, j] + P[j, i])
-            P[j, i] = P[i, j]
+    change = np.zeros(errors)
+    for r in range(errors):
+        for i in range(m):
+            total = PH[r, i]
+            for k in range(i):
+                total -= S[i, k] * PH[r, k]
+            PH[r, i] = total / S[i, i]
+            change[r] += PH[r, i] * whitened[i]
+    for i in range(errors):
+        for j in range(i + 1):
+            total = 0.5 * (P[i, j] + P[j, i])
+            for k in range(m):
+                total -= PH[i, k] * PH[j, k]
+            P[i, j] = P[j, i] = total
     for i in range(3):
         mean[i] += change[i]
     assign(mean[3:7], turned_by(mean[3:7], change[3:6]))

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from scipy.spatial import cKDTree
 
 from wakewise.arrays import Array, IntArray
 from wakewise.compiled import njit, prange
@@ -91,34 +94,24 @@ def _closest(
     return out
 
 
-@njit
 def _halved(centres: Array) -> tuple[IntArray, IntArray, IntArray, IntArray]:
-    """Tree over points: halve each node across its longest side until it is a leaf.
+    """Tree over points, SciPy's, as arrays.
 
     Gives the order of the points, and for each node its first child (-1 for a leaf; the other child follows it), the
     first of its points in that order, and their number.
     """
-    order = np.arange(len(centres))
-    nodes = max(1, 4 * len(centres) // _LEAF + 1)
-    left, first, count = np.full(nodes, -1), np.zeros(nodes, np.int64), np.zeros(nodes, np.int64)
-    count[0] = len(centres)
-    made, node = 1, 0
-    while node < made:
-        start, stop = first[node], first[node] + count[node]
-        if stop - start > _LEAF:
-            axis, widest = 0, -1.0
-            for k in range(3):
-                side = centres[order[start:stop], k]
-                if side.max() - side.min() > widest:
-                    axis, widest = k, side.max() - side.min()
-            order[start:stop] = order[start:stop][np.argsort(centres[order[start:stop], axis], kind="mergesort")]
-            middle = (start + stop) // 2
-            left[node] = made
-            first[made], count[made] = start, middle - start
-            first[made + 1], count[made + 1] = middle, stop - middle
-            made += 2
-        node += 1
-    return order, left[:made], first[:made], count[:made]
+    tree = cKDTree(centres, leafsize=_LEAF)
+    nodes: list[Any] = [tree.tree]
+    left: list[int] = []
+    for node in nodes:  # it grows meanwhile
+        if node.split_dim < 0:
+            left.append(-1)
+        else:
+            left.append(len(nodes))
+            nodes.extend((node.lesser, node.greater))
+    first = np.array([node.start_idx for node in nodes])
+    count = np.array([node.end_idx for node in nodes]) - first
+    return np.asarray(tree.indices), np.array(left), first, count
 
 
 @njit
