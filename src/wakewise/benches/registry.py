@@ -18,7 +18,7 @@ BENCHES = {
     "reconstruction": "models of three corals from clear photographs: accuracy, completeness, time and memory",
     "operator": "an operator's velocity obeyed, against the water's disturbance, by w_track",
     "imaging": "one photograph: speed by part, memory, geometry, flat port, features",
-    "lattice": "the lattice-Boltzmann solver: cell updates per core, and its distance from the twin",
+    "lattice": "the lattice-Boltzmann solver: cell updates per core beside a plain loop, distance from the twin",
     "tank": "the world of a trial against the clock",
 }
 """Name of each bench and what it measures; the module of that name in this folder holds it, or one of `_STUDIES`."""

@@ -15,7 +15,8 @@ from wakewise.errors import InputError, StageError
 from wakewise.files import whole_file
 from wakewise.lattice.averages import MOMENTS, accumulate
 from wakewise.lattice.cases import Case, DiskJet, case_hash
-from wakewise.lattice.kernel import OPEN, WALL, push, smagorinsky_factor, step, velocity
+from wakewise.lattice.kernel import push, step, velocity
+from wakewise.lattice.stencil import OPEN, WALL, box, plane_row, smagorinsky_factor, still_water
 
 DISK_THICKNESS_D = 0.2
 """Thickness of the layer that the disk's force is spread over, the same on every grid."""
@@ -105,13 +106,12 @@ class LatticeRun:
         self.steps_done = 0
         self.samples = 0
         nx, ny, nz = case.cells
-        shape = (19, nx + 2, (ny + 2) * (nz + 2))
-        self._now, self._next = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
+        self._now, self._next = still_water(case.cells), still_water(case.cells)
         along = _ramp(nx, n, 0.0 if case.floor else case.sponge_D * n)
         across = _ramp(ny, n, n)[:, None] + _ramp(nz, n, n)
         unit = 3 * _SPONGE_VISCOSITY * s * n
         self._tau_x = (0.5 + 3 * s * n / case.reynolds + unit * along).astype(np.float32)
-        self._tau_yz = (unit * across).ravel().astype(np.float32)
+        self._tau_yz = plane_row(unit * across)
         self._faces = np.array([OPEN, WALL if case.floor else OPEN, OPEN, OPEN, OPEN, OPEN])
         self._eddies = smagorinsky_factor(case.smagorinsky)
         self._rng = np.random.default_rng(case.seed)
@@ -154,7 +154,7 @@ class LatticeRun:
                     push(self._now, self._next, nz, self._tau_x, self._tau_yz, self._eddies, disk.cells, forces)
             self._now, self._next = self._next, self._now
             self.steps_done += 1
-        if not math.isfinite(float(self._now[0, 1:-1, ny * (nz + 2) // 2 + nz // 2].sum())):
+        if not math.isfinite(float(box(self._now, ny, nz)[0, 1:-1, ny // 2, nz // 2].sum())):
             raise StageError(f"lattice case {self.case.name!r}: the flow blew up before step {self.steps_done}")
 
     def field(self) -> np.ndarray:
@@ -217,7 +217,7 @@ class LatticeRun:
             np.savez(
                 temporary,
                 hash=case_hash(self.case),
-                now=self._now,
+                now=box(self._now, *self.case.cells[1:]),
                 sums=self.sums,
                 counts=(self.steps_done, self.samples),
                 loads=np.stack([disk.load for disk in self._disks]),
@@ -235,7 +235,8 @@ class LatticeRun:
         with np.load(path) as data:
             if str(data["hash"]) != case_hash(case):
                 return run
-            run._now[:] = data["now"]
+            inside = box(run._now, *case.cells[1:])
+            inside[:] = data["now"].reshape(inside.shape)
             run.sums[:] = data["sums"]
             run.steps_done, run.samples = (int(c) for c in data["counts"])
             for disk, load in zip(run._disks, data["loads"], strict=True):
