@@ -12,6 +12,7 @@ from numba import float32
 
 from wakewise.benches.plain_lattice import make_sweep, two_lattices
 from wakewise.lattice import load_mean_field
+from wakewise.lattice.engines import why_no_gpu
 from wakewise.lattice.kernel import step
 from wakewise.lattice.stencil import OPEN, PERIODIC, box, plane_row, smagorinsky_factor, still_water
 from wakewise.lattice.twin import twin_step
@@ -39,8 +40,12 @@ def run(options: BenchOptions) -> dict[str, Any]:
         for name, value in convergence.items()
         if value is None
     }
+    no_gpu = why_no_gpu()
+    if no_gpu:
+        why["glups_gpu"] = no_gpu
     return {
         **figures,
+        "glups_gpu": None if no_gpu else _gpu_rate(),
         "cells": int(np.prod(CELLS)),
         "bytes_per_cell": 2 * 19 * 4,
         "twin_rel_error": _twin_gap(),
@@ -83,6 +88,12 @@ def _rates(options: BenchOptions, rounds: int = 9) -> dict[str, Any]:
         "plain_ratio": float(np.median(np.divide(ours, peer))),
         "plain_rel_error": plain_gap(),
     }
+
+
+def _gpu_rate() -> float:
+    from wakewise.lattice.cuda_engine import giga_updates_per_s
+
+    return giga_updates_per_s()
 
 
 def _mlups(work: Callable[[], None]) -> float:

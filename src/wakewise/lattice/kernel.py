@@ -7,19 +7,18 @@ are nineteen long rows and not nineteen streams at once, and it matters little h
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numba import float32, njit, prange
 
 from wakewise.arrays import Array, IntArray
-from wakewise.lattice.collision import collide
+from wakewise.lattice.collision import collide, collide_forced
 from wakewise.lattice.faces import fill_slots
 from wakewise.lattice.memory import LINE, copy_line, fetch_line, peek, poke, settle_stores, stream_line
-from wakewise.lattice.stencil import HERMITE, PERIODIC, PIECE, SHAPES, VELOCITIES, WEIGHTS, Lattice, box, origin
+from wakewise.lattice.stencil import PERIODIC, PIECE, VELOCITIES, Lattice, box, origin
 
 _1 = float32(1.0)
 _cell = njit(cache=True, fastmath=True, error_model="numpy", boundscheck=False, inline="always")(collide)
+_forced = njit(cache=True, error_model="numpy", boundscheck=False)(collide_forced)
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", boundscheck=False)
@@ -164,11 +163,9 @@ def push(
     cells: IntArray,
     forces: Array,
 ) -> None:
-    """Collide again the few cells that a body force acts on, with the force in them (Guo et al. 2002).
+    """Collide again the few cells that a body force acts on; see `collide_forced`.
 
-    The velocity includes half the force, u = (sum f c + F/2) / rho, and the source (1 - 1/(2 tau)) w [3 c.F + 4.5 Q :
-    (u F + F u)] joins the collision (doi:10.1103/PhysRevE.65.046308); with F = 0 this is the collision of `step`,
-    written plainly. Call it right after `step`, with the same arguments.
+    Call it right after `step`, with the same arguments.
 
     Parameters
     ----------
@@ -178,42 +175,16 @@ def push(
         Force per cell over the density of rest, cells per step squared.
     """
     mz, start = nz + 2, origin(nz)
-    c = VELOCITIES
-    g = np.empty(19)
-    u, F, drift = np.empty(3), np.empty(3), np.empty((3, 3))
+    g, went = np.empty(19), np.empty(19)
+    u, stress, drift = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     for k in range(cells.shape[0]):
         x, at = cells[k, 0], start + cells[k, 1] * mz + cells[k, 2]
         for i in range(19):
-            g[i] = src[i, x - c[i, 0], at - c[i, 1] * mz - c[i, 2]]
-        excess = 0.0
-        u[:] = 0.0
+            c = VELOCITIES[i]
+            g[i] = src[i, x - c[0], at - c[1] * mz - c[2]]
+        _forced(g, tau_x[x] + tau_yz[at], eddies, forces[k], u, stress, drift, went)
         for i in range(19):
-            excess += g[i]
-            for a in range(3):
-                u[a] += g[i] * c[i, a]
-        rho = 1.0 + excess
-        for a in range(3):
-            F[a] = forces[k, a]
-            u[a] = (u[a] + 0.5 * F[a]) / rho
-        norm = 0.0
-        stress = np.zeros((3, 3))
-        for a in range(3):
-            for b in range(3):
-                for i in range(19):
-                    stress[a, b] += g[i] * c[i, a] * c[i, b]
-                stress[a, b] -= rho * u[a] * u[b] + (excess / 3 if a == b else 0.0)
-                drift[a, b] = u[a] * F[b] + F[a] * u[b]
-                norm += (stress[a, b] + 0.5 * drift[a, b]) ** 2
-        tau0 = tau_x[x] + tau_yz[at]
-        tau = 0.5 * (tau0 + math.sqrt(tau0**2 + eddies * math.sqrt(norm) / rho))
-        for i in range(19):
-            value = excess
-            for a in range(3):
-                value += 3 * c[i, a] * (rho * u[a] + 0.5 * F[a])
-                for b in range(3):
-                    kept = (1 - 1 / tau) * stress[a, b] + (1 - 0.5 / tau) * drift[a, b]
-                    value += SHAPES[i, a, b] * rho * u[a] * u[b] + HERMITE[i, a, b] * kept
-            dst[i, x, at] = WEIGHTS[i] * value
+            dst[i, x, at] = went[i]
 
 
 @njit(cache=True, parallel=True, fastmath=True, error_model="numpy", boundscheck=False)
