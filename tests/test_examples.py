@@ -28,9 +28,9 @@ def is_picture(path):
     return path.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n" and path.stat().st_size > 10_000
 
 
-def test_there_are_eight():
-    """Eight questions."""
-    assert len(list(EXAMPLES.glob("*.py"))) == 8
+def test_there_are_nine():
+    """Nine questions."""
+    assert len(list(EXAMPLES.glob("*.py"))) == 9
 
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.stem)
@@ -69,6 +69,13 @@ def test_ballast_is_advised_and_tried_in_the_tank(tmp_path):
     assert before.startswith("as it is: dp") and after.startswith("as advised: dp")
     energies = [float(kJ) for line in (before, after) for kJ in re.findall(r"([\d.]+) kJ", line)]
     assert energies[1] < energies[0]
+
+
+def test_many_vehicles_at_once_say_which_stiffness_is_best(tmp_path):
+    """Too soft is carried off by the current, too stiff follows the noise; the best lies between."""
+    median_mm = [float(mm) for mm in re.findall(r"(\d+) mm off", run("many_vehicles.py", tmp_path))]
+    assert len(median_mm) == 4
+    assert median_mm[0] > median_mm[1] > median_mm[2] < median_mm[3]
 
 
 def test_wake_models_are_ranked_by_the_lattice(tmp_path):

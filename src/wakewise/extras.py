@@ -22,6 +22,7 @@ EXTRAS: dict[str, dict[str, str]] = {
     "piv": {"openpiv": "openpiv", "cv2": "opencv-python-headless"},
     "nerf": {"torch": "torch"},
     "film": {"av": "av"},
+    "gpu": {"numba_cuda": "numba-cuda"},
 }
 """Modules of each extra, and the package that each comes with; pyproject.toml says which versions."""
 

@@ -7,21 +7,20 @@ import numpy as np
 import pytest
 
 from wakewise.lattice.cases import Case, DiskJet
-from wakewise.lattice.kernel import (
+from wakewise.lattice.kernel import push, step, velocity, wrap
+from wakewise.lattice.run import LatticeRun
+from wakewise.lattice.stencil import (
     OPEN,
     OPPOSITE,
     PERIODIC,
     VELOCITIES,
     WALL,
     WEIGHTS,
-    fill_halo,
-    push,
+    box,
+    plane_row,
     smagorinsky_factor,
-    step,
-    velocity,
-    wrap,
+    still_water,
 )
-from wakewise.lattice.run import LatticeRun
 from wakewise.lattice.twin import equilibrium, twin_step
 
 EDDIES = smagorinsky_factor(0.12)
@@ -36,29 +35,26 @@ def one_thread():
     numba.set_num_threads(before)
 
 
-def _rows(box):
-    return box.reshape(19, box.shape[1], -1)
-
-
 def _random(cells, rng, size=1e-2):
-    return (size * rng.standard_normal((19, *(n + 2 for n in cells)))).astype(np.float32)
+    """A lattice and its populations as the twin takes them, (19, nx + 2, ny + 2, nz + 2), halo filled."""
+    f = still_water(cells)
+    start = (size * rng.standard_normal((19, *(n + 2 for n in cells)))).astype(np.float32)
+    box(f, *cells[1:])[:] = start
+    return f, start
 
 
 def _run(rho, u, steps, tau, faces, eddies=0.0, force=None):
     """Start from equilibrium at `rho`, `u` (3, nx, ny, nz) and return density excess and velocity, float64."""
     nx, ny, nz = rho.shape
-    now = np.zeros((19, nx + 2, ny + 2, nz + 2), np.float32)
-    now[:, 1:-1, 1:-1, 1:-1] = equilibrium(rho, u) - WEIGHTS[:, None, None, None]
-    now, later = _rows(now), np.zeros((19, nx + 2, (ny + 2) * (nz + 2)), np.float32)
-    tau_x, tau_yz = np.full(nx + 2, tau, np.float32), np.zeros((ny + 2) * (nz + 2), np.float32)
+    now, later = still_water(rho.shape), still_water(rho.shape)
+    box(now, ny, nz)[:, 1:-1, 1:-1, 1:-1] = equilibrium(rho, u) - WEIGHTS[:, None, None, None]
+    tau_x, tau_yz = np.full(nx + 2, tau, np.float32), plane_row(np.zeros((ny + 2, nz + 2)))
     faces = np.array(faces)
-    fill_halo(now, ny, nz, faces)
     for _ in range(steps):
         wrap(now, ny, nz, faces)
         step(now, later, ny, nz, tau_x, tau_yz, eddies, faces)
         if force is not None:
             push(now, later, nz, tau_x, tau_yz, eddies, *force)
-            fill_halo(later, ny, nz, faces)
         now, later = later, now
     out = np.zeros((4, nx, ny, nz), np.float32)
     velocity(now, ny, nz, out)
@@ -87,31 +83,60 @@ def test_equilibrium_has_the_fourth_moments_of_maxwell():
 
 
 @pytest.mark.parametrize("eddies", [0.0, EDDIES])
-def test_kernel_equals_its_twin(eddies):
+@pytest.mark.parametrize("cells", [(5, 12, 13), (3, 20, 33)])
+def test_kernel_equals_its_twin(cells, eddies):
     """One step of random populations agrees with the plain NumPy one to float32's rounding."""
-    cells = (5, 12, 13)
-    start = _random(cells, np.random.default_rng(1))
-    tau_x = np.linspace(0.51, 0.9, cells[0] + 2).astype(np.float32)
-    tau_yz = np.linspace(0.0, 0.2, (cells[1] + 2) * (cells[2] + 2)).astype(np.float32)
-    out = np.zeros_like(_rows(start))
-    step(_rows(start), out, cells[1], cells[2], tau_x, tau_yz, eddies, np.full(6, OPEN))
-    slow = twin_step(start.astype(float), tau_x.astype(float), tau_yz.astype(float).reshape(14, 15), eddies)
-    fast = out.reshape(start.shape)[:, 1:-1, 1:-1, 1:-1]
+    nx, ny, nz = cells
+    f, start = _random(cells, np.random.default_rng(1))
+    tau_x = np.linspace(0.51, 0.9, nx + 2).astype(np.float32)
+    tau_yz = np.linspace(0.0, 0.2, (ny + 2) * (nz + 2)).reshape(ny + 2, nz + 2)
+    out = still_water(cells)
+    # Beyond periodic faces lies what the halo holds.
+    step(f, out, ny, nz, tau_x, plane_row(tau_yz), eddies, np.full(6, PERIODIC))
+    slow = twin_step(start.astype(float), tau_x.astype(float), tau_yz, eddies)
+    fast = box(out, ny, nz)[:, 1:-1, 1:-1, 1:-1]
     assert np.abs(fast - slow).max() < 3e-7 * (1 + np.abs(slow).max())
 
 
-def test_push_without_force_is_the_collision_of_step():
-    """The plainly written collision of the forced cells and the fast one are the same function."""
-    cells = (5, 12, 13)
-    start = _rows(_random(cells, np.random.default_rng(2)))
-    tau_x, tau_yz = np.full(7, 0.6, np.float32), np.zeros(start.shape[2], np.float32)
-    fast = np.zeros_like(start)
-    step(start, fast, 12, 13, tau_x, tau_yz, EDDIES, np.full(6, OPEN))
-    plain = fast.copy()
-    where = np.array([[2, 4, 5], [3, 6, 7]])
-    push(start, plain, 13, tau_x, tau_yz, EDDIES, where, np.zeros((2, 3)))
-    at = where[:, 1] * 15 + where[:, 2]
-    assert plain[:, where[:, 0], at] == pytest.approx(fast[:, where[:, 0], at], abs=3e-8)
+@pytest.mark.parametrize("faces", [[OPEN] * 6, [WALL] * 6, [OPEN, WALL, WALL, OPEN, PERIODIC, PERIODIC]])
+def test_push_without_force_is_the_collision_of_step(faces):
+    """The plainly written collision and pull of single cells and the fast ones are the same function, at faces too."""
+    cells = (4, 12, 21)
+    nx, ny, nz = cells
+    f, _ = _random(cells, np.random.default_rng(2))
+    tau_x, tau_yz = np.full(nx + 2, 0.6, np.float32), plane_row(np.zeros((ny + 2, nz + 2)))
+    fast, plain = still_water(cells), still_water(cells)
+    step(f, fast, ny, nz, tau_x, tau_yz, EDDIES, np.array(faces))
+    where = np.argwhere(np.ones(cells)) + 1
+    push(f, plain, nz, tau_x, tau_yz, EDDIES, where, np.zeros((len(where), 3)))
+    inside = (slice(None), slice(1, -1), slice(1, -1), slice(1, -1))
+    assert np.abs(box(plain, ny, nz)[inside]).max() > 1e-3
+    assert box(plain, ny, nz)[inside] == pytest.approx(box(fast, ny, nz)[inside], abs=3e-8)
+
+
+def test_bytes_do_not_depend_on_where_a_lattice_lies_in_memory():
+    """Lines that pass the caches by and ordinary stores write the same."""
+    cells = (3, 12, 13)
+    f, _ = _random(cells, np.random.default_rng(4))
+    tau_x, tau_yz = np.full(5, 0.6, np.float32), plane_row(np.zeros((14, 15)))
+    lined = still_water(cells)
+    shifted = np.zeros(lined.size + 1, np.float32)[1:].reshape(lined.shape)
+    if shifted.ctypes.data % 64 == 0:
+        shifted = np.zeros(lined.size + 2, np.float32)[2:].reshape(lined.shape)
+    for out in (lined, shifted):
+        step(f, out, 12, 13, tau_x, tau_yz, EDDIES, np.full(6, OPEN))
+    inside = (slice(None), slice(1, -1), slice(1, -1), slice(1, -1))
+    assert np.array_equal(box(lined, 12, 13)[inside], box(shifted, 12, 13)[inside])
+
+
+def test_nearly_still_water_is_put_to_rest():
+    """Where nothing is left that float32 could tell from rest, populations are exactly zero and not denormal."""
+    cells = (3, 12, 13)
+    f, _ = _random(cells, np.random.default_rng(5), 1e-18)
+    tau_x, tau_yz = np.full(5, 0.6, np.float32), plane_row(np.zeros((14, 15)))
+    out = still_water(cells)
+    step(f, out, 12, 13, tau_x, tau_yz, EDDIES, np.full(6, PERIODIC))
+    assert not box(out, 12, 13)[:, 1:-1, 1:-1, 1:-1].any()
 
 
 def test_force_adds_its_momentum_and_periodic_water_keeps_it():

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from wakewise.errors import InputError
-from wakewise.lattice import Case, DiskJet, LatticeRun, compute_mean_field, compute_run, find_case
+from wakewise.lattice import Case, DiskJet, LatticeRun, case_hash, compute_mean_field, compute_run, find_case
+from wakewise.lattice.crossing import crossing_figures
 from wakewise.lattice.laws import momentum_flux
 from wakewise.lattice.run import Disk
 
@@ -55,6 +56,26 @@ def test_disk_pushes_with_its_thrust_and_torque_on_every_grid():
         assert math.sqrt(0.5) - 1 / n < reach < math.sqrt(0.5) + 1 / n
 
 
+@pytest.mark.parametrize("axis", ["y", "z"])
+def test_a_disk_may_blow_along_any_axis(axis):
+    """Turned with its box it has the same cells and forces, turned; and a case along x keeps the hash that it had."""
+    turn = {"y": [2, 0, 1], "z": [1, 2, 0]}[axis]  # where x, y and z of the jet along x go
+    jet = DiskJet(torque=0.1, position_D=(0.1, 0.2, -0.1))
+    low, high, place = (np.array(v) for v in (SMALL.low_D, SMALL.high_D, jet.position_D))
+    case = replace(SMALL, jets=(jet,))
+    turned = replace(
+        SMALL,
+        jets=(DiskJet(), replace(jet, axis=axis, position_D=tuple(place[turn]))),
+        low_D=tuple(low[turn]),
+        high_D=tuple(high[turn]),
+    )
+    first, second = (Disk(c, c.jets[-1], np.random.default_rng(0)) for c in (case, turned))
+    forces = [disk.forces(5.0, 0.3, np.random.default_rng(1), 0.05) for disk in (first, second)]
+    assert np.array_equal(second.cells, first.cells[:, turn])
+    assert forces[1] == pytest.approx(forces[0][:, turn], abs=1e-12)
+    assert case_hash(find_case("twin")) == "b08291e8f41caa6b"
+
+
 def test_unsteady_load_has_the_asked_size():
     """The rms over cells and time of what the patches add is the unsteadiness, per component."""
     rng = np.random.default_rng(1)
@@ -73,6 +94,9 @@ def test_bad_cases_are_refused():
         replace(SMALL, jets=())
     with pytest.raises(InputError, match="whole numbers"):
         replace(SMALL, high_D=(3.1, 2, 2))
+    for axes, said in (("w", "axis 'w'"), ("y", "first jet, allowed x")):
+        with pytest.raises(InputError, match=said):
+            replace(SMALL, jets=(DiskJet(axis=axes),))
     with pytest.raises(InputError, match="box's edge"):
         LatticeRun(replace(SMALL, jets=(DiskJet(position_D=(0, 1.9, 0)),)))
     with pytest.raises(InputError, match="no such case"):
@@ -118,6 +142,12 @@ def test_stopped_disk_lets_the_water_calm_down():
     run.advance(run.steps_at(8.0))
     assert before > 0.5
     assert abs(run.sample_velocity(np.zeros((1, 3)))[0, 0]) < 0.25 * before
+
+
+def test_crossing_jets_are_told_apart_from_others():
+    """Figures of a crossing are those of its own case; any other pair is refused."""
+    with pytest.raises(InputError, match=r"not a jet along \+x and one along \+y"):
+        crossing_figures(LatticeRun(SMALL))
 
 
 BOX = replace(SMALL, jets=(DiskJet(),), low_D=(-3, -4, -4), high_D=(8, 4, 4), sponge_D=1.5, develop=20.0, average=40.0)
@@ -169,3 +199,17 @@ def test_head_on_jets_go_sideways():
     outward = ((means[2] * Y + means[3] * Z) / R)[plane].mean(0)[ring].mean()
     assert abs(means[1][plane].mean(0)[R < 0.4].mean()) < 0.25
     assert outward > 0.2
+
+
+@pytest.mark.slow
+def test_jets_that_cross_at_right_angles_go_on_along_the_bisector():
+    """Together they flow halfway between, faster than one jet's share along it, and spread most out of their plane."""
+    pair = (DiskJet(), DiskJet(axis="y", position_D=(3.0, -3.0, 0.0)))
+    low, high = (-3.0, -6.0, -4.0), (9.0, 6.0, 4.0)
+    run = compute_run(replace(BOX, jets=pair, low_D=low, high_D=high, develop=15.0, average=25.0))
+    found = crossing_figures(run)
+    u, v = run.means()[1:3]
+    # Symmetric about the bisector, which is the diagonal of the lattice here.
+    assert u.sum() == pytest.approx(v.sum(), rel=0.05)
+    assert found["speed"][2] > 0.5
+    assert found["half_height_D"][2] > found["half_width_D"][2]

@@ -1,4 +1,4 @@
-"""One step of the vehicle, with and without Jacobians, compiled and called from Python, and against public programs."""
+"""One step of the vehicle, with and without Jacobians, compiled and from Python; of many at once; public programs."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 
 from wakewise.arrays import Array
@@ -17,10 +18,13 @@ from wakewise.physics import GRAVITY_M_S2
 from wakewise.physics import TRIM_WATER_KG_M3 as RHO_KG_M3
 from wakewise.trials.timing import BenchOptions, timed_us
 from wakewise.vehicles import (
+    RigidBody,
     acceleration,
     compile_body,
     fossen,
     load_vehicle,
+    pack_bodies,
+    step_batch,
     step_rk4,
     step_rk4_jacobians,
     step_semi_implicit,
@@ -61,8 +65,56 @@ def run(options: BenchOptions) -> dict[str, Any]:
             "semi_implicit": timed_us(lambda: step_semi_implicit(body, *there), 5000),
             "semi_implicit_with_jacobians": timed_us(lambda: step_semi_implicit_jacobians(body, *there), 5000),
         },
+        **batch_figures(body),
         **oracle_figures(options.data),
     }
+
+
+def batch_figures(body: RigidBody, vehicles: int = 16384, rounds: int = 41) -> dict[str, Any]:
+    """Vehicle steps a second of `step_batch`, by the clock on all cores and by thread CPU on one, and the peer's.
+
+    The peer is a Python loop over `step_rk4` in the same process; every vehicle has a body and a current of its own.
+    Other work on the machine lowers what the clock says, so its best round is given too.
+    """
+    rng = np.random.default_rng(0)
+    states = np.zeros((vehicles, 13))
+    states[:, 3], states[:, 7:] = 1.0, 0.1 * rng.standard_normal((vehicles, 6))
+    wrenches, currents = rng.standard_normal((vehicles, 6)), 0.1 * rng.standard_normal((vehicles, 3))
+    bodies = pack_bodies([body] * vehicles)
+    after = np.empty_like(states)
+
+    def march() -> None:
+        step_batch(bodies, states, wrenches, DT_S, currents_W_m_s=currents, out=after)
+
+    def loop() -> None:
+        for row, wrench, current in zip(states[:500], wrenches, currents, strict=False):
+            step_rk4(body, row[:3], row[3:7], row[7:], wrench, current, DT_S)
+
+    before = numba.get_num_threads()
+    march()
+    both = [vehicles / _span_s(time.perf_counter, march) for _ in range(rounds)]
+    try:
+        numba.set_num_threads(1)
+        one, peer = [], []
+        for _ in range(rounds):  # by turns, so that both meet the same machine
+            one.append(vehicles / _span_s(time.thread_time, march))
+            peer.append(500 / _span_s(time.thread_time, loop))
+    finally:
+        numba.set_num_threads(before)
+    return {
+        "batch_steps_per_s": float(np.median(both)),
+        "batch_steps_per_s_best": float(np.max(both)),
+        "batch_threads": before,
+        "batch_steps_per_s_1_thread": float(np.median(one)),
+        "batch_ratio": float(np.median(np.divide(one, peer))),
+        "python_loop_steps_per_s": float(np.median(peer)),
+    }
+
+
+def _span_s(clock: Callable[[], float], work: Callable[[], None]) -> float:
+    began = clock()
+    work()
+    return clock() - began
 
 
 def oracle_figures(data: Path | None) -> dict[str, Any]:

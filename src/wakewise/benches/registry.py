@@ -13,13 +13,13 @@ BENCHES = {
     "cold": "what a user waits for at first: import, --help, compiling, first flight, second flight",
     "disturbance": "the Gram matrix of D against the sum over points",
     "estimator": "the filter in the default tank: error, consistency, ten seconds without a camera",
-    "dynamics": "one step of the vehicle, with and without Jacobians",
+    "dynamics": "one step of the vehicle, with and without Jacobians, and of many vehicles at once",
     "gentle": "what each method and each lever does to the target's water, in the tank and in the paper's own world",
     "planner": "the planner against the paper's recipe and IPOPT",
     "reconstruction": "models of three corals from clear photographs: accuracy, completeness, time and memory",
     "operator": "an operator's velocity obeyed, against the water's disturbance, by w_track",
     "imaging": "one photograph: speed by part, memory, geometry, flat port, features",
-    "lattice": "the lattice-Boltzmann solver: cell updates per core, and its distance from the twin",
+    "lattice": "the lattice-Boltzmann solver: cell updates per core beside a plain loop, distance from the twin",
     "tank": "the world of a trial against the clock",
 }
 """Name of each bench and what it measures; the module of that name in this folder holds it, or one of `_STUDIES`."""

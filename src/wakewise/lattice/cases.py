@@ -22,6 +22,9 @@ from wakewise.errors import InputError
 SOLVER = "d3q19-regularised-2"
 """Version of solver and disk; part of every hash, so raise it when a change of the code changes the flow."""
 
+AXES = ("x", "y", "z")
+"""What the axis of a disk may be called."""
+
 T200_TORQUE = 0.15
 """Torque over thrust and diameter, Q / (T D), of a small ducted propeller.
 
@@ -40,11 +43,13 @@ class DiskJet:
     position_D : tuple of three
         Centre of the disk, the origin being the disk of the case's first jet.
     along : int
-        +1 or -1: the jet blows along plus or minus x.
+        +1 or -1: the jet blows along plus or minus its axis.
     strength : float
         Momentum flux over that of a jet with exit speed U0: thrust over the unit thrust.
     torque : float
-        Q / (T D), turning the water about +x; 0 for a jet without swirl.
+        Q / (T D), turning the water about the axis; 0 for a jet without swirl.
+    axis : str
+        x, y or z.
     start, stop : float
         When it pushes, in D / U0.
     """
@@ -53,6 +58,7 @@ class DiskJet:
     along: int = 1
     strength: float = 1.0
     torque: float = 0.0
+    axis: str = "x"
     start: float = 0.0
     stop: float = float("inf")
 
@@ -110,6 +116,10 @@ class Case:
         for jet in self.jets:
             if jet.along not in (-1, 1):
                 raise InputError(f"lattice case {self.name!r}: jet along {jet.along}, allowed +1 or -1")
+            if jet.axis not in AXES:
+                raise InputError(f"lattice case {self.name!r}: axis {jet.axis!r} of a jet, allowed {', '.join(AXES)}")
+        if self.jets[0].axis != "x":
+            raise InputError(f"lattice case {self.name!r}: axis {self.jets[0].axis!r} of the first jet, allowed x")
         for low, high in zip(self.low_D, self.high_D, strict=True):
             cells = (high - low) * self.cells_per_D
             if cells < 12 or abs(cells - round(cells)) > 1e-6:
@@ -130,7 +140,11 @@ class Case:
 
 def case_hash(case: Case) -> str:
     """Digest of everything that decides the flow: the case and the version of the solver."""
-    text = json.dumps({"solver": SOLVER, **asdict(case)}, sort_keys=True)
+    stated = asdict(case)
+    for jet in stated["jets"]:
+        if jet["axis"] == "x":  # as it was before there were others
+            del jet["axis"]
+    text = json.dumps({"solver": SOLVER, **stated}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
@@ -188,6 +202,13 @@ def _cases() -> dict[str, Case]:
                 cells_per_D=6,
             ),
             Case(
+                name="crossing",
+                jets=(plain, replace(plain, axis="y", position_D=(6.0, -6.0, 0.0))),
+                low_D=(-3.0, -9.0, -5.0),
+                high_D=(15.0, 9.0, 5.0),
+                cells_per_D=8,
+            ),
+            Case(
                 name="four",
                 jets=(replace(plain, strength=4.0),),
                 cells_per_D=6,
@@ -199,7 +220,8 @@ def _cases() -> dict[str, Case]:
 
 
 CASES = _cases()
-"""Cases by name. `twin`: 8 cm apart for D = 60 mm; `head-on`: 0.6 m apart; `four`: four times the thrust."""
+"""Cases by name. `twin`: 8 cm apart for D = 60 mm; `head-on`: 0.6 m apart; `crossing`: at right angles, 0.36 m
+from both disks; `four`: four times the thrust."""
 
 
 def find_case(name: str) -> Case:

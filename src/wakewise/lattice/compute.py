@@ -18,7 +18,9 @@ WATCH_EVERY = 0.3
 _CHECKPOINT_S = 300.0
 
 
-def compute_run(case: Case, cache: Path | None = None, progress: Progress = no_progress) -> LatticeRun:
+def compute_run(
+    case: Case, cache: Path | None = None, progress: Progress = no_progress, device: str = "cpu"
+) -> LatticeRun:
     """Run a case to its end.
 
     Parameters
@@ -28,6 +30,8 @@ def compute_run(case: Case, cache: Path | None = None, progress: Progress = no_p
         Folder for a checkpoint every five minutes, from which a run that was stopped goes on; it is left there, so that
         a finished run need not be repeated. None keeps nothing.
     progress : Progress
+    device : str
+        As `LatticeRun`. A run may go on on another device than it began.
 
     Raises
     ------
@@ -35,7 +39,7 @@ def compute_run(case: Case, cache: Path | None = None, progress: Progress = no_p
         If the flow blows up.
     """
     path = cache / f"{case.name}-{case.cells_per_D}-{case_hash(case)}.npz" if cache else None
-    run = LatticeRun.restored(case, path) if path else LatticeRun(case)
+    run = LatticeRun.restored(case, path, device) if path else LatticeRun(case, device)
     stride = max(1, run.steps_at(WATCH_EVERY))
     saved = time.monotonic()
     unfinished = run.steps_done < run.steps_total
@@ -51,8 +55,10 @@ def compute_run(case: Case, cache: Path | None = None, progress: Progress = no_p
     return run
 
 
-def compute_mean_field(case: Case, cache: Path | None = None, progress: Progress = no_progress) -> MeanField:
+def compute_mean_field(
+    case: Case, cache: Path | None = None, progress: Progress = no_progress, device: str = "cpu"
+) -> MeanField:
     """Mean field of a case with its figures; arguments as `compute_run`."""
-    run = compute_run(case, cache, progress)
+    run = compute_run(case, cache, progress, device)
     table = mean_field(run)
     return replace(table, figures=figures(table))

@@ -13,9 +13,9 @@ from scipy.ndimage import map_coordinates
 from wakewise.arrays import Array, IntArray, frozen
 from wakewise.errors import InputError, StageError
 from wakewise.files import whole_file
-from wakewise.lattice.averages import MOMENTS, accumulate
-from wakewise.lattice.cases import Case, DiskJet, case_hash
-from wakewise.lattice.kernel import OPEN, WALL, push, smagorinsky_factor, step, velocity
+from wakewise.lattice.cases import AXES, Case, DiskJet, case_hash
+from wakewise.lattice.engines import make_engine
+from wakewise.lattice.stencil import OPEN, WALL, smagorinsky_factor
 
 DISK_THICKNESS_D = 0.2
 """Thickness of the layer that the disk's force is spread over, the same on every grid."""
@@ -44,14 +44,18 @@ class Disk:
 
     def __init__(self, case: Case, jet: DiskJet, rng: np.random.Generator) -> None:
         n = case.cells_per_D
-        centre = (np.array(jet.position_D) - case.low_D) * n  # in cells from the low corner
+        # The jet's own axes, its own first; a turn of the box's, so that what is right-handed stays so.
+        turn = np.roll(np.arange(3), -AXES.index(jet.axis))
+        self._back = np.argsort(turn)
+        centre = ((np.array(jet.position_D) - case.low_D) * n)[turn]  # in cells from the low corner
+        cells = np.array(case.cells)[turn]
         half = 0.5 * DISK_THICKNESS_D * n
         radius = 0.5 * _RATIO * n
         fine = (np.arange(8) + 0.5) / 8
         lines = []
         for axis, reach in enumerate((half, radius, radius)):
             first, last = math.floor(centre[axis] - reach), math.ceil(centre[axis] + reach)
-            if first < 1 or last > case.cells[axis] - 1:
+            if first < 1 or last > cells[axis] - 1:
                 raise InputError(f"lattice case {case.name!r}: a disk reaches the box's edge, allowed inside only")
             lines.append((np.arange(first, last)[:, None] + fine).ravel() - centre[axis])
         # Share of each cell that lies in the disk, from 8 x 8 x 8 points in it.
@@ -63,7 +67,7 @@ class Disk:
         self.jet = jet
         self.share = share[share > 0] / share.sum()
         start = np.array([round(line[0] + c - fine[0]) for line, c in zip(lines, centre, strict=True)])
-        self.cells: IntArray = where + start + 1  # with halo
+        self.cells: IntArray = np.ascontiguousarray((where + start + 1)[:, self._back])  # with halo
         across = (where + start + 0.5 - centre)[:, 1:]
         lever = np.sum(self.share * np.sum(across**2, axis=1))
         # Solid-body swirl: the force across grows with the radius and its moment is the torque.
@@ -88,16 +92,22 @@ class Disk:
         out = unsteadiness * (self.patches @ self.load) * self.share[:, None]
         out[:, 0] += self.jet.along * self.share
         out[:, 1:] += self.twist
-        return total * self.jet.strength * out
+        return np.ascontiguousarray(total * self.jet.strength * out[:, self._back])
 
 
 class LatticeRun:
     """State of one run; `advance` moves it on and everything else looks at it.
 
     Speeds are given in U0, lengths in D and times in D / U0, as in the case.
+
+    Parameters
+    ----------
+    case : Case
+    device : str
+        "cpu", "cuda" (a graphics card, which needs the extra `gpu`) or "auto": the card if there is one.
     """
 
-    def __init__(self, case: Case) -> None:
+    def __init__(self, case: Case, device: str = "cpu") -> None:
         self.case = case
         n, s = case.cells_per_D, case.lattice_speed / math.sqrt(max(jet.strength for jet in case.jets))
         self.speed = s
@@ -105,19 +115,14 @@ class LatticeRun:
         self.steps_done = 0
         self.samples = 0
         nx, ny, nz = case.cells
-        shape = (19, nx + 2, (ny + 2) * (nz + 2))
-        self._now, self._next = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
         along = _ramp(nx, n, 0.0 if case.floor else case.sponge_D * n)
         across = _ramp(ny, n, n)[:, None] + _ramp(nz, n, n)
         unit = 3 * _SPONGE_VISCOSITY * s * n
-        self._tau_x = (0.5 + 3 * s * n / case.reynolds + unit * along).astype(np.float32)
-        self._tau_yz = (unit * across).ravel().astype(np.float32)
-        self._faces = np.array([OPEN, WALL if case.floor else OPEN, OPEN, OPEN, OPEN, OPEN])
-        self._eddies = smagorinsky_factor(case.smagorinsky)
+        tau_x = 0.5 + 3 * s * n / case.reynolds + unit * along
+        faces = np.array([OPEN, WALL if case.floor else OPEN, OPEN, OPEN, OPEN, OPEN])
+        self._water = make_engine(device, tau_x, unit * across, smagorinsky_factor(case.smagorinsky), faces)
         self._rng = np.random.default_rng(case.seed)
         self._disks = [Disk(case, jet, self._rng) for jet in case.jets]
-        self._field = np.zeros((4, nx, ny, nz), np.float32)
-        self.sums = np.zeros((MOMENTS, nx, ny, nz))
         self.axis_times: list[float] = []
         self.axis_speeds: list[Array] = []
 
@@ -144,26 +149,25 @@ class LatticeRun:
             If the flow has blown up.
         """
         n = self.case.cells_per_D
-        _, ny, nz = self.case.cells
         unit = math.pi / 4 * n**2 * self.speed**2  # T / rho in lattice units
         for _ in range(steps):
-            step(self._now, self._next, ny, nz, self._tau_x, self._tau_yz, self._eddies, self._faces)
-            for disk in self._disks:
-                if disk.jet.start <= self.time < disk.jet.stop:
-                    forces = disk.forces(unit, self.case.unsteadiness, self._rng, self.speed / n)
-                    push(self._now, self._next, nz, self._tau_x, self._tau_yz, self._eddies, disk.cells, forces)
-            self._now, self._next = self._next, self._now
+            pushes = [
+                (disk.cells, disk.forces(unit, self.case.unsteadiness, self._rng, self.speed / n))
+                for disk in self._disks
+                if disk.jet.start <= self.time < disk.jet.stop
+            ]
+            self._water.advance(pushes)
             self.steps_done += 1
-        if not math.isfinite(float(self._now[0, 1:-1, ny * (nz + 2) // 2 + nz // 2].sum())):
+        _, ny, nz = self.case.cells
+        if not np.isfinite(self._water.along_x(ny // 2, nz // 2)).all():
             raise StageError(f"lattice case {self.case.name!r}: the flow blew up before step {self.steps_done}")
 
     def field(self) -> np.ndarray:
         """Pressure over rho U0^2 and velocity over U0 of every cell, float32, shape (4, nx, ny, nz); a view."""
-        _, ny, nz = self.case.cells
-        velocity(self._now, ny, nz, self._field)
-        self._field[0] /= 3 * self.speed**2
-        self._field[1:] /= self.speed
-        return self._field
+        field = self._water.field()
+        field[0] /= 3 * self.speed**2
+        field[1:] /= self.speed
+        return field
 
     def cell_centres_D(self) -> tuple[Array, Array, Array]:
         """Where the cells are along x, y and z."""
@@ -190,17 +194,16 @@ class LatticeRun:
 
     def watch(self) -> None:
         """Note the speed on the first jet's axis, and add to the averages once the flow has developed."""
-        field = self.field()
         _, y, z = self.cell_centres_D()
         j, k = (int(np.searchsorted(c, p)) for c, p in zip((y, z), self.case.jets[0].position_D[1:], strict=True))
         self.axis_times.append(self.time)
-        self.axis_speeds.append(field[1, :, j - 1 : j + 1, k - 1 : k + 1].mean((1, 2)).astype(np.float64))
+        self.axis_speeds.append(self._water.along_x(j, k) / self.speed)
         if self.time >= self.case.develop:
-            accumulate(field, self.sums)
+            self._water.accumulate()
             self.samples += 1
 
     def means(self) -> Array:
-        """Time averages, shape (MOMENTS, nx, ny, nz): p, u, v, w, uu, vv, ww, vw in units of U0.
+        """Time averages, shape (8, nx, ny, nz): p, u, v, w, uu, vv, ww, vw in units of U0.
 
         Raises
         ------
@@ -209,7 +212,10 @@ class LatticeRun:
         """
         if not self.samples:
             raise StageError(f"lattice case {self.case.name!r}: no averages before {self.case.develop:g} D/U0")
-        return self.sums / self.samples
+        # Pressure, three velocities, four products of two.
+        units = self.speed ** np.array([2.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0])
+        units[0] *= 3
+        return self._water.sums / (self.samples * units[:, None, None, None])
 
     def save(self, path: Path) -> None:
         """Write everything that `restored` needs, whole or not at all."""
@@ -217,8 +223,8 @@ class LatticeRun:
             np.savez(
                 temporary,
                 hash=case_hash(self.case),
-                now=self._now,
-                sums=self.sums,
+                populations=self._water.populations,
+                moments=self._water.sums,
                 counts=(self.steps_done, self.samples),
                 loads=np.stack([disk.load for disk in self._disks]),
                 rng=json.dumps(self._rng.bit_generator.state),
@@ -227,16 +233,15 @@ class LatticeRun:
             )
 
     @classmethod
-    def restored(cls, case: Case, path: Path) -> LatticeRun:
+    def restored(cls, case: Case, path: Path, device: str = "cpu") -> LatticeRun:
         """A run of `case` from where `save` left it, or from the start if the file is missing or of another case."""
-        run = cls(case)
+        run = cls(case, device)
         if not path.exists():
             return run
         with np.load(path) as data:
-            if str(data["hash"]) != case_hash(case):
+            if str(data["hash"]) != case_hash(case) or "moments" not in data:
                 return run
-            run._now[:] = data["now"]
-            run.sums[:] = data["sums"]
+            run._water.restore(data["populations"], data["moments"])
             run.steps_done, run.samples = (int(c) for c in data["counts"])
             for disk, load in zip(run._disks, data["loads"], strict=True):
                 disk.load = load

@@ -5,11 +5,12 @@ Body frame B is FRD. A positive thrust pushes the vehicle along the thruster's a
 Start reading in `vehicle.py` (the record, with `hydrodynamics.py`) and `library.py` with `library_data/` (one file
 per cited source; `vehicle_file.py` and `draft.py` read them). `dynamics.py` has the equations of motion and the steps
 (`fossen.py` the readable matrices, `kernels.py`, `runge_kutta.py`, `semi_implicit.py` the compiled steps,
-`jacobians.py` their derivatives), `check.py` and `mixing.py` rank, null space and wrong signs in shipped matrices,
-`describe.py` and `parameters.py` all of it in words, `perturbation.py` the vehicle that the tank flies. Thrusters are
-a room below, files of other projects the room `importers`.
+`jacobians.py` their derivatives, `batch.py` many vehicles at once), `check.py` and `mixing.py` rank, null space and
+wrong signs in shipped matrices, `describe.py` and `parameters.py` all of it in words, `perturbation.py` the vehicle
+that the tank flies. Thrusters are a room below, files of other projects the room `importers`.
 """
 
+from wakewise.vehicles.batch import pack_bodies, step_batch
 from wakewise.vehicles.check import (
     achievable_wrench,
     actuation,
@@ -73,9 +74,11 @@ __all__ = [
     "load_vehicle",
     "mixing_disagreements",
     "null_space_names",
+    "pack_bodies",
     "parameters",
     "perturbed",
     "restoring_wrench",
+    "step_batch",
     "step_rk4",
     "step_rk4_jacobians",
     "step_semi_implicit",

@@ -19,7 +19,12 @@ COLUMNS = 16
 @njit
 def rk4_kernel(packed: Array, state: Array, inputs: Array, dt_s: float) -> None:
     """Advance `state`, shape (13,), in place by one classical Runge-Kutta step."""
-    k = np.empty((5, 13))
+    rk4_stages(packed, state, inputs, dt_s, np.empty((5, 13)))
+
+
+@njit(cache=True)
+def rk4_stages(packed: Array, state: Array, inputs: Array, dt_s: float, k: Array) -> None:
+    """`rk4_kernel` with its work space, shape (5, 13), given: what steps many vehicles makes one for all of them."""
     rate_kernel(packed, state, inputs, k[0])
     for stage in range(1, 4):
         reach = dt_s if stage == 3 else 0.5 * dt_s
