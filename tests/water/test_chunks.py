@@ -14,7 +14,7 @@ from wakewise.water.chunks import over_points
 @pytest.mark.parametrize("n", [0, 1, 383, 384, 1000, 5003])
 @pytest.mark.parametrize("cores", [1, 2, 3])
 def test_every_point_is_taken_once(monkeypatch, n, cores):
-    """Whatever the number of points and cores, each row is written exactly once, whole blocks of 64 but the last."""
+    """Whatever the number of points and cores, each row is written exactly once, whole groups of 256 but the last."""
     monkeypatch.setattr("os.cpu_count", lambda: cores)
     points, out, lengths, lock = np.arange(3.0 * n).reshape(n, 3), np.zeros((n, 3)), [], threading.Lock()
 

@@ -10,8 +10,8 @@ from functools import cache
 
 from wakewise.arrays import Array
 
-_CHUNK = 192  # least points of a piece
-_BLOCKS = 64
+_CHUNK = 256  # least points of a piece
+_BLOCKS = 256
 _THREADED_PAIRS = 700_000  # about 0.7 ms of work; below it threads cost more than they save
 _MOST = 8  # threads
 _PIECES = 4  # per thread: they are not all as long
@@ -21,7 +21,7 @@ def over_points(kernel: Callable[[Array, Array], None], points: Array, out: Arra
     """Call `kernel(points, out)` on all points, in pieces on several threads if there are many pairs.
 
     The kernel must release the interpreter's lock and compute each row of `out` from its own point alone, or from its
-    own block of successive points whose length divides 64; then the result does not depend on the pieces. The caller
+    own group of successive points whose length divides 256; then the result does not depend on the pieces. The caller
     takes pieces, too: a thread that only waited would leave its core to the one that it has just woken, and the others
     idle for the milliseconds that all this takes.
     """

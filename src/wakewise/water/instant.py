@@ -17,9 +17,10 @@ from wakewise.water.bedjets import Rings, layer_speed
 from wakewise.water.bedjets_sums import LOG_WIDTH, REACH
 from wakewise.water.blockage import Blockage
 from wakewise.water.chunks import over_points
-from wakewise.water.clusters import ImpulseField, in_space
+from wakewise.water.clusters import ImpulseField
 from wakewise.water.faces import Room
 from wakewise.water.parcels import CENTRE_SPEED, Parcels, gusty_impulse_m4_s
+from wakewise.water.space_order import in_space
 from wakewise.water.walljets import WallRows
 
 
