@@ -185,6 +185,8 @@ def sum_field(points: Array, rows: np.ndarray, starts: IntArray, K: np.ndarray, 
         for block in range(group, end, _BLOCK):
             n = min(_BLOCK, end - block)
             about = _ball(points, block, block + n, centre)
+            if plain:
+                middle[:], centre[:] = _ZERO, _ZERO  # then what a point gets depends on no other
             # Lengths are counted from the block's centre: single precision then loses nothing of nearby distances.
             for p in range(n):
                 lanes[0, p], lanes[1, p] = points[block + p, 0] - centre[0], points[block + p, 1] - centre[1]
