@@ -105,12 +105,7 @@ class Blockage:
         sigmas = np.full(_SOURCES, 0.5 * size)
         sources = inner - 0.8 * size * inward
         across = _across(points, normals, sources, sigmas, target.bed_z_m)
-        # Least squares over strengths that sum to zero: work in the space across (1, ..., 1).
-        closed = np.eye(_SOURCES) - 1.0 / _SOURCES
-        M = across @ closed
-        normal = M.T @ M
-        damping = _DAMPING * float(np.trace(normal)) / _SOURCES
-        response = -(closed @ np.linalg.solve(normal + damping * np.eye(_SOURCES), M.T))
+        response = _least_squares(across, _DAMPING)
         return cls(points, normals, sources, sigmas, response, target.bed_z_m)
 
     def strengths_m3_s(self, undisturbed_m_s: Array) -> Array:
@@ -189,6 +184,46 @@ def add_body(body: BodyRows, points: Array, strengths_m3_s: Array, out: Array) -
     for q in range(near.shape[0]):
         for k in range(3):
             out[near[q], k] += result[q, k]
+
+
+@njit(cache=True)
+def _least_squares(across: Array, damping: float) -> Array:
+    """Strengths, shape (s, k), that leave least of a unit velocity across the surface at each point.
+
+    `across`, shape (k, s), is what unit strengths make there. Strengths sum to zero: the search is in the space across
+    (1, ..., 1). By Cholesky's way, written out: a library's sums would depend on the number of threads.
+    """
+    k, s = across.shape
+    M = across.copy()
+    for p in range(k):
+        M[p] -= across[p].mean()
+    L, trace = np.zeros((s, s)), 0.0
+    for p in range(k):
+        for i in range(s):
+            trace += M[p, i] ** 2
+            for j in range(i + 1):
+                L[i, j] += M[p, i] * M[p, j]
+    for i in range(s):
+        L[i, i] += damping * trace / s
+    for j in range(s):
+        for i in range(j, s):
+            for n in range(j):
+                L[i, j] -= L[i, n] * L[j, n]
+            L[i, j] = math.sqrt(L[j, j]) if i == j else L[i, j] / L[j, j]
+    out = np.empty((s, k))
+    x = np.empty(s)
+    for p in range(k):
+        for i in range(s):
+            x[i] = -M[p, i]
+            for n in range(i):
+                x[i] -= L[i, n] * x[n]
+            x[i] /= L[i, i]
+        for i in range(s - 1, -1, -1):
+            for n in range(i + 1, s):
+                x[i] -= L[n, i] * x[n]
+            x[i] /= L[i, i]
+        out[:, p] = x - x.mean()
+    return out
 
 
 def _across(points: Array, normals: Array, sources: Array, sigmas: Array, bed_z_m: float) -> Array:

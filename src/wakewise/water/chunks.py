@@ -7,8 +7,11 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache
+from typing import TypeVar
 
-from wakewise.arrays import Array
+from wakewise.arrays import Array, IntArray
+
+A = TypeVar("A", Array, IntArray)
 
 _CHUNK = 256  # least points of a piece
 _BLOCKS = 256
@@ -17,8 +20,8 @@ _MOST = 8  # threads
 _PIECES = 4  # per thread: they are not all as long
 
 
-def over_points(kernel: Callable[[Array, Array], None], points: Array, out: Array, pairs: int) -> None:
-    """Call `kernel(points, out)` on all points, in pieces on several threads if there are many pairs.
+def over_points(kernel: Callable[[A, A], None], points: A, out: A, pairs: int) -> None:
+    """Call `kernel(points, out)` on all points or indices, in pieces on several threads if there are many pairs.
 
     The kernel must release the interpreter's lock and compute each row of `out` from its own point alone, or from its
     own group of successive points whose length divides 256; then the result does not depend on the pieces. The caller

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import i0
 
-from wakewise.arrays import Array
+from wakewise.arrays import Array, IntArray
 from wakewise.interfaces import Current
 from wakewise.water.bedjets import Rings, layer_speed
 from wakewise.water.bedjets_sums import LOG_WIDTH, REACH
@@ -89,18 +89,15 @@ class Instant:
 
     def jets(self, points: Array) -> Array:
         """Free jets and wall jets with their images, without the body's answer, shape (n, 3)."""
-        # In an order that suits both sums.
-        order = in_space(points)
-        sorted_points = np.ascontiguousarray(points[order])
         field, rows, bed = self._field, self._rows, self._bed
-        sums = np.zeros_like(sorted_points)
+        points = np.ascontiguousarray(points, dtype=np.float64)
+        u = np.empty_like(points)
 
-        def both(some: Array, result: Array) -> None:
-            flow_at(some, field.rows, field.starts, rows.planes, rows.starts, rows.packed, bed, SINGLE, result)
+        def some(order: IntArray, _: IntArray) -> None:
+            flow_at(points, order, field.rows, field.starts, rows.planes, rows.starts, rows.packed, bed, SINGLE, u)
 
-        over_points(both, sorted_points, sums, field.pairs(len(points)) + rows.pairs(len(points)))
-        u = np.empty_like(sums)
-        u[order] = sums
+        order = in_space(points)
+        over_points(some, order, order, field.pairs(len(points)) + rows.pairs(len(points)))
         return u
 
     def stirred_bed(self, least_speed_m_s: float) -> Array:

@@ -86,6 +86,7 @@ class Tally(NamedTuple):
 @njit(cache=True, nogil=True)
 def flow_at(
     points: Array,
+    order: IntArray,
     rows: np.ndarray,
     starts: IntArray,
     planes: Array,
@@ -95,16 +96,21 @@ def flow_at(
     constants: np.ndarray,
     out: Array,
 ) -> None:
-    """Write the velocity of free and wall jets at points, shape (n, 3), best in the order of `in_space`, into `out`.
+    """Write the velocity of free and wall jets at some of the points, shape (n, 3), into those rows of `out`.
 
-    `rows` and `starts` are those of an `ImpulseField`; `planes`, `ring_starts` and `rings` those of `WallRows`.
+    `order` says at which, best as `ordered` has them; `rows` and `starts` are those of an `ImpulseField`; `planes`,
+    `ring_starts` and `rings` those of `WallRows`.
     """
-    sum_field(points, rows, starts, constants, out)
-    for p in range(points.shape[0]):
-        if points[p, 2] == bed_z:
-            out[p, 2] = 0.0  # there is only rounding
+    some, sums = points[order], np.zeros((order.shape[0], 3))
+    sum_field(some, rows, starts, constants, sums)
+    for p in range(order.shape[0]):
+        if some[p, 2] == bed_z:
+            sums[p, 2] = 0.0  # there is only rounding
     if rings.shape[0]:
-        sum_planes(points, planes, ring_starts, rings, np.zeros(0, np.float32), out)
+        sum_planes(some, planes, ring_starts, rings, np.zeros(0, np.float32), sums)
+    for p in range(order.shape[0]):
+        for k in range(3):
+            out[order[p], k] = sums[p, k]
 
 
 @njit(cache=True, nogil=True)
@@ -242,16 +248,12 @@ def _carrying(
     rows, starts = clustered(*mirrored(X, impulse, sigma, planes.walls))
     frames, ring_starts, rings = wall_rows(layers, r, planes)
     points = X[look]
-    order = ordered(points, laws.curve)
-    sorted_points, sums, u = points[order], np.zeros((look.shape[0], 3)), np.empty((look.shape[0], 3))
-    flow_at(sorted_points, rows, starts, frames, ring_starts, rings, laws.bed_z, laws.constants, sums)
-    for q in range(look.shape[0]):
-        for k in range(3):
-            u[order[q], k] = sums[q, k]
+    u, look_order = np.empty((look.shape[0], 3)), ordered(points, laws.curve)
+    flow_at(points, look_order, rows, starts, frames, ring_starts, rings, laws.bed_z, laws.constants, u)
     if body.points.shape[0]:
         if tally.steps[1] < 0 or tally.steps[0] % _EVERY == 0:
-            at_body = np.zeros((body.points.shape[0], 3))
-            flow_at(body.points, rows, starts, frames, ring_starts, rings, laws.bed_z, laws.constants, at_body)
+            at_body, every = np.empty((body.points.shape[0], 3)), np.arange(body.points.shape[0])
+            flow_at(body.points, every, rows, starts, frames, ring_starts, rings, laws.bed_z, laws.constants, at_body)
             tally.held[:] = answer(body, at_body)
             tally.steps[1] = tally.steps[0]
         add_body(body, points, tally.held, u)

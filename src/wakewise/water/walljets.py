@@ -17,13 +17,11 @@ from wakewise.water.bedjets import (
     kept_rings,
     layer_speeds,
     merge_layers,
-    planes_velocity,
 )
-from wakewise.water.bedjets_sums import COLUMNS, leaning, sum_planes, with_images
+from wakewise.water.bedjets_sums import COLUMNS, leaning, with_images
 from wakewise.water.faces import Face, Room
 
 LEAST_RING_IMAGE_M_S = 2e-4  # images whose crest would not reach this speed at the wall are left out
-_SINGLE = np.zeros(0, np.float32)
 _MOST = 400  # rings
 _REST = 3.0  # wall jets rest at this many times the parcels' rest speed: on the bed 3 mm/s,
 _SHEET_REST = 10.0  # and the jets of a meeting, of which there may be many, at this many
@@ -75,17 +73,9 @@ class WallRows:
     starts: IntArray
     packed: Array
 
-    def velocity(self, points_W_m: Array) -> Array:
-        """Velocity of all of them, shape (n, 3), at points, shape (n, 3)."""
-        return planes_velocity(points_W_m, self.planes, self.starts, self.packed)
-
     def pairs(self, points: int) -> int:
         """How many pairs of a point and an impulse take as long as the sum at so many points."""
         return 2 * points * len(self.packed)
-
-    def add(self, points_W_m: Array, out: Array) -> None:
-        """Add the velocity at points to `out`, both shape (n, 3), on this thread."""
-        sum_planes(points_W_m, self.planes, self.starts, self.packed, _SINGLE, out)
 
 
 def _per_height(face: Face, room: Room) -> float:
