@@ -17,7 +17,7 @@ from wakewise.tank.plant import VehiclePlant
 from wakewise.tank.probes import surface_points
 from wakewise.tank.sediment import SHEAR_HEIGHT_M, Silt, SiltLaws
 from wakewise.tank.sensors import Sensors
-from wakewise.tank.settings import MAX_PARCELS, MAX_SILT_PARTICLES, PLANT_STEP_S, TankSettings
+from wakewise.tank.settings import MAX_PARCELS, MAX_SILT_PARTICLES, TankSettings
 from wakewise.tank.tether import Tether
 from wakewise.targets import Target
 from wakewise.thrusters import electrical_power_W
@@ -182,8 +182,7 @@ class Tank:
         self._touching = ""
         while end - self._time > _TIME_TOLERANCE_S:
             flow_due = (self._flow_steps + 1) * self.settings.flow_step_s
-            stop = min(self._time + PLANT_STEP_S, end, flow_due, self._sensors.next_due_s())
-            self._advance(commands, max(stop - self._time, 0.0))
+            self._advance(commands, min(end, flow_due, self._sensors.next_due_s()))
             if flow_due - self._time < _TIME_TOLERANCE_S:
                 self._move_water()
         self._touching = self._touching or self._plant.touches()
@@ -221,12 +220,12 @@ class Tank:
             inflow[i] -= impulse_velocity(origins[i : i + 1], own.position_m, own.impulse_m4_s, own.sigma_m)[0]
         return inflow
 
-    def _advance(self, commands_N: Array, dt_s: float) -> None:
-        self._plant.step(commands_N, dt_s, self._inflow)
-        self._touching = self._touching or self._plant.contact
-        self._time += dt_s
+    def _advance(self, commands_N: Array, until_s: float) -> None:
+        touched = self._plant.advance(commands_N, until_s, self._inflow)
+        self._touching = self._touching or touched
+        self._time = self._plant.time_s
         if self._sensors.next_due_s() - self._time < _TIME_TOLERANCE_S:
-            self._sensors.sample(self._time, self._plant.state, self._plant.force_B_m_s2, self._turbidity_per_m)
+            self._sensors.sample(self._time, self._plant.vector, self._plant.force_B_m_s2, self._turbidity_per_m)
 
     def _move_water(self) -> None:
         origins, axes = self._plant.disks()
