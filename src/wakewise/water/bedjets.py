@@ -152,30 +152,30 @@ def packed_rings(rings: Rings, least_m: float = 0.0, per_height: float = 0.0, st
     """
     heading, kappa = rings.heading_kappa
     rows = np.empty((rings.count, COLUMNS))
-    sizes = rings.radius_m, rings.impulse_m4_s
-    fill_rows(rows, rings.centre_m, *sizes, heading, kappa, least_m, per_height, stretch)
+    for j in range(rings.count):
+        sizes = rings.radius_m[j], rings.impulse_m4_s[j]
+        fill_row(rows[j], rings.centre_m[j], *sizes, heading[j], kappa[j], least_m, per_height, stretch)
+    finish_rows(rows)
     return rows
 
 
 @njit(cache=True, nogil=True)
-def fill_rows(
-    rows: Array,
+def fill_row(
+    row: Array,
     centre: Array,
-    R: Array,
-    impulse: Array,
+    radius: float,
+    impulse: float,
     heading: Array,
-    kappa: Array,
+    kappa: float,
     least: float,
     per_height: float,
     stretch: float,
 ) -> None:
-    """Write `packed_rings` into `rows`."""
-    for j in range(rows.shape[0]):
-        rows[j, 0], rows[j, 1], rows[j, 2] = centre[j, 0], centre[j, 1], R[j]
-        rows[j, 3] = STRENGTH * impulse[j] / R[j] ** 2 / stretch
-        rows[j, 4], rows[j, 5], rows[j, 6] = heading[j, 0], heading[j, 1], kappa[j]
-        rows[j, 11], rows[j, 12] = least / stretch, per_height
-    finish_rows(rows)
+    """Write one row of `packed_rings`, but for what `finish_rows` fills in."""
+    row[0], row[1], row[2] = centre[0], centre[1], radius
+    row[3] = STRENGTH * impulse / radius**2 / stretch
+    row[4], row[5], row[6] = heading[0], heading[1], kappa
+    row[11], row[12] = least / stretch, per_height
 
 
 def packed_velocity(points_W_m: Array, packed: Array, bed_z_m: float, *, exact: bool = False) -> Array:

@@ -146,23 +146,28 @@ def _meeting_pairs(X: Array, m: Array, sigma: Array, stream: IntArray, strong: I
     found = np.empty((n, 2), np.int64)
     used = np.zeros(n, np.bool_)
     count = 0
+    unit = np.empty((n, 3))
+    for p in range(n):
+        i = strong[p]
+        length = math.sqrt(m[i, 0] ** 2 + m[i, 1] ** 2 + m[i, 2] ** 2)
+        for k in range(3):
+            unit[p, k] = m[i, k] / length
     for p in range(n):
         if used[p]:
             continue
         i = strong[p]
         for q in range(p + 1, n):
+            # First what most pairs fail by.
+            if unit[p, 0] * unit[q, 0] + unit[p, 1] * unit[q, 1] + unit[p, 2] * unit[q, 2] > _OPPOSED:
+                continue
             j = strong[q]
             dx, dy, dz = X[j, 0] - X[i, 0], X[j, 1] - X[i, 1], X[j, 2] - X[i, 2]
             gap2 = dx * dx + dy * dy + dz * dz
             reach = STRIKE_HEIGHT * (sigma[i] + sigma[j])
             if gap2 > reach * reach or used[q] or stream[i] == stream[j]:
                 continue
-            one = math.sqrt(m[i, 0] ** 2 + m[i, 1] ** 2 + m[i, 2] ** 2)
-            two = math.sqrt(m[j, 0] ** 2 + m[j, 1] ** 2 + m[j, 2] ** 2)
-            if m[i, 0] * m[j, 0] + m[i, 1] * m[j, 1] + m[i, 2] * m[j, 2] > _OPPOSED * one * two:
-                continue
-            ahead = (dx * m[i, 0] + dy * m[i, 1] + dz * m[i, 2]) / one
-            back = -(dx * m[j, 0] + dy * m[j, 1] + dz * m[j, 2]) / two
+            ahead = dx * unit[p, 0] + dy * unit[p, 1] + dz * unit[p, 2]
+            back = -(dx * unit[q, 0] + dy * unit[q, 1] + dz * unit[q, 2])
             aside2 = gap2 - ahead * ahead
             if ahead <= 0.0 or back <= 0.0 or aside2 > (0.5 * (sigma[i] + sigma[j])) ** 2:
                 continue

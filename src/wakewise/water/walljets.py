@@ -12,14 +12,14 @@ from wakewise.arrays import Array, IntArray
 from wakewise.water.bedjets import (
     STRIKE_HEIGHT,
     Layers,
-    fill_rows,
+    fill_row,
     grow_layers,
     kept_rings,
     layer_speeds,
     merge_layers,
 )
-from wakewise.water.bedjets_sums import COLUMNS, leaning, with_images
-from wakewise.water.faces import Face, Room
+from wakewise.water.bedjets_sums import COLUMNS, finish_rows, leaning, with_images
+from wakewise.water.faces import Face, Room, longer
 
 LEAST_RING_IMAGE_M_S = 2e-4  # images whose crest would not reach this speed at the wall are left out
 _MOST = 400  # rings
@@ -160,32 +160,46 @@ def wall_rows(layers: Layers, count: int, planes: Planes) -> tuple[Array, IntArr
     """Planes with rings, where each one's rings start, and the rings with their images, as `WallRows` has them."""
     heading, kappa = leaning(layers.lean[:count])
     faces, many = planes.walls.shape[0], planes.frames.shape[0]
+    on = np.zeros(many, np.int64)
+    for j in range(count):
+        on[layers.plane[j]] += 1
     frames, starts = np.empty((many, 14)), np.zeros(many + 1, np.int64)
-    packed = np.empty((0, COLUMNS))
-    used = 0
+    packed, used = np.empty((4 * count, COLUMNS)), 0
     for p in range(many):
-        on = np.flatnonzero(layers.plane[:count] == p)
-        if on.shape[0] == 0:
+        if on[p] == 0:
             continue
-        rows = np.empty((on.shape[0], COLUMNS))
-        fill_rows(
-            rows,
-            layers.centre[on],
-            layers.radius[on],
-            layers.impulse[on],
-            heading[on],
-            kappa[on],
-            planes.thickness[p],
-            planes.per_height[p],
-            planes.stretch[p],
-        )
+        rows, n = np.empty((on[p], COLUMNS)), 0
+        for j in range(count):
+            if layers.plane[j] == p:
+                _fill_row(rows[n], layers, j, planes, heading[j], kappa[j])
+                n += 1
+        finish_rows(rows)
         if p < faces:
             rows = with_images(rows, _walls_across(planes.walls, p), LEAST_RING_IMAGE_M_S)
-        packed = np.concatenate((packed, rows))
+        end = starts[used] + rows.shape[0]
+        if end > packed.shape[0]:
+            packed = longer(packed, 2 * end)
+        packed[starts[used] : end] = rows
         frames[used] = planes.frames[p]
         used += 1
-        starts[used] = packed.shape[0]
-    return frames[:used].copy(), starts[: used + 1].copy(), packed
+        starts[used] = end
+    return frames[:used].copy(), starts[: used + 1].copy(), packed[: starts[used]].copy()
+
+
+@njit(cache=True, nogil=True)
+def _fill_row(row: Array, layers: Layers, j: int, planes: Planes, heading: Array, kappa: float) -> None:
+    p = layers.plane[j]
+    fill_row(
+        row,
+        layers.centre[j],
+        layers.radius[j],
+        layers.impulse[j],
+        heading,
+        kappa,
+        planes.thickness[p],
+        planes.per_height[p],
+        planes.stretch[p],
+    )
 
 
 @njit(cache=True, nogil=True)
