@@ -90,7 +90,8 @@ class VehiclePlant:
         self._force_B_m_s2 = -_GRAVITY_W_M_S2 @ start.X_WB.R
         self._still = ambient.steady and ambient.uniform
         self._calm = self._still and tether is None and not failures  # so that nothing is asked of between two events
-        self._last = np.zeros(4)  # velocity in the world before the last step, and that step
+        # Velocity in the world before the last step, that step, and 1 if the hull was surely clear of everything then.
+        self._last = np.zeros(5)
         self._water_W = ambient.velocity(start.X_WB.p_m[None], 0.0)[0]
         self.contact = ""
         """What the hull was stopped by in the last step, or nothing (an empty string)."""
@@ -121,7 +122,7 @@ class VehiclePlant:
     @property
     def force_B_m_s2(self) -> Array:
         """Specific force at the body origin, mean over the last step, shape (3,): what an accelerometer there feels."""
-        return self._force_B_m_s2
+        return self._force_B_m_s2.copy()
 
     @property
     def vector(self) -> Array:
@@ -164,8 +165,12 @@ class VehiclePlant:
             self._impulse_N_s,
             self._R,
             self._last,
+            self._force_B_m_s2,
         )
-        self._hold()
+        if self._last[4] == 0.0:
+            self._hold()
+        else:
+            self.contact = ""
 
     def _hold(self) -> None:
         """Set the hull back out of what it is in, and note the specific force of the last step."""
@@ -293,7 +298,7 @@ def _lag_and_move(
         R[0, k], R[1, k], R[2, k] = rotate(state[3], state[4], state[5], state[6], a, b, c)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _steps_in_free_water(
     packed: Array,
     allocation: Array,
@@ -312,11 +317,13 @@ def _steps_in_free_water(
     impulse_N_s: Array,
     R: Array,
     last: Array,
+    force_B: Array,
 ) -> float:
     """Steps of `_lag_and_move` from a time until another, none longer than a third (`times_s`); the time reached.
 
-    They end where the hull may touch something (`around`). `last`, shape (4,), is written: the velocity in the world
-    before the last step, and that step.
+    They end where the hull may touch something (`around`). `last`, shape (5,), is written: the velocity in the world
+    before the last step, that step, and 1 if the hull was clear of everything after it; then `force_B`, too, the
+    specific force.
     """
     time_s, until_s = times_s[0], times_s[1]
     while until_s - time_s > _TIME_TOLERANCE_S:
@@ -342,6 +349,13 @@ def _steps_in_free_water(
             R,
         )
         time_s += dt_s
-        if not clear(around, state, R):
-            break
+        last[4] = 1.0 if clear(around, state, R) else 0.0
+        if last[4] == 0.0:
+            return time_s
+    rate = np.empty(3)
+    for i in range(3):
+        now = R[i, 0] * state[7] + R[i, 1] * state[8] + R[i, 2] * state[9]
+        rate[i] = (now - last[i]) / last[3] - _GRAVITY_W_M_S2[i]
+    for i in range(3):
+        force_B[i] = R[0, i] * rate[0] + R[1, i] * rate[1] + R[2, i] * rate[2]
     return time_s

@@ -206,13 +206,12 @@ class Silt:
         if len(self.mass_kg):
             # The lowest layer of nodes may lie on the bed: what is below it is counted there, not lost.
             origin = np.array(origin_W_m, dtype=np.float64)
-            shared_among_nodes(self.position_m, self.mass_kg, origin, float(spacing_m), values)
-        half = np.ones(shape[2])
+            shared_among_nodes(self.position_m, self.mass_kg / spacing_m**3, origin, float(spacing_m), values)
         bed = (self._size[2] - origin_W_m[2]) / spacing_m
         # A node on the bed has water only on its upper side.
         if 0 <= bed <= shape[2] - 1 and abs(bed - round(bed)) < 1e-6:
-            half[round(bed)] = 0.5
-        return ScalarGrid(origin_W_m=origin_W_m, spacing_m=spacing_m, values=values / (spacing_m**3 * half))
+            values[:, :, round(bed)] *= 2.0
+        return ScalarGrid(origin_W_m=origin_W_m, spacing_m=spacing_m, values=values)
 
     def _shear(self, flow: Flow, stirred_W_m: Array) -> None:
         """Friction velocity of every cell: from the water over it where jets reach, from the current elsewhere."""

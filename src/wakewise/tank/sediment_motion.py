@@ -14,7 +14,7 @@ from wakewise.arrays import Array, IntArray
 from wakewise.tank.grains import friction_from
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def stirred_cells(circles: Array, low: Array, cell: Array, margin_m: float, near: np.ndarray) -> None:
     """Mark the cells of a grid, shape (nx, ny), whose centres lie in circles (x, y, radius) widened by a margin."""
     nx, ny = near.shape
@@ -36,7 +36,7 @@ def stirred_cells(circles: Array, low: Array, cell: Array, margin_m: float, near
                     near[i, j] = True
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def cells_to_look_at(
     near: np.ndarray, looked: np.ndarray, odd: int, low: Array, cell: Array, depth: float
 ) -> tuple[np.ndarray, IntArray, Array]:
@@ -60,7 +60,7 @@ def cells_to_look_at(
     return kept, cells[:count].copy(), places[: count + 1].copy()
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def feel(star: Array, kept: np.ndarray, cells: IntArray, u: Array, table: Array) -> None:
     """Renew the friction velocities of cells, shape (nx, ny), from the water's velocities `u` at `cells_to_look_at`."""
     away = friction_from(table, math.sqrt(u[0, 0] ** 2 + u[0, 1] ** 2))
@@ -72,7 +72,7 @@ def feel(star: Array, kept: np.ndarray, cells: IntArray, u: Array, table: Array)
         star[cells[q, 0], cells[q, 1]] = friction_from(table, math.sqrt(u[q + 1, 0] ** 2 + u[q + 1, 1] ** 2))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def moved_cells(star: Array, bed: Array, least: float) -> IntArray:
     """Cells, shape (m, 2), that have a load and a friction velocity above the least."""
     cells, count = np.empty((star.size, 2), np.int64), 0
@@ -84,7 +84,7 @@ def moved_cells(star: Array, bed: Array, least: float) -> IntArray:
     return cells[:count].copy()
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def due(u: Array, age: Array, dt_s: float, held_m: float, held_s: float) -> IntArray:
     """Particles at which the water must be looked at before a step; the ages of what the others know go on."""
     found, count = np.empty(age.shape[0], np.int64), 0
@@ -98,7 +98,7 @@ def due(u: Array, age: Array, dt_s: float, held_m: float, held_s: float) -> IntA
     return found[:count].copy()
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def settle(
     landed: np.ndarray, position: Array, mass: Array, u: Array, age: Array, bed: Array, low: Array, cell: Array
 ) -> int:
@@ -117,7 +117,7 @@ def settle(
     return left
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def carry(position: Array, u: Array, settling_m_s: float, dt_s: float, low: Array, depth: float) -> np.ndarray:
     """Move particles, shape (n, 3), in place with the water and down; return which of them reached the bed.
 
@@ -136,7 +136,7 @@ def carry(position: Array, u: Array, settling_m_s: float, dt_s: float, low: Arra
     return landed
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def mix(
     position: Array, kicks: Array, star: Array, low: Array, cell: Array, depth: float, dt_s: float, laws: Array
 ) -> None:
@@ -164,7 +164,7 @@ def mix(
         position[k, 2] = _between(position[k, 2] + drift_z * dt_s + size * kicks[k, 2], depth)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def shared_among_nodes(position: Array, mass: Array, origin: Array, spacing: float, values: Array) -> None:
     """Add each particle's mass to the eight nodes round it, with weights linear in the distance (cloud in cell)."""
     for k in range(mass.shape[0]):
@@ -185,7 +185,7 @@ def shared_among_nodes(position: Array, mass: Array, origin: Array, spacing: flo
                         values[i + di, j + dj, h + dh] += mass[k] * weight
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _turned_back(x: float, half: float) -> float:
     """Mirrored into -half to half if it is beyond."""
     if x > half:
@@ -195,7 +195,7 @@ def _turned_back(x: float, half: float) -> float:
     return min(max(x, -half), half)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _between(z: float, depth: float) -> float:
     """Mirrored into 0 to depth if it is beyond."""
     z = abs(z)

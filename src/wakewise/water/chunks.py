@@ -28,7 +28,7 @@ def over_points(kernel: Callable[[A, A], None], points: A, out: A, pairs: int) -
     takes pieces, too: a thread that only waited would leave its core to the one that it has just woken, and the others
     idle for the milliseconds that all this takes.
     """
-    if pairs < _THREADED_PAIRS or len(points) < 2 * _CHUNK or (workers := min(os.cpu_count() or 1, _MOST)) == 1:
+    if pairs < _THREADED_PAIRS or len(points) < 2 * _CHUNK or (workers := min(cores(), _MOST)) == 1:
         kernel(points, out)
         return
     # Whole blocks: kernels may look up to `_BLOCKS` successive points up together.
@@ -52,6 +52,13 @@ def over_points(kernel: Callable[[A, A], None], points: A, out: A, pairs: int) -
         wait(begun)
     for other in begun:
         other.result()
+
+
+@cache
+def cores() -> int:
+    """How many cores this process may use."""
+    there = os.cpu_count() or 1
+    return min(there, len(os.sched_getaffinity(0))) if hasattr(os, "sched_getaffinity") else there
 
 
 @cache

@@ -249,7 +249,9 @@ class Water:
     def _ambient_velocity(self, places_W_m: Array) -> Array:
         """Velocity of the ambient water at places, both shape (n, 3)."""
         if getattr(self._ambient, "uniform", False) and len(places_W_m):
-            return np.tile(self._ambient.velocity(places_W_m[:1], self._time), (len(places_W_m), 1))
+            even = np.empty((len(places_W_m), 3))
+            even[:] = self._ambient.velocity(places_W_m[:1], self._time)
+            return even
         return np.array(self._ambient.velocity(places_W_m, self._time), dtype=np.float64)
 
     def _answer_to_ambient(self) -> Array:
