@@ -5,8 +5,18 @@ import math
 import numpy as np
 import pytest
 
-from wakewise.tank.grains import settling_speed_m_s
-from wakewise.tank.sediment_motion import carry, cells_of, mix, shared_among_nodes, stirred_cells
+from wakewise.tank.grains import friction_table_m_s, friction_velocity_m_s, settling_speed_m_s
+from wakewise.tank.sediment_motion import (
+    carry,
+    cells_to_look_at,
+    due,
+    feel,
+    mix,
+    moved_cells,
+    settle,
+    shared_among_nodes,
+    stirred_cells,
+)
 
 LOW, CELL, SHAPE, DEPTH_M = np.array([-0.5, -0.4]), np.array([0.05, 0.05]), (20, 16), 0.6
 KARMAN, HIGHEST_M, BACKGROUND = LAWS = (0.4, 0.065, 1e-5)
@@ -98,11 +108,64 @@ def test_stirred_cells_are_those_whose_middle_a_circle_covers():
         assert found[i, j] == covered.any()
 
 
-def test_cells_are_found_one_by_one():
-    """Also beyond the grid's edge, where the nearest counts."""
-    place = np.random.default_rng(4).uniform(-0.7, 0.7, (50, 2))
-    i, j = cells_of(place, LOW, CELL, *SHAPE)
-    assert [(int(a), int(b)) for a, b in zip(i, j, strict=True)] == [cell_of(x, y) for x, y in place]
+def test_cells_are_looked_at_in_turn():
+    """New ones at once, those of one colour that stay stirred keep what they felt; the first place is far away."""
+    rng = np.random.default_rng(4)
+    near, looked = rng.uniform(size=SHAPE) < 0.5, rng.uniform(size=SHAPE) < 0.5
+    for odd in (0, 1):
+        kept, cells, places = cells_to_look_at(near, looked, odd, LOW, CELL, DEPTH_M)
+        expected = np.array([[near[c] and looked[c] and sum(c) % 2 == odd for c in row] for row in _all_cells()])
+        assert np.array_equal(kept, expected)
+        assert np.array_equal(cells, np.argwhere(near & ~kept))
+        assert places[0] == pytest.approx([*LOW, DEPTH_M])
+        assert places[1:] == pytest.approx(np.column_stack([LOW + (cells + 0.5) * CELL, np.full(len(cells), DEPTH_M)]))
+
+
+def _all_cells():
+    return [[(i, j) for j in range(SHAPE[1])] for i in range(SHAPE[0])]
+
+
+def test_a_bed_feels_the_water_that_was_looked_at():
+    """Kept cells keep, looked at ones take the law's friction velocity, and all others that of the first place."""
+    rng = np.random.default_rng(5)
+    star, kept = rng.uniform(0.0, 0.03, SHAPE), rng.uniform(size=SHAPE) < 0.2
+    before = star.copy()
+    cells = np.argwhere(~kept)[::3]
+    u = rng.normal(0.0, 0.2, (len(cells) + 1, 3))
+    feel(star, kept, cells, u, friction_table_m_s(0.01, 20e-6))
+    law = friction_velocity_m_s(np.hypot(u[:, 0], u[:, 1]), 0.01, 20e-6)
+    expected = np.where(kept, before, law[0])
+    expected[tuple(cells.T)] = law[1:]
+    assert star == pytest.approx(expected, rel=1e-4)
+    bed = (rng.uniform(size=SHAPE) < 0.5).astype(float)
+    assert np.array_equal(moved_cells(star, bed, 0.01), np.argwhere((star > 0.01) & (bed > 0.0)))
+
+
+def test_particles_are_looked_at_when_they_have_gone_far_or_long():
+    """The ages of the others go on, and those found start anew."""
+    u, age = np.array([[0.1, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.02, 0.0]]), np.array([0.1, 0.25, 0.1])
+    assert due(u, age, 0.06, 0.015, 0.3).tolist() == [0, 1]
+    assert age == pytest.approx([0.0, 0.0, 0.16])
+
+
+def test_what_lands_lies_on_the_bed_and_the_rest_closes_ranks():
+    """Mass is kept, cell by cell, also of grains beyond the edge, where the nearest cell counts."""
+    rng = np.random.default_rng(6)
+    place = np.column_stack([rng.uniform(-0.7, 0.7, (50, 2)), rng.uniform(0, DEPTH_M, 50)])
+    mass, u, age, landed = (
+        rng.uniform(size=50),
+        rng.normal(size=(50, 3)),
+        rng.uniform(size=50),
+        rng.uniform(size=50) < 0.4,
+    )
+    bed, expected = np.zeros(SHAPE), np.zeros(SHAPE)
+    for (x, y, _), kg in zip(place[landed], mass[landed], strict=True):
+        expected[cell_of(x, y)] += kg / CELL.prod()
+    then = [array[~landed] for array in (place, mass, u, age)]
+    left = settle(landed, place, mass, u, age, bed, LOW, CELL)
+    assert bed == pytest.approx(expected, rel=1e-12)
+    for now, kept in zip((place, mass, u, age), then, strict=True):
+        assert np.array_equal(now[:left], kept)
 
 
 @pytest.mark.parametrize("grain_m", [20e-6, 60e-6, 3e-4])
@@ -143,7 +206,7 @@ def test_the_drift_term_keeps_silt_from_leaving_strong_mixing():
         kicks = rng.normal(size=(n, 3))
         kicks[:, 2] = 0.0
         mix(place, kicks, star, LOW, CELL, DEPTH_M, dt, np.array(LAWS))
-        i, j = cells_of(no_drift, LOW, CELL, *SHAPE)
+        i, j = np.clip(np.floor((no_drift[:, :2] - LOW) / CELL).astype(int), 0, np.array(SHAPE) - 1).T
         size = np.sqrt(2 * (BACKGROUND + KARMAN * star[i, j] * HIGHEST_M) * dt)
         no_drift[:, 0] = np.clip(no_drift[:, 0] + size * kicks[:, 0], -0.5, 0.5)
     right = (place[:, 0] > 0.0).mean(), (no_drift[:, 0] > 0.0).mean()

@@ -3,16 +3,17 @@
 import numpy as np
 import pytest
 
-from wakewise.geometry import Pose, quat_conjugate, quat_from_euler, quat_multiply, rotvec_from_quat
+from wakewise.geometry import Pose, quat_conjugate, quat_from_euler, quat_from_rotvec, quat_multiply, rotvec_from_quat
 from wakewise.interfaces import BodyState
 from wakewise.tank import Sensors
-from wakewise.tank.sensors import pose_loss
+from wakewise.tank.sensors import _turned, pose_loss
 from wakewise.tank.settings import SensorSettings
 
 STATE = BodyState(
     X_WB=Pose(np.array([0.1, -0.2, 0.8]), quat_from_euler(0.1, -0.2, 0.7)), nu_B=np.array([0, 0, 0, 0.1, 0.2, -0.3])
 )
 
+VECTOR = np.concatenate([STATE.X_WB.p_m, STATE.X_WB.q, STATE.nu_B])
 FORCE = np.array([0.3, -0.1, -9.8])
 
 
@@ -21,7 +22,7 @@ def _record(seconds, seed=0, turbidity=0.0, **settings):
     out = []
     while sensors.next_due_s() <= seconds:
         time_s = sensors.next_due_s()
-        sensors.sample(time_s, STATE, FORCE, turbidity)
+        sensors.sample(time_s, VECTOR, FORCE, turbidity)
         out += [(time_s, m) for m in sensors.collect(time_s)]
     return out
 
@@ -97,3 +98,10 @@ def test_contrast_decides_on_poses():
     assert pose_loss(np.log(10.0) / 0.7, 0.7, 0.01) == pytest.approx(0.01)
     assert pose_loss(np.log(20.0) / 0.7, 0.7, 0.01) == pytest.approx(1.0)
     assert 0.1 < pose_loss(np.log(14.0) / 0.7, 0.7, 0.01) < 0.9
+
+
+def test_a_turned_attitude_is_the_product_of_quaternions():
+    """For large, small and no turns the compiled product is the geometry's."""
+    for turn in ([0.3, -0.2, 1.1], [1e-9, 0.0, 2e-9], [0.0, 0.0, 0.0]):
+        expected = quat_multiply(STATE.X_WB.q, quat_from_rotvec(turn))
+        assert _turned(np.array(STATE.X_WB.q), np.array(turn)) == pytest.approx(expected, abs=1e-15)

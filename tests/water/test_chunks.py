@@ -14,8 +14,8 @@ from wakewise.water.chunks import over_points
 @pytest.mark.parametrize("n", [0, 1, 383, 384, 1000, 5003])
 @pytest.mark.parametrize("cores", [1, 2, 3])
 def test_every_point_is_taken_once(monkeypatch, n, cores):
-    """Whatever the number of points and cores, each row is written exactly once, whole blocks of 64 but the last."""
-    monkeypatch.setattr("os.cpu_count", lambda: cores)
+    """Whatever the number of points and cores, each row is written exactly once, whole groups of 256 but the last."""
+    monkeypatch.setattr(chunks, "cores", lambda: cores)
     points, out, lengths, lock = np.arange(3.0 * n).reshape(n, 3), np.zeros((n, 3)), [], threading.Lock()
 
     def kernel(some, result):
@@ -31,7 +31,7 @@ def test_every_point_is_taken_once(monkeypatch, n, cores):
 
 def test_an_error_in_a_piece_is_told(monkeypatch):
     """What a kernel raises comes out of the call, whichever thread it happened on."""
-    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    monkeypatch.setattr(chunks, "cores", lambda: 2)
 
     def kernel(some, result):
         if some[0, 0] > 0.5:
@@ -54,7 +54,7 @@ def _sum_in_child(queue):
 @pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
 def test_a_forked_child_has_threads_of_its_own(monkeypatch):
     """After sums on threads in the parent, a forked child sums as well instead of waiting for threads it has not."""
-    monkeypatch.setattr("os.cpu_count", lambda: 3)
+    monkeypatch.setattr(chunks, "cores", lambda: 3)
     forking = multiprocessing.get_context("fork")
     queue = forking.Queue()
     _sum_in_child(queue)

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 
+from wakewise.compiled import njit
 from wakewise.lattice.collision import Populations, collide
 from wakewise.lattice.stencil import VELOCITIES, Lattice
 

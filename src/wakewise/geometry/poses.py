@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -29,7 +30,7 @@ class Pose:
 
     def __post_init__(self) -> None:
         freeze(self, p_m=(3,), q=(4,))
-        norm = float(np.linalg.norm(self.q))
+        norm = math.sqrt(self.q @ self.q)
         if norm < 1e-6:
             raise InputError(f"quaternion {self.q.tolist()}: length {norm:g}, must not be zero")
         freeze_q = self.q / norm

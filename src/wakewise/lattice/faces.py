@@ -16,9 +16,10 @@ Whole rows of cells beside one face are worked on together; edges, corners and t
 from __future__ import annotations
 
 import numpy as np
-from numba import float32, njit
+from numba import float32
 
 from wakewise.arrays import IntArray
+from wakewise.compiled import njit
 from wakewise.lattice.collision import Populations
 from wakewise.lattice.memory import peek, poke
 from wakewise.lattice.stencil import (
@@ -49,7 +50,7 @@ _1, _1_5, _3, _9 = float32(1.0), float32(1.5), float32(3.0), float32(9.0)
 _0, _W1, _W2 = float32(0.0), float32(1 / 18), float32(1 / 36)
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", boundscheck=False, inline="always")
+@njit(fastmath=True, inline="always")
 def beyond_open(own: Populations, axis: int, side: int) -> tuple[float, float, float, float, float]:
     """What a cell with these populations pulls from beyond its one open face, in the order of `BEYOND`.
 
@@ -74,7 +75,7 @@ def beyond_open(own: Populations, axis: int, side: int) -> tuple[float, float, f
     return _W1 * straight, _W2 * (on_v + by_v), _W2 * (on_v - by_v), _W2 * (on_w + by_w), _W2 * (on_w - by_w)
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", boundscheck=False)
+@njit(fastmath=True)
 def pull_beyond(
     own: Lattice, at: tuple[int, int, int], cells: tuple[int, int, int], faces: IntArray, pulled: Lattice
 ) -> None:
@@ -126,7 +127,7 @@ def pull_beyond(
             pulled[i] = WEIGHTS[i] * value
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", boundscheck=False)
+@njit(fastmath=True)
 def _open_row(src: Lattice, x: int, first: int, end: int, face: int, mz: int, made: Lattice) -> None:
     """Fill the slots of the cells first to end - 1 of plane x, all beside one open face; at most `PIECE`.
 
@@ -191,7 +192,7 @@ def _open_row(src: Lattice, x: int, first: int, end: int, face: int, mz: int, ma
             slots[p - back] = made[k * PIECE + p - first]
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", boundscheck=False)
+@njit(fastmath=True)
 def _wall_row(src: Lattice, x: int, first: int, end: int, face: int, mz: int) -> None:
     """Fill the slots of the cells first to end - 1 of plane x, all beside one wall."""
     for k in range(5):
@@ -202,7 +203,7 @@ def _wall_row(src: Lattice, x: int, first: int, end: int, face: int, mz: int) ->
             slots[p - back] = left[p]
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", boundscheck=False)
+@njit(fastmath=True)
 def _face_row(src: Lattice, x: int, first: int, end: int, face: int, kind: int, mz: int, made: Lattice) -> None:
     """Fill the slots of a row of cells beside one face, as if there were no other."""
     if kind == OPEN:
@@ -211,7 +212,7 @@ def _face_row(src: Lattice, x: int, first: int, end: int, face: int, kind: int, 
         _wall_row(src, x, first, end, face, mz)
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", boundscheck=False)
+@njit(fastmath=True)
 def _open_end(src: Lattice, x: int, at: int, face: int, mz: int) -> None:
     """Fill the slots of one cell at the end of a row, beside an open face and no other."""
     own = (
@@ -241,7 +242,7 @@ def _open_end(src: Lattice, x: int, at: int, face: int, mz: int) -> None:
         src[i, x - VELOCITIES[i, 0], at - VELOCITIES[i, 1] * mz - VELOCITIES[i, 2]] = made[k]
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", boundscheck=False)
+@njit(fastmath=True)
 def _any_cell(src: Lattice, x: int, y: int, z: int, ny: int, nz: int, faces: IntArray, made: Lattice) -> None:
     """Fill the slots of one cell beside any faces."""
     mz, at = nz + 2, origin(nz) + y * (nz + 2) + z
@@ -256,7 +257,7 @@ def _any_cell(src: Lattice, x: int, y: int, z: int, ny: int, nz: int, faces: Int
             src[i, a, at - VELOCITIES[i, 1] * mz - VELOCITIES[i, 2]] = pulled[i]
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", boundscheck=False)
+@njit(fastmath=True)
 def fill_slots(src: Lattice, x: int, p: int, ny: int, nz: int, faces: IntArray, made: Lattice) -> None:
     """Fill the slots that the piece of plane x from p on will pull from; `made` has room for five rows of a piece."""
     nx, mz, start = src.shape[1] - 2, nz + 2, origin(nz)

@@ -8,20 +8,21 @@ are nineteen long rows and not nineteen streams at once, and it matters little h
 from __future__ import annotations
 
 import numpy as np
-from numba import float32, njit, prange
+from numba import float32
 
 from wakewise.arrays import Array, IntArray
+from wakewise.compiled import njit, prange
 from wakewise.lattice.collision import collide, collide_forced
 from wakewise.lattice.faces import fill_slots
 from wakewise.lattice.memory import LINE, copy_line, fetch_line, peek, poke, settle_stores, stream_line
 from wakewise.lattice.stencil import PERIODIC, PIECE, VELOCITIES, Lattice, box, origin
 
 _1 = float32(1.0)
-_cell = njit(cache=True, fastmath=True, error_model="numpy", boundscheck=False, inline="always")(collide)
-_forced = njit(cache=True, error_model="numpy", boundscheck=False)(collide_forced)
+_cell = njit(fastmath=True, inline="always")(collide)
+_forced = njit(collide_forced)
 
 
-@njit(cache=True, fastmath=True, error_model="numpy", boundscheck=False)
+@njit(fastmath=True)
 def _collide(src: Lattice, starts: IntArray, tau_x: float, tau_yz: Lattice, p: int, eddies: float, f: Lattice) -> None:
     """Collide the `PIECE` cells that pull population i from src[starts[i]] on, `src` flat, into f[i * PIECE] on."""
     s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11, s12, s13, s14, s15, s16, s17, s18 = (
@@ -89,7 +90,7 @@ def _collide(src: Lattice, starts: IntArray, tau_x: float, tau_yz: Lattice, p: i
         poke(f, 18 * PIECE + n, went[18])
 
 
-@njit(cache=True, parallel=True, fastmath=True, error_model="numpy", boundscheck=False)
+@njit(parallel=True, fastmath=True)
 def step(
     src: Lattice, dst: Lattice, ny: int, nz: int, tau_x: Lattice, tau_yz: Lattice, eddies: float, faces: IntArray
 ) -> None:
@@ -152,7 +153,7 @@ def wrap(f: Lattice, ny: int, nz: int, faces: IntArray) -> None:
         cells[..., 0], cells[..., -1] = cells[..., -2], cells[..., 1]
 
 
-@njit(cache=True, error_model="numpy", boundscheck=False)
+@njit
 def push(
     src: Lattice,
     dst: Lattice,
@@ -187,7 +188,7 @@ def push(
             dst[i, x, at] = went[i]
 
 
-@njit(cache=True, parallel=True, fastmath=True, error_model="numpy", boundscheck=False)
+@njit(parallel=True, fastmath=True)
 def velocity(f: Lattice, ny: int, nz: int, out: Lattice) -> None:
     """Density and velocity of all cells inside: `out`, shape (4, nx, ny, nz), gets rho - 1, ux, uy, uz."""
     mz, start = nz + 2, origin(nz)

@@ -12,10 +12,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.lattice.memory import LINE
 
 Lattice = NDArray[np.float32]
@@ -67,7 +67,7 @@ def smagorinsky_factor(constant: float) -> float:
     return 18 * math.sqrt(2) * constant**2
 
 
-@njit(cache=True)
+@njit
 def origin(nz: int) -> int:
     """Where cell (0, 0) of a plane's halo lies in its row."""
     return (-(nz + 3)) % LINE

@@ -122,7 +122,7 @@ class InstantWater:
             self._plant.step(thrusts_N, max(stop - self._time, 0.0))
             self._time = max(stop, self._time)
             if self._sensors.next_due_s() - self._time < _TOLERANCE_S:
-                self._sensors.sample(self._time, self._plant.state, self._plant.force_B_m_s2)
+                self._sensors.sample(self._time, self._plant.vector, self._plant.force_B_m_s2)
         return self._sensors.collect(self._time)
 
     def speeds_m_s(self, points_W_m: Array) -> Array:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from itertools import product
 
 import numpy as np
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 
 _NONE = np.zeros((0, 3))
 _TOUCH_M = 1e-6  # a hull that was set back onto something still touches it
@@ -34,18 +36,11 @@ class Surroundings:
         self.corners_B_m: Array = self._half * np.array(list(product((-1.0, 1.0), repeat=3)))
         self._target = np.ascontiguousarray(target_W_m, dtype=np.float64)
         self._middle = self._target.mean(axis=0)
-        self._target_at = tuple(float(v) for v in self._middle)
-        self._ball = float(np.linalg.norm(self._half)) + 2 * _TOUCH_M
         self._radius = float(np.linalg.norm(self._target - self._middle, axis=1).max())
-
-    def surely_clear(self, p_W_m: Array) -> bool:
-        """Whether a ball round the hull, about `p_W_m` (the first three numbers), is clear of everything."""
-        x, y, z = float(p_W_m[0]), float(p_W_m[1]), float(p_W_m[2])
-        reach = self._ball
-        if z + reach > self._size[2] or abs(x) + reach > self._size[0] / 2 or abs(y) + reach > self._size[1] / 2:
-            return False
-        a, b, c = self._target_at
-        return (x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2 > (reach + self._radius) ** 2
+        ball = float(np.linalg.norm(self._half)) + 2 * _TOUCH_M
+        room = (size_m[0] / 2, size_m[1] / 2, size_m[2])
+        self.packed: Array = np.array([*self._half, *room, *self._middle, self._radius, ball])
+        """What `clear` must know."""
 
     def touches(self, p_W_m: Array, R_WB: Array) -> str:
         """Name what the hull is in or on: the floor, a wall, the target, or nothing (an empty string)."""
@@ -91,3 +86,30 @@ class Surroundings:
         points = (self._target - p_W_m) @ R_WB
         inside: Array = points[np.all(np.abs(points) < self._half + margin_m, axis=1)]
         return inside
+
+
+@njit
+def clear(around: Array, p_W_m: Array, R_WB: Array) -> bool:
+    """Whether a hull, by a quick look, surely touches nothing.
+
+    `around` is `Surroundings.packed`; `p_W_m` is the hull's place (the first three numbers), `R_WB` its attitude.
+    """
+    half, room, middle, radius, ball = around[0:3], around[3:6], around[6:9], around[9], around[10]
+    away2, inside = 0.0, p_W_m[2] + ball <= room[2]
+    for k in range(2):
+        inside &= abs(p_W_m[k]) + ball <= room[k]
+    for k in range(3):
+        away2 += (p_W_m[k] - middle[k]) ** 2
+    if inside and away2 > (ball + radius) ** 2:
+        return True
+    # The box itself, against the ball round the target.
+    gap2 = 0.0
+    for i in range(3):
+        reach = along = 0.0
+        for k in range(3):
+            reach += abs(R_WB[i, k]) * half[k]
+            along += (middle[k] - p_W_m[k]) * R_WB[k, i]
+        if (p_W_m[i] if i == 2 else abs(p_W_m[i])) + reach + _TOUCH_M > room[i]:
+            return False
+        gap2 += max(abs(along) - half[i], 0.0) ** 2
+    return gap2 > (radius + math.sqrt(3.0) * _TOUCH_M) ** 2

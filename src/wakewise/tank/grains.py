@@ -12,11 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.errors import InputError
 from wakewise.physics import GRAVITY_M_S2
 
 VISCOSITY_M2_S = 1.0e-6  # of fresh water at 20 degrees
 VON_KARMAN = 0.40
+_FASTEST_M_S, _NODES = 4.0, 2049  # of a table of friction velocities
+_SUBLAYER = 11.6  # height of the viscous sublayer in nu / u*
 SAND_M = 62.5e-6  # from here on grains are sand (Wentworth 1922), which van Rijn's law is for
 
 
@@ -51,12 +54,33 @@ def friction_velocity_m_s(speed_m_s: ArrayLike, height_m: float, grain_m: float)
     z = 11.6 nu/u* the viscous sublayer u = u*^2 z / nu takes over.
     """
     speed = np.abs(np.asarray(speed_m_s, dtype=np.float64))
-    viscous = np.sqrt(speed * VISCOSITY_M2_S / height_m)
+    viscous, star = np.sqrt(speed * VISCOSITY_M2_S / height_m), _log_law_m_s(speed, height_m, grain_m)
+    return np.where(star * height_m / VISCOSITY_M2_S < _SUBLAYER, viscous, star)
+
+
+def _log_law_m_s(speed: Array, height_m: float, grain_m: float) -> Array:
     star = np.maximum(0.05 * speed, 1e-9)
     for _ in range(8):  # each round shrinks the error about tenfold
         rough = 2.5 * grain_m / 30 + VISCOSITY_M2_S / (9 * star)
         star = np.maximum(VON_KARMAN * speed / np.log(np.maximum(height_m / rough, 3.0)), 1e-9)
-    return np.where(star * height_m / VISCOSITY_M2_S < 11.6, viscous, star)
+    return star
+
+
+def friction_table_m_s(height_m: float, grain_m: float) -> Array:
+    """For `friction_from`: height, then the log law at speeds of evenly spaced roots from 0 to 4 m/s, shape (2050,)."""
+    speeds = _FASTEST_M_S * np.linspace(0.0, 1.0, _NODES) ** 2
+    return np.concatenate([[height_m], _log_law_m_s(speeds, height_m, grain_m)])
+
+
+@njit(nogil=True)
+def friction_from(table: Array, speed_m_s: float) -> float:
+    """`friction_velocity_m_s` under a speed, from a table, to 1e-4 of it; beyond 4 m/s the last slope goes on."""
+    place = math.sqrt(speed_m_s / _FASTEST_M_S) * (_NODES - 1)
+    k = min(int(place), _NODES - 2)
+    star = table[k + 1] + (place - k) * (table[k + 2] - table[k + 1])
+    if star * table[0] / VISCOSITY_M2_S < _SUBLAYER:
+        return math.sqrt(speed_m_s * VISCOSITY_M2_S / table[0])
+    return star
 
 
 def speed_at_stress_m_s(stress_over_density_m2_s2: float, height_m: float, grain_m: float) -> float:

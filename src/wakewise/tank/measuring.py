@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.interfaces import Flow, ScalarGrid, WaterTruth
 from wakewise.tank.grains import beam_attenuation_per_m, friction_velocity_m_s
 from wakewise.tank.probes import bed_points, surface_points, water_points
@@ -103,10 +104,7 @@ class TargetProbes:
         ends = self.surface_W_m[::every]
         facing = (ends - self._centre) @ (camera_W_m - self._centre) > 0.0
         ends = ends[facing] if facing.any() else ends
-        share = ((np.arange(_RAY_STEPS) + 0.5) / _RAY_STEPS)[None, :, None]
-        places = camera_W_m + share * (ends - camera_W_m)[:, None, :]
-        mean = concentration_at(silt, places.reshape(-1, 3)).reshape(len(ends), _RAY_STEPS).mean(axis=1)
-        return _attenuation(laws, float((mean * np.linalg.norm(ends - camera_W_m, axis=1)).mean()))
+        return _attenuation(laws, _along_rays(silt.values, silt.origin_W_m, silt.spacing_m, ends, camera_W_m))
 
 
 def tracer_speeds_m_s(water: Flow, starts_W_m: Array, velocities_m_s: Array, frame_s: float, bed_z_m: float) -> Array:
@@ -122,12 +120,39 @@ def tracer_speeds_m_s(water: Flow, starts_W_m: Array, velocities_m_s: Array, fra
 
 def concentration_at(silt: ScalarGrid, points_W_m: Array) -> Array:
     """Concentration at the node nearest to each point, shape (n,); zero outside the grid."""
-    node = np.rint((points_W_m - silt.origin_W_m) / silt.spacing_m).astype(np.int64)
-    shape = np.array(silt.values.shape)
-    inside = np.all((node >= 0) & (node < shape), axis=1)
-    found = np.zeros(len(points_W_m))
-    found[inside] = silt.values[tuple(node[inside].T)]
+    found: Array = _at_nodes(silt.values, silt.origin_W_m, silt.spacing_m, np.ascontiguousarray(points_W_m))
     return found
+
+
+@njit
+def _at_nodes(values: Array, origin: Array, spacing: float, points: Array) -> Array:
+    found = np.empty(points.shape[0])
+    for p in range(points.shape[0]):
+        found[p] = _at_node(values, origin, spacing, points[p, 0], points[p, 1], points[p, 2])
+    return found
+
+
+@njit
+def _at_node(values: Array, origin: Array, spacing: float, x: float, y: float, z: float) -> float:
+    i, j = round((x - origin[0]) / spacing), round((y - origin[1]) / spacing)
+    k = round((z - origin[2]) / spacing)
+    if 0 <= i < values.shape[0] and 0 <= j < values.shape[1] and 0 <= k < values.shape[2]:
+        return values[i, j, k]
+    return 0.0
+
+
+@njit
+def _along_rays(values: Array, origin: Array, spacing: float, ends: Array, eye: Array) -> float:
+    """Line integral of a field from an eye to places, shape (n, 3), by the midpoint rule; mean over them."""
+    total = 0.0
+    for r in range(ends.shape[0]):
+        dx, dy, dz = ends[r, 0] - eye[0], ends[r, 1] - eye[1], ends[r, 2] - eye[2]
+        sum_ = 0.0
+        for k in range(_RAY_STEPS):
+            s = (k + 0.5) / _RAY_STEPS
+            sum_ += _at_node(values, origin, spacing, eye[0] + s * dx, eye[1] + s * dy, eye[2] + s * dz)
+        total += sum_ / _RAY_STEPS * np.sqrt(dx * dx + dy * dy + dz * dz)
+    return total / ends.shape[0]
 
 
 def _p95(values: Array) -> float:

@@ -12,8 +12,8 @@ from wakewise.errors import InputError
 from wakewise.geometry import Pose, matrix_from_quat
 from wakewise.interfaces import BodyState
 from wakewise.physics import GRAVITY_M_S2
-from wakewise.tank.contact import Surroundings
-from wakewise.tank.settings import ThrusterFailure
+from wakewise.tank.contact import Surroundings, clear
+from wakewise.tank.settings import PLANT_STEP_S, ThrusterFailure
 from wakewise.tank.tether import Tether
 from wakewise.tank.thrust_losses import FailingThrusters, inflow_factors
 from wakewise.thrusters import saturate, thruster_lag
@@ -23,6 +23,7 @@ from wakewise.vehicles.runge_kutta import rk4_kernel
 from wakewise.water.currents import AmbientSum
 
 _GRAVITY_W_M_S2 = np.array([0.0, 0.0, GRAVITY_M_S2])
+_TIME_TOLERANCE_S = 1e-9
 
 
 class VehiclePlant:
@@ -88,6 +89,9 @@ class VehiclePlant:
         self._arms_B, self._axes_B = np.array(vehicle.thruster_positions_B_m), np.array(vehicle.thruster_axes_B)
         self._force_B_m_s2 = -_GRAVITY_W_M_S2 @ start.X_WB.R
         self._still = ambient.steady and ambient.uniform
+        self._calm = self._still and tether is None and not failures  # so that nothing is asked of between two events
+        # Velocity in the world before the last step, that step, and 1 if the hull was surely clear of everything then.
+        self._last = np.zeros(5)
         self._water_W = ambient.velocity(start.X_WB.p_m[None], 0.0)[0]
         self.contact = ""
         """What the hull was stopped by in the last step, or nothing (an empty string)."""
@@ -118,7 +122,66 @@ class VehiclePlant:
     @property
     def force_B_m_s2(self) -> Array:
         """Specific force at the body origin, mean over the last step, shape (3,): what an accelerometer there feels."""
-        return self._force_B_m_s2
+        return self._force_B_m_s2.copy()
+
+    @property
+    def vector(self) -> Array:
+        """Position, quaternion and twist, shape (13,): the true state as it is, which is not to be written to."""
+        return self._state
+
+    @property
+    def time_s(self) -> float:
+        """Sum of the steps."""
+        return self._time
+
+    def advance(self, commands_N: Array, until_s: float, inflow_W_m_s: Array | None = None) -> str:
+        """Move on to a time in steps of at most 5 ms; what the hull was stopped by on the way. Arguments as `step`."""
+        commands, touched = np.asarray(commands_N, dtype=np.float64), ""
+        while until_s - self._time > _TIME_TOLERANCE_S:
+            if self._calm and inflow_W_m_s is None:
+                self._glide(commands, until_s)
+            else:
+                self.step(commands, min(self._time + PLANT_STEP_S, until_s) - self._time, inflow_W_m_s)
+            touched = touched or self.contact
+        return touched
+
+    def _glide(self, commands_N: Array, until_s: float) -> None:
+        """Steps in steady, even water, up to a time or to where the hull may touch something."""
+        self._time = _steps_in_free_water(
+            self._packed,
+            self._allocation,
+            self._lower_N,
+            self._upper_N,
+            self._lags_s,
+            self._gains,
+            self._factors,
+            commands_N,
+            np.zeros(6),
+            self._water_W,
+            np.array([self._time, until_s, PLANT_STEP_S]),
+            self._surroundings.packed,
+            self._state,
+            self._motors_N,
+            self._impulse_N_s,
+            self._R,
+            self._last,
+            self._force_B_m_s2,
+        )
+        if self._last[4] == 0.0:
+            self._hold()
+        else:
+            self.contact = ""
+
+    def _hold(self) -> None:
+        """Set the hull back out of what it is in, and note the specific force of the last step."""
+        self.contact = ""
+        if not clear(self._surroundings.packed, self._state, self._R):
+            p, nu, self.contact = self._surroundings.held(self._state[:3].copy(), self._R, self._state[7:].copy())
+            self._state[:3], self._state[7:] = p, nu
+        dt_s = self._last[3]
+        if dt_s > 0.0:
+            rate_W = (self._R @ self._state[7:10] - self._last[:3]) / dt_s
+            self._force_B_m_s2 = (rate_W - _GRAVITY_W_M_S2) @ self._R
 
     def step(self, commands_N: Array, dt_s: float, inflow_W_m_s: Array | None = None) -> None:
         """Move on by one short time step.
@@ -144,7 +207,7 @@ class VehiclePlant:
         if self._tether is not None:
             pose = Pose(self._state[:3], self._state[3:7])
             wrench += self._tether.wrench_B(pose, self._state[7:], self._ambient, self._time)
-        v_W = self._R @ self._state[7:10]
+        self._last[:3], self._last[3] = self._R @ self._state[7:10], dt_s
         _lag_and_move(
             self._packed,
             self._allocation,
@@ -162,13 +225,8 @@ class VehiclePlant:
             self._impulse_N_s,
             self._R,
         )
-        self.contact = ""
-        if not self._surroundings.surely_clear(self._state):
-            p, nu, self.contact = self._surroundings.held(self._state[:3].copy(), self._R, self._state[7:].copy())
-            self._state[:3], self._state[7:] = p, nu
+        self._hold()
         self._time += dt_s
-        if dt_s > 0.0:
-            self._force_B_m_s2 = ((self._R @ self._state[7:10] - v_W) / dt_s - _GRAVITY_W_M_S2) @ self._R
 
     def disks(self) -> tuple[Array, Array]:
         """Where the disks are and which way positive thrust pushes, shapes (n, 3), in the world."""
@@ -177,7 +235,7 @@ class VehiclePlant:
 
     def touches(self) -> str:
         """Name what the hull, taken as a box, is in or on: the floor, a wall, the target, or nothing."""
-        if self._surroundings.surely_clear(self._state):
+        if clear(self._surroundings.packed, self._state, self._R):
             return ""
         return self._surroundings.touches(self._state[:3], self._R)
 
@@ -238,3 +296,66 @@ def _lag_and_move(
     for k in range(3):
         a, b, c = (1.0 if k == 0 else 0.0), (1.0 if k == 1 else 0.0), (1.0 if k == 2 else 0.0)
         R[0, k], R[1, k], R[2, k] = rotate(state[3], state[4], state[5], state[6], a, b, c)
+
+
+@njit(nogil=True)
+def _steps_in_free_water(
+    packed: Array,
+    allocation: Array,
+    lower_N: Array,
+    upper_N: Array,
+    lags_s: Array,
+    gains: Array,
+    factors: Array,
+    wanted_N: Array,
+    wrench_B: Array,
+    water_W: Array,
+    times_s: Array,
+    around: Array,
+    state: Array,
+    motors_N: Array,
+    impulse_N_s: Array,
+    R: Array,
+    last: Array,
+    force_B: Array,
+) -> float:
+    """Steps of `_lag_and_move` from a time until another, none longer than a third (`times_s`); the time reached.
+
+    They end where the hull may touch something (`around`). `last`, shape (5,), is written: the velocity in the world
+    before the last step, that step, and 1 if the hull was clear of everything after it; then `force_B`, too, the
+    specific force.
+    """
+    time_s, until_s = times_s[0], times_s[1]
+    while until_s - time_s > _TIME_TOLERANCE_S:
+        dt_s = min(time_s + times_s[2], until_s) - time_s
+        for i in range(3):
+            last[i] = R[i, 0] * state[7] + R[i, 1] * state[8] + R[i, 2] * state[9]
+        last[3] = dt_s
+        _lag_and_move(
+            packed,
+            allocation,
+            lower_N,
+            upper_N,
+            lags_s,
+            gains,
+            factors,
+            wanted_N,
+            wrench_B,
+            water_W,
+            dt_s,
+            state,
+            motors_N,
+            impulse_N_s,
+            R,
+        )
+        time_s += dt_s
+        last[4] = 1.0 if clear(around, state, R) else 0.0
+        if last[4] == 0.0:
+            return time_s
+    rate = np.empty(3)
+    for i in range(3):
+        now = R[i, 0] * state[7] + R[i, 1] * state[8] + R[i, 2] * state[9]
+        rate[i] = (now - last[i]) / last[3] - _GRAVITY_W_M_S2[i]
+    for i in range(3):
+        force_B[i] = R[0, i] * rate[0] + R[1, i] * rate[1] + R[2, i] * rate[2]
+    return time_s

@@ -14,18 +14,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wakewise.arrays import Array, IntArray
+from wakewise.arrays import Array
 from wakewise.interfaces import Flow, ScalarGrid
 from wakewise.tank.grains import (
     SAND_M,
     VON_KARMAN,
     erosion_rate_kg_m2_s,
-    friction_velocity_m_s,
+    friction_table_m_s,
     pickup_rate_kg_m2_s,
     settling_speed_m_s,
     threshold_stress_Pa,
 )
-from wakewise.tank.sediment_motion import carry, cells_of, mix, shared_among_nodes, stirred_cells
+from wakewise.tank.sediment_motion import (
+    carry,
+    cells_to_look_at,
+    due,
+    feel,
+    mix,
+    moved_cells,
+    settle,
+    shared_among_nodes,
+    stirred_cells,
+)
 
 CELL_M = 0.05
 SHEAR_HEIGHT_M = 0.01  # where the log law takes the water's speed from; the wall jets' slip speed stands for it
@@ -111,6 +121,7 @@ class Silt:
         self._low = -self._size[:2] / 2
         self.bed_kg_m2: Array = np.full(self._shape, load_kg_m2)
         self._star_m_s: Array = np.zeros(self._shape)
+        self._friction = friction_table_m_s(SHEAR_HEIGHT_M, laws.grain_m)
         self.position_m: Array = np.zeros((0, 3))
         self.mass_kg: Array = np.zeros(0)
         self._u_m_s: Array = np.zeros((0, 3))  # of the water at each particle when last looked at
@@ -195,16 +206,12 @@ class Silt:
         if len(self.mass_kg):
             # The lowest layer of nodes may lie on the bed: what is below it is counted there, not lost.
             origin = np.array(origin_W_m, dtype=np.float64)
-            shared_among_nodes(self.position_m, self.mass_kg, origin, float(spacing_m), values)
-        half = np.ones(shape[2])
+            shared_among_nodes(self.position_m, self.mass_kg / spacing_m**3, origin, float(spacing_m), values)
         bed = (self._size[2] - origin_W_m[2]) / spacing_m
         # A node on the bed has water only on its upper side.
         if 0 <= bed <= shape[2] - 1 and abs(bed - round(bed)) < 1e-6:
-            half[round(bed)] = 0.5
-        return ScalarGrid(origin_W_m=origin_W_m, spacing_m=spacing_m, values=values / (spacing_m**3 * half))
-
-    def _cells(self, position_m: Array) -> tuple[IntArray, IntArray]:
-        return cells_of(position_m, self._low, self._cell, *self._shape)
+            values[:, :, round(bed)] *= 2.0
+        return ScalarGrid(origin_W_m=origin_W_m, spacing_m=spacing_m, values=values)
 
     def _shear(self, flow: Flow, stirred_W_m: Array) -> None:
         """Friction velocity of every cell: from the water over it where jets reach, from the current elsewhere."""
@@ -212,29 +219,23 @@ class Silt:
         stirred_cells(np.ascontiguousarray(stirred_W_m, dtype=np.float64), self._low, self._cell, CELL_M, near)
         # A cell that stays stirred is looked at every second time, its neighbours in between.
         self._odd = 1 - self._odd
-        colour = np.add.outer(np.arange(self._shape[0]), np.arange(self._shape[1])) % 2
-        kept = near & self._looked & (colour == self._odd)
+        kept, cells, places = cells_to_look_at(
+            near, self._looked, self._odd, self._low, self._cell, float(self._size[2])
+        )
         self._looked = near
-        i, j = np.nonzero(near & ~kept)
         # Away from the jets the water moves as it does in the farthest corner.
-        points = np.full((len(i) + 1, 3), self._size[2])
-        points[0, :2] = self._low
-        points[1:, 0] = self._low[0] + (i + 0.5) * self._cell[0]
-        points[1:, 1] = self._low[1] + (j + 0.5) * self._cell[1]
-        u = flow.velocity(points)
-        star = friction_velocity_m_s(np.hypot(u[:, 0], u[:, 1]), SHEAR_HEIGHT_M, self.laws.grain_m)
-        self._star_m_s = np.where(kept, self._star_m_s, star[0])
-        self._star_m_s[i, j] = star[1:]
+        feel(self._star_m_s, kept, cells, flow.velocity(places), self._friction)
 
     def _erode(self, dt_s: float) -> None:
         """Lift whole particles, drawn so that on average each cell loses what the law says, at once."""
         laws = self.laws
-        stress = laws.water_density_kg_m3 * self._star_m_s**2
+        least = math.sqrt(laws.threshold_Pa / laws.water_density_kg_m3)
         area = float(self._cell.prod())
-        i, j = np.nonzero((stress > laws.threshold_Pa) & (self.bed_kg_m2 > 0.0))
+        i, j = moved_cells(self._star_m_s, self.bed_kg_m2, least).T
         if not len(i):
             return
-        worth = laws.lifted_kg_m2_s(stress[i, j]) * area * dt_s / self._birth_kg
+        stress = laws.water_density_kg_m3 * self._star_m_s[i, j] ** 2
+        worth = laws.lifted_kg_m2_s(stress) * area * dt_s / self._birth_kg
         lifted = np.floor(worth + self._rng.uniform(size=len(i)))
         i, j, lifted = i[lifted > 0], j[lifted > 0], lifted[lifted > 0]
         mass = np.minimum(lifted * self._birth_kg, self.bed_kg_m2[i, j] * area)
@@ -250,19 +251,16 @@ class Silt:
 
     def _carry(self, flow: Flow, dt_s: float) -> None:
         """Move with the water and sink; what sinks onto the bed stays there."""
-        position = self.position_m.copy()
+        position, mass = self.position_m.copy(), self.mass_kg.copy()
         if len(self._age_s) != len(position):
             self._u_m_s, self._age_s = np.zeros_like(position), np.full(len(position), _NEVER_S)
-        u, age = self._u_m_s, self._age_s + dt_s
-        gone = np.sqrt(np.einsum("ni,ni->n", u, u)) * age
-        look = np.flatnonzero((age > _HELD_S - 1e-9) | (gone > _HELD_M))
+        u, age, depth = self._u_m_s, self._age_s, float(self._size[2])
+        look = due(u, age, dt_s, _HELD_M, _HELD_S)
         if len(look):
-            u[look], age[look] = flow.velocity(position[look]), 0.0
-        landed = carry(position, u, self.laws.settling_m_s, dt_s, self._low, float(self._size[2]))
-        i, j = self._cells(position[landed])
-        np.add.at(self.bed_kg_m2, (i, j), self.mass_kg[landed] / float(self._cell.prod()))
-        self.position_m, self.mass_kg = position[~landed], self.mass_kg[~landed]
-        self._u_m_s, self._age_s = u[~landed], age[~landed]
+            u[look] = flow.velocity(position[look])
+        landed = carry(position, u, self.laws.settling_m_s, dt_s, self._low, depth)
+        left = settle(landed, position, mass, u, age, self.bed_kg_m2, self._low, self._cell)
+        self.position_m, self.mass_kg, self._u_m_s, self._age_s = position[:left], mass[:left], u[:left], age[:left]
 
     def _mix(self, dt_s: float) -> None:
         """Random walk with drift; the bed turns it back, since only sinking deposits (flux w_s C, Krone 1962)."""

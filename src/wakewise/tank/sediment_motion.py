@@ -11,9 +11,10 @@ import numpy as np
 
 from wakewise.arrays import Array, IntArray
 from wakewise.compiled import njit
+from wakewise.tank.grains import friction_from
 
 
-@njit
+@njit(nogil=True)
 def stirred_cells(circles: Array, low: Array, cell: Array, margin_m: float, near: np.ndarray) -> None:
     """Mark the cells of a grid, shape (nx, ny), whose centres lie in circles (x, y, radius) widened by a margin."""
     nx, ny = near.shape
@@ -35,7 +36,88 @@ def stirred_cells(circles: Array, low: Array, cell: Array, margin_m: float, near
                     near[i, j] = True
 
 
-@njit
+@njit(nogil=True)
+def cells_to_look_at(
+    near: np.ndarray, looked: np.ndarray, odd: int, low: Array, cell: Array, depth: float
+) -> tuple[np.ndarray, IntArray, Array]:
+    """Which of the stirred cells keep what they felt, which are looked at, shape (m, 2), and the places of the look.
+
+    A cell that was stirred and `looked` at keeps what it felt if it is of the colour `odd` of a chessboard; the others
+    are looked at, at the bed under their middles. The first place, shape (m + 1, 3), is the farthest corner.
+    """
+    kept = near & looked
+    cells, places = np.empty((near.size, 2), np.int64), np.empty((near.size + 1, 3))
+    places[0, 0], places[0, 1], places[0, 2] = low[0], low[1], depth
+    count = 0
+    for i in range(near.shape[0]):
+        for j in range(near.shape[1]):
+            kept[i, j] &= (i + j) % 2 == odd
+            if near[i, j] and not kept[i, j]:
+                cells[count, 0], cells[count, 1] = i, j
+                count += 1
+                places[count, 0], places[count, 1] = low[0] + (i + 0.5) * cell[0], low[1] + (j + 0.5) * cell[1]
+                places[count, 2] = depth
+    return kept, cells[:count].copy(), places[: count + 1].copy()
+
+
+@njit(nogil=True)
+def feel(star: Array, kept: np.ndarray, cells: IntArray, u: Array, table: Array) -> None:
+    """Renew the friction velocities of cells, shape (nx, ny), from the water's velocities `u` at `cells_to_look_at`."""
+    away = friction_from(table, math.sqrt(u[0, 0] ** 2 + u[0, 1] ** 2))
+    for i in range(star.shape[0]):
+        for j in range(star.shape[1]):
+            if not kept[i, j]:
+                star[i, j] = away
+    for q in range(cells.shape[0]):
+        star[cells[q, 0], cells[q, 1]] = friction_from(table, math.sqrt(u[q + 1, 0] ** 2 + u[q + 1, 1] ** 2))
+
+
+@njit(nogil=True)
+def moved_cells(star: Array, bed: Array, least: float) -> IntArray:
+    """Cells, shape (m, 2), that have a load and a friction velocity above the least."""
+    cells, count = np.empty((star.size, 2), np.int64), 0
+    for i in range(star.shape[0]):
+        for j in range(star.shape[1]):
+            if star[i, j] > least and bed[i, j] > 0.0:
+                cells[count, 0], cells[count, 1] = i, j
+                count += 1
+    return cells[:count].copy()
+
+
+@njit(nogil=True)
+def due(u: Array, age: Array, dt_s: float, held_m: float, held_s: float) -> IntArray:
+    """Particles at which the water must be looked at before a step; the ages of what the others know go on."""
+    found, count = np.empty(age.shape[0], np.int64), 0
+    for k in range(age.shape[0]):
+        age[k] += dt_s
+        speed = math.sqrt(u[k, 0] ** 2 + u[k, 1] ** 2 + u[k, 2] ** 2)
+        if age[k] > held_s - 1e-9 or speed * age[k] > held_m:
+            age[k] = 0.0
+            found[count] = k
+            count += 1
+    return found[:count].copy()
+
+
+@njit(nogil=True)
+def settle(
+    landed: np.ndarray, position: Array, mass: Array, u: Array, age: Array, bed: Array, low: Array, cell: Array
+) -> int:
+    """Put particles that have landed onto the bed, shape (nx, ny) in kg/m2, and close the ranks; how many are left."""
+    left = 0
+    for k in range(mass.shape[0]):
+        if landed[k]:
+            i = min(max(math.floor((position[k, 0] - low[0]) / cell[0]), 0), bed.shape[0] - 1)
+            j = min(max(math.floor((position[k, 1] - low[1]) / cell[1]), 0), bed.shape[1] - 1)
+            bed[i, j] += mass[k] / (cell[0] * cell[1])
+            continue
+        mass[left], age[left] = mass[k], age[k]
+        for c in range(3):
+            position[left, c], u[left, c] = position[k, c], u[k, c]
+        left += 1
+    return left
+
+
+@njit(nogil=True)
 def carry(position: Array, u: Array, settling_m_s: float, dt_s: float, low: Array, depth: float) -> np.ndarray:
     """Move particles, shape (n, 3), in place with the water and down; return which of them reached the bed.
 
@@ -54,7 +136,7 @@ def carry(position: Array, u: Array, settling_m_s: float, dt_s: float, low: Arra
     return landed
 
 
-@njit
+@njit(nogil=True)
 def mix(
     position: Array, kicks: Array, star: Array, low: Array, cell: Array, depth: float, dt_s: float, laws: Array
 ) -> None:
@@ -82,7 +164,7 @@ def mix(
         position[k, 2] = _between(position[k, 2] + drift_z * dt_s + size * kicks[k, 2], depth)
 
 
-@njit
+@njit(nogil=True)
 def shared_among_nodes(position: Array, mass: Array, origin: Array, spacing: float, values: Array) -> None:
     """Add each particle's mass to the eight nodes round it, with weights linear in the distance (cloud in cell)."""
     for k in range(mass.shape[0]):
@@ -103,18 +185,7 @@ def shared_among_nodes(position: Array, mass: Array, origin: Array, spacing: flo
                         values[i + di, j + dj, h + dh] += mass[k] * weight
 
 
-@njit
-def cells_of(position: Array, low: Array, cell: Array, nx: int, ny: int) -> tuple[IntArray, IntArray]:
-    """Indices of the cells that places, shape (n, 2 or 3), are in or nearest to."""
-    n = position.shape[0]
-    i, j = np.empty(n, np.int64), np.empty(n, np.int64)
-    for k in range(n):
-        i[k] = min(max(math.floor((position[k, 0] - low[0]) / cell[0]), 0), nx - 1)
-        j[k] = min(max(math.floor((position[k, 1] - low[1]) / cell[1]), 0), ny - 1)
-    return i, j
-
-
-@njit
+@njit(nogil=True)
 def _turned_back(x: float, half: float) -> float:
     """Mirrored into -half to half if it is beyond."""
     if x > half:
@@ -124,7 +195,7 @@ def _turned_back(x: float, half: float) -> float:
     return min(max(x, -half), half)
 
 
-@njit
+@njit(nogil=True)
 def _between(z: float, depth: float) -> float:
     """Mirrored into 0 to depth if it is beyond."""
     z = abs(z)

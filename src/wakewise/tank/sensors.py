@@ -14,8 +14,9 @@ import math
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.geometry import Pose, quat_from_rotvec, quat_multiply
-from wakewise.interfaces import BodyState, Measurement
+from wakewise.compiled import njit
+from wakewise.geometry import Pose
+from wakewise.interfaces import Measurement
 from wakewise.tank.settings import SensorSettings
 
 LEAST_CONTRAST = 0.1  # an assumption: detectors of printed marks work down to a contrast of some percent to a fifth
@@ -52,14 +53,14 @@ class Sensors:
         """When the next sample is to be taken; the first ones one period after the start."""
         return self._next_s
 
-    def sample(self, time_s: float, state: BodyState, force_B_m_s2: Array, turbidity_per_m: float = 0.0) -> None:
+    def sample(self, time_s: float, state: Array, force_B_m_s2: Array, turbidity_per_m: float = 0.0) -> None:
         """Take the samples that are due at `time_s`.
 
         Parameters
         ----------
         time_s : float
-        state : BodyState
-            True pose and twist.
+        state : ndarray, shape (13,)
+            True position, quaternion (w, x, y, z) and twist.
         force_B_m_s2 : ndarray, shape (3,)
             True specific force at the body origin.
         turbidity_per_m : float
@@ -74,30 +75,30 @@ class Sensors:
     def _soonest_s(self) -> float:
         return min((n + 1) / rate for n, rate in zip(self._taken, self._rates_hz, strict=True) if rate > 0.0)
 
-    def _pose(self, time_s: float, state: BodyState, _force: Array, turbidity_per_m: float) -> None:
+    def _pose(self, time_s: float, state: Array, _force: Array, turbidity_per_m: float) -> None:
         s = self._settings
         # Drawn whether or not it is lost, so that a lost pose leaves the noise of the next ones alone.
-        turn = quat_from_rotvec(self._pose_rng.normal(0.0, s.pose_noise_rad, 3))
+        turn = self._pose_rng.normal(0.0, s.pose_noise_rad, 3)
         shift = self._pose_rng.normal(0.0, s.pose_noise_m, 3)
         if self._pose_rng.uniform() < pose_loss(turbidity_per_m, s.pose_range_m, s.pose_dropout):
             return
         if any(begin <= time_s < end for begin, end in s.pose_outages_s):
             return
-        seen = Pose(state.X_WB.p_m + shift, quat_multiply(state.X_WB.q, turn))
+        seen = Pose(state[:3] + shift, _turned(state[3:7], turn))
         self._send(time_s + s.pose_latency_s, Measurement(time_s=time_s, X_WB=seen))
 
-    def _imu(self, time_s: float, state: BodyState, force_B_m_s2: Array, _turbidity: float) -> None:
+    def _imu(self, time_s: float, state: Array, force_B_m_s2: Array, _turbidity: float) -> None:
         s = self._settings
-        omega = state.nu_B[3:] + self._gyro_bias_B + self._gyro_rng.normal(0.0, s.gyro_noise_rad_s, 3)
+        omega = state[10:] + self._gyro_bias_B + self._gyro_rng.normal(0.0, s.gyro_noise_rad_s, 3)
         force = force_B_m_s2 + self._force_bias_B + self._force_rng.normal(0.0, s.accelerometer_noise_m_s2, 3)
         self._send(time_s, Measurement(time_s=time_s, omega_B_rad_s=omega, force_B_m_s2=force))
 
-    def _depth(self, time_s: float, state: BodyState, _force: Array, _turbidity: float) -> None:
-        depth = float(state.X_WB.p_m[2] + self._depth_rng.normal(0.0, self._settings.depth_noise_m))
+    def _depth(self, time_s: float, state: Array, _force: Array, _turbidity: float) -> None:
+        depth = float(state[2] + self._depth_rng.normal(0.0, self._settings.depth_noise_m))
         self._send(time_s, Measurement(time_s=time_s, depth_m=depth))
 
-    def _tracking(self, time_s: float, state: BodyState, _force: Array, _turbidity: float) -> None:
-        place = state.X_WB.p_m + self._tracking_rng.normal(0.0, self._settings.tracking_noise_m, 3)
+    def _tracking(self, time_s: float, state: Array, _force: Array, _turbidity: float) -> None:
+        place = state[:3] + self._tracking_rng.normal(0.0, self._settings.tracking_noise_m, 3)
         self._send(time_s + self._settings.tracking_latency_s, Measurement(time_s=time_s, p_WB_m=place))
 
     def collect(self, time_s: float) -> tuple[Measurement, ...]:
@@ -117,3 +118,17 @@ def pose_loss(turbidity_per_m: float, range_m: float, dropout: float) -> float:
     contrast = math.exp(-turbidity_per_m * range_m)
     seen = min(max(2.0 * contrast / LEAST_CONTRAST - 1.0, 0.0), 1.0)
     return 1.0 - (1.0 - dropout) * seen
+
+
+@njit
+def _turned(q: Array, turn_rad: Array) -> Array:
+    """Quaternion (w, x, y, z), shape (4,), turned further by a rotation vector, shape (3,), of its own frame."""
+    angle = math.sqrt(turn_rad[0] ** 2 + turn_rad[1] ** 2 + turn_rad[2] ** 2)
+    share = math.sin(0.5 * angle) / angle if angle > 1e-12 else 0.5
+    w, x, y, z = math.cos(0.5 * angle), share * turn_rad[0], share * turn_rad[1], share * turn_rad[2]
+    out = np.empty(4)
+    out[0] = q[0] * w - q[1] * x - q[2] * y - q[3] * z
+    out[1] = q[0] * x + q[1] * w + q[2] * z - q[3] * y
+    out[2] = q[0] * y - q[1] * z + q[2] * w + q[3] * x
+    out[3] = q[0] * z + q[1] * y - q[2] * x + q[3] * w
+    return out

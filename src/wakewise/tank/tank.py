@@ -12,12 +12,13 @@ from wakewise.errors import InputError
 from wakewise.interfaces import BodyState, Measurement, ScalarGrid, WaterTruth
 from wakewise.tank.ambient import build_ambient
 from wakewise.tank.grains import speed_at_stress_m_s
+from wakewise.tank.lane import Lane
 from wakewise.tank.measuring import TargetProbes
 from wakewise.tank.plant import VehiclePlant
 from wakewise.tank.probes import surface_points
 from wakewise.tank.sediment import SHEAR_HEIGHT_M, Silt, SiltLaws
 from wakewise.tank.sensors import Sensors
-from wakewise.tank.settings import MAX_PARCELS, MAX_SILT_PARTICLES, PLANT_STEP_S, TankSettings
+from wakewise.tank.settings import MAX_PARCELS, MAX_SILT_PARTICLES, TankSettings
 from wakewise.tank.tether import Tether
 from wakewise.targets import Target
 from wakewise.thrusters import electrical_power_W
@@ -26,6 +27,7 @@ from wakewise.water import AmbientSum
 from wakewise.water.blockage import Blockage
 from wakewise.water.closure import PLAIN, SWIRLING
 from wakewise.water.induction import impulse_velocity
+from wakewise.water.instant import Instant
 from wakewise.water.water import Water
 
 GRID_SPACING_M = 0.05
@@ -85,7 +87,7 @@ class Tank:
             failures=settings.failures,
             tether=_tether(settings),
         )
-        self.water = Water(
+        self._water = Water(
             vehicle.disk_areas_m2,
             density_kg_m3=settings.density_kg_m3,
             bed_z_m=depth,
@@ -106,8 +108,8 @@ class Tank:
             silt.threshold_Pa,
             silt.pickup,
         )
-        self.silt = Silt(laws, silt.load_kg_m2, settings.size_m, MAX_SILT_PARTICLES, silt_rng)
-        self.silt.suspend(1e-3 * silt.suspended_mg_l, target.centre_W_m)
+        self._silt = Silt(laws, silt.load_kg_m2, settings.size_m, MAX_SILT_PARTICLES, silt_rng)
+        self._silt.suspend(1e-3 * silt.suspended_mg_l, target.centre_W_m)
         _say_when_it_clears(settings, laws)
         self._stirring_speed = _STIRRING_SHARE * speed_at_stress_m_s(
             laws.threshold_Pa / settings.density_kg_m3, SHEAR_HEIGHT_M, laws.grain_m
@@ -121,10 +123,23 @@ class Tank:
         self._disks_before_m = self._plant.disks()[0]
         # The water at the disks is looked at once for each of its own steps.
         self._inflow = self.ambient.velocity(self._disks_before_m, 0.0) if settings.jets.inflow_loss else None
-        self._muddy = self.silt.total_kg > 0.0
+        self._muddy = self._silt.total_kg > 0.0
         self._touching = ""
         self._measured: WaterTruth | None = None
+        self._water_lane, self._silt_lane = Lane("water"), Lane("silt")
         self._turbidity_per_m = self._probes.turbidity_per_m(laws, self._silt_grid())
+
+    @property
+    def water(self) -> Water:
+        """The water, as it is after its last step."""
+        self._catch_up()
+        return self._water
+
+    @property
+    def silt(self) -> Silt:
+        """The silt, as it is after its last step."""
+        self._catch_up()
+        return self._silt
 
     @property
     def vehicle(self) -> Vehicle:
@@ -182,8 +197,7 @@ class Tank:
         self._touching = ""
         while end - self._time > _TIME_TOLERANCE_S:
             flow_due = (self._flow_steps + 1) * self.settings.flow_step_s
-            stop = min(self._time + PLANT_STEP_S, end, flow_due, self._sensors.next_due_s())
-            self._advance(commands, max(stop - self._time, 0.0))
+            self._advance(commands, min(end, flow_due, self._sensors.next_due_s()))
             if flow_due - self._time < _TIME_TOLERANCE_S:
                 self._move_water()
         self._touching = self._touching or self._plant.touches()
@@ -221,32 +235,46 @@ class Tank:
             inflow[i] -= impulse_velocity(origins[i : i + 1], own.position_m, own.impulse_m4_s, own.sigma_m)[0]
         return inflow
 
-    def _advance(self, commands_N: Array, dt_s: float) -> None:
-        self._plant.step(commands_N, dt_s, self._inflow)
-        self._touching = self._touching or self._plant.contact
-        self._time += dt_s
+    def _advance(self, commands_N: Array, until_s: float) -> None:
+        touched = self._plant.advance(commands_N, until_s, self._inflow)
+        self._touching = self._touching or touched
+        self._time = self._plant.time_s
         if self._sensors.next_due_s() - self._time < _TIME_TOLERANCE_S:
-            self._sensors.sample(self._time, self._plant.state, self._plant.force_B_m_s2, self._turbidity_per_m)
+            self._sensors.sample(self._time, self._plant.vector, self._plant.force_B_m_s2, self._turbidity_per_m)
 
     def _move_water(self) -> None:
+        """Send water and silt off on their steps; the vehicle goes on meanwhile, which neither of them feels.
+
+        The silt follows the water's instant, which stays what it is while the water takes its next step.
+        """
         origins, axes = self._plant.disks()
-        dt_s = self.settings.flow_step_s
-        self.water.step(dt_s, self._disks_before_m, origins, axes, self._plant.take_impulse_N_s())
+        dt_s, before, impulse_N_s = self.settings.flow_step_s, self._disks_before_m, self._plant.take_impulse_N_s()
         self._disks_before_m = origins
         self._flow_steps += 1
+        self._measured = None
+        silt_too = self._muddy and self._flow_steps % self._silt_every == self._silt_middle
+
+        def move() -> None:
+            self._water.step(dt_s, before, origins, axes, impulse_N_s)
+            if silt_too:
+                now = self._water.now
+                self._silt_lane.do(lambda: self._move_silt(now))
+
+        self._water_lane.do(move)
         if self._inflow is not None:
             self._inflow = self._inflow_W_m_s()
-        if self._muddy and self._flow_steps % self._silt_every == self._silt_middle:
-            self._move_silt()
         if self._muddy and self._flow_steps % round(_TURBIDITY_EVERY_S / dt_s) == 0:
             self._turbidity_per_m = self._probes.turbidity_per_m(self.silt.laws, self._silt_grid())
-        self._measured = None
 
-    def _move_silt(self) -> None:
+    def _move_silt(self, now: Instant) -> None:
         """Move the silt by its whole step with the water of the step's middle, which makes the step of second order."""
-        now = self.water.now
         circles = np.concatenate([now.stirred_bed(self._stirring_speed), self.ambient.stirred_bed()])
-        self.silt.step(now, circles, self._silt_every * self.settings.flow_step_s)
+        self._silt.step(now, circles, self._silt_every * self.settings.flow_step_s)
+
+    def _catch_up(self) -> None:
+        """Wait for water and silt to have done their steps."""
+        self._water_lane.wait()
+        self._silt_lane.wait()
 
 
 def tank_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSum:

@@ -10,10 +10,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import ArrayLike
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit, prange
 from wakewise.errors import InputError
 from wakewise.vehicles.dynamics import RigidBody
 from wakewise.vehicles.runge_kutta import rk4_stages
@@ -100,7 +100,7 @@ def step_batch(
     return out
 
 
-@njit(cache=True, parallel=True)
+@njit(parallel=True)
 def batch_kernel(packed: Array, states: Array, wrenches: Array, currents: Array, dt_s: float, steps: int) -> None:
     """Advance `states`, shape (N, 13), in place; `packed` and `currents` have N rows or one for all."""
     n = states.shape[0]

@@ -22,7 +22,7 @@ def rk4_kernel(packed: Array, state: Array, inputs: Array, dt_s: float) -> None:
     rk4_stages(packed, state, inputs, dt_s, np.empty((5, 13)))
 
 
-@njit(cache=True)
+@njit
 def rk4_stages(packed: Array, state: Array, inputs: Array, dt_s: float, k: Array) -> None:
     """`rk4_kernel` with its work space, shape (5, 13), given: what steps many vehicles makes one for all of them."""
     rate_kernel(packed, state, inputs, k[0])

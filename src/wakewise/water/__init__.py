@@ -4,10 +4,11 @@ The controllers' wake models (`wakewise.wake`) are not used here, nor is this ro
 truth would prove nothing. Jets are made of impulse parcels that take time to travel, entrain, merge, strike the bed
 and run out along it.
 
-Start reading in `water.py` (one step of all of it) and `instant.py` (the velocity at any points, now). `parcels.py`,
-`closure.py` and `drift.py` are a free jet, `meeting.py` jets that meet, `walljets.py` and `bedjets*.py` jets on the
-bed, `blockage.py` and `faces.py` target and walls, `clusters.py`, `induction.py` and `chunks.py` fast sums,
-`currents.py` and `current_series.py` what moves without thrusters. Laws and their sources stand beside the equations.
+Start reading in `water.py` (what callers see), `stepping.py` (one compiled step of all of it) and `instant.py` (the
+velocity at any points, now). `parcels.py`, `closure.py` and `drift.py` are a free jet, `meeting.py` jets that meet,
+`walljets.py` and `bedjets*.py` jets on the bed, `blockage.py` and `faces.py` target and walls, `clusters.py`,
+`induction.py`, `space_order.py` and `chunks.py` fast sums, `currents.py` and `current_series.py` what moves without
+thrusters. Laws and their sources stand beside the equations.
 """
 
 from wakewise.water.current_series import read_current_series

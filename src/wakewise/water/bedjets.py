@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,12 +35,9 @@ from wakewise.water.bedjets_sums import (
     log_i0s,
     log_overlap,
     sum_planes,
-    with_images,
 )
 from wakewise.water.chunks import over_points
-from wakewise.water.faces import Face, Room
 
-LEAST_RING_IMAGE_M_S = 2e-4  # images whose crest would not reach this speed at the wall are left out
 WALL_JET_SPEED = 1.16  # u_max r / sqrt(M), Rajaratnam 1976
 STRIKE_HEIGHT = 1.75  # of the parcel's sigma: 0.14 H, where the bed's pressure begins to turn the jet (Beltaos 1974)
 _LAYER_CONVECTION = 1 / math.sqrt(2)  # mean of u weighted with u over a Gaussian layer, as a share of u_max
@@ -51,6 +49,19 @@ STRENGTH = _LAYER_CONVECTION * WALL_JET_SPEED**2 / (math.sqrt(2 * math.pi) * LOG
 _MERGE_L2 = 2.0
 # Weak rings may come from farther, as long as no water is moved wrongly by more than about this.
 _MERGE_ERROR_M_S, _FARTHEST_L2 = 1.5e-3, 6.0
+
+
+class Layers(NamedTuple):
+    """Room for the rings of all planes, of which the first so many are in use; the step writes into it.
+
+    `plane`, shape (n,), is the number of each ring's plane; the others are as in `Rings`.
+    """
+
+    plane: IntArray
+    centre: Array
+    radius: Array
+    impulse: Array
+    lean: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +103,17 @@ class Rings:
         """Those that a mask or an index array picks."""
         return Rings(self.centre_m[keep], self.radius_m[keep], self.impulse_m4_s[keep], self.lean[keep])
 
+    @classmethod
+    def of(cls, layers: Layers, count: int, plane: int) -> Rings:
+        """A copy of those of the first `count` that lie on a plane."""
+        on = np.flatnonzero(layers.plane[:count] == plane)
+        return cls(layers.centre[on], layers.radius[on], layers.impulse[on], layers.lean[on])
+
+    def layers(self) -> Layers:
+        """A copy as the only plane's."""
+        copies = (a.copy() for a in (self.centre_m, self.radius_m, self.impulse_m4_s, self.lean))
+        return Layers(np.zeros(self.count, np.int64), *copies)
+
     def joined(self, later: Rings) -> Rings:
         """These followed by the later ones."""
         return Rings(
@@ -130,21 +152,30 @@ def packed_rings(rings: Rings, least_m: float = 0.0, per_height: float = 0.0, st
     """
     heading, kappa = rings.heading_kappa
     rows = np.empty((rings.count, COLUMNS))
-    _fill(rows, rings.centre_m, rings.radius_m, rings.impulse_m4_s, heading, kappa, least_m / stretch, per_height)
-    rows[:, 3] /= stretch
+    for j in range(rings.count):
+        sizes = rings.radius_m[j], rings.impulse_m4_s[j]
+        fill_row(rows[j], rings.centre_m[j], *sizes, heading[j], kappa[j], least_m, per_height, stretch)
     finish_rows(rows)
     return rows
 
 
-@njit
-def _fill(
-    rows: Array, centre: Array, R: Array, impulse: Array, heading: Array, kappa: Array, least: float, per_height: float
+@njit(nogil=True)
+def fill_row(
+    row: Array,
+    centre: Array,
+    radius: float,
+    impulse: float,
+    heading: Array,
+    kappa: float,
+    least: float,
+    per_height: float,
+    stretch: float,
 ) -> None:
-    for j in range(rows.shape[0]):
-        rows[j, 0], rows[j, 1], rows[j, 2] = centre[j, 0], centre[j, 1], R[j]
-        rows[j, 3] = STRENGTH * impulse[j] / R[j] ** 2
-        rows[j, 4], rows[j, 5], rows[j, 6] = heading[j, 0], heading[j, 1], kappa[j]
-        rows[j, 11], rows[j, 12] = least, per_height
+    """Write one row of `packed_rings`, but for what `finish_rows` fills in."""
+    row[0], row[1], row[2] = centre[0], centre[1], radius
+    row[3] = STRENGTH * impulse / radius**2 / stretch
+    row[4], row[5], row[6] = heading[0], heading[1], kappa
+    row[11], row[12] = least / stretch, per_height
 
 
 def packed_velocity(points_W_m: Array, packed: Array, bed_z_m: float, *, exact: bool = False) -> Array:
@@ -178,15 +209,6 @@ def planes_velocity(points_W_m: Array, planes: Array, starts: IntArray, packed: 
     return out
 
 
-def with_ring_images(packed: Array, face: Face, room: Room) -> Array:
-    """Packed rings on a face, and their images in the faces across it that they can reach at a speed that matters."""
-    first, second = (face.axis + 1) % 3, (face.axis + 2) % 3
-    walls = [((first, second).index(o.axis), o.at_m, o.side) for o in room.faces if o.axis != face.axis]
-    if not walls or not len(packed):
-        return packed
-    return with_images(packed, np.array(walls, dtype=np.float64), LEAST_RING_IMAGE_M_S)
-
-
 def ring_strength(rings: Rings) -> Array:
     """A of each ring in m2/s, shape (n,): such that rings sent at a steady rate add up to u_max = 1.16 sqrt(M) / r."""
     strength: Array = STRENGTH * rings.impulse_m4_s / rings.radius_m**2
@@ -200,62 +222,120 @@ def layer_speed(rings: Rings) -> Array:
     centres meet along less and less of their crests as the centres part, and hardly at all a radius apart; those that
     lean different ways lend each other speed as far as their directions overlap.
     """
-    speed = np.empty(rings.count)
-    _sum_layers(rings.centre_m, rings.radius_m, ring_strength(rings), *rings.heading_kappa, speed)
+    speed: Array = layer_speeds(rings.layers(), rings.count)
     return speed
 
 
 def grown(
     rings: Rings, current_m_s: Array, dt_s: float, least_m: float = 0.0, stretch: float = 1.0
 ) -> tuple[Rings, Array]:
-    """Rings after dt_s, and the layer speed they had, shape (n,). Exact in dt for a speed that falls as 1/R.
+    """Rings of one plane after dt_s, and the layer speed they had, shape (n,); see `grow_layers`.
 
-    The current carries the centres: velocity in the face's frame, shape (3,) or (n, 3). `least_m` and `stretch` as in
-    `packed_rings`.
+    The current is a velocity in the plane's frame, shape (3,) or (n, 3).
     """
-    thin = WALL_JET_SPREAD * rings.radius_m
-    speed = layer_speed(rings) * thin / np.hypot(stretch * thin, least_m)
-    radius = np.sqrt(rings.radius_m**2 + 2 * rings.radius_m * _LAYER_CONVECTION * speed * dt_s)
-    centre = rings.centre_m + current_m_s[..., :2] * dt_s
-    return Rings(centre, radius, rings.impulse_m4_s, rings.lean), speed
+    layers, speed = rings.layers(), np.empty(rings.count)
+    current = np.ascontiguousarray(np.broadcast_to(current_m_s, (rings.count, 3)))
+    grow_layers(layers, rings.count, current, np.array([least_m]), np.array([stretch]), dt_s, speed)
+    return Rings.of(layers, rings.count, 0), speed
 
 
 def coarsened(rings: Rings) -> Rings:
-    """Rings that are near each other in centre, radius and direction made one.
+    """Rings of one plane that are near each other made one; see `merge_layers`."""
+    layers = rings.layers()
+    return Rings.of(layers, merge_layers(layers, rings.count), 0)
+
+
+@njit(nogil=True)
+def kept_rings(layers: Layers, count: int, keep: np.ndarray) -> int:
+    """Close the ranks: of the first `count`, only those that a mask picks stay; how many they are."""
+    left = 0
+    for j in range(count):
+        if keep[j]:
+            layers.plane[left], layers.radius[left] = layers.plane[j], layers.radius[j]
+            layers.impulse[left] = layers.impulse[j]
+            layers.centre[left], layers.lean[left] = layers.centre[j], layers.lean[j]
+            left += 1
+    return left
+
+
+@njit(nogil=True)
+def layer_speeds(layers: Layers, count: int) -> Array:
+    """As `layer_speed`, each among those of its own plane."""
+    out, per_L = np.empty(count), 1.0 / LOG_WIDTH
+    heading, kappa = leaning(layers.lean[:count])
+    centre, radius, plane = layers.centre, layers.radius, layers.plane
+    logs, bessel = np.log(radius[:count]), log_i0s(kappa)
+    strength = STRENGTH * layers.impulse[:count] / radius[:count] ** 2
+    out[:] = strength
+    for i in range(count):
+        for j in range(i + 1, count):
+            apart = (logs[i] - logs[j]) * per_L
+            alike = 0.5 * apart * apart
+            if alike >= 12.0 or plane[i] != plane[j]:
+                continue
+            dx, dy = centre[i, 0] - centre[j, 0], centre[i, 1] - centre[j, 1]
+            off = 2.0 * (dx * dx + dy * dy)
+            for_i, for_j = alike + off / (radius[i] * radius[i]), alike + off / (radius[j] * radius[j])
+            if min(for_i, for_j) >= 12.0:
+                continue
+            shared = log_overlap(heading[i], kappa[i], bessel[i], heading[j], kappa[j], bessel[j])
+            if for_i < 12.0:
+                out[i] += strength[j] * math.exp(shared - for_i)
+            if for_j < 12.0:
+                out[j] += strength[i] * math.exp(shared - for_j)
+    for i in range(count):
+        out[i] /= radius[i]
+    return out
+
+
+@njit(nogil=True)
+def grow_layers(
+    layers: Layers, count: int, current_m_s: Array, least_m: Array, stretch: Array, dt_s: float, speed_m_s: Array
+) -> None:
+    """Let rings run out for dt_s, in place. Exact in dt for a speed that falls as 1/R.
+
+    Parameters
+    ----------
+    layers : Layers
+    count : int
+    current_m_s : ndarray, shape (count, 3)
+        Velocity of the current in each ring's plane's frame, which carries the centres.
+    least_m, stretch : ndarray, one of each plane
+        As in `packed_rings`.
+    dt_s : float
+    speed_m_s : ndarray, shape (count,)
+        Layer speed that they had; written.
+    """
+    speeds = layer_speeds(layers, count)
+    for j in range(count):
+        R, plane = layers.radius[j], layers.plane[j]
+        thin = WALL_JET_SPREAD * R
+        speed_m_s[j] = speeds[j] * thin / math.sqrt((stretch[plane] * thin) ** 2 + least_m[plane] ** 2)
+        layers.radius[j] = math.sqrt(R * R + 2 * R * _LAYER_CONVECTION * speed_m_s[j] * dt_s)
+        for k in range(2):
+            layers.centre[j, k] += current_m_s[j, k] * dt_s
+
+
+@njit(nogil=True)
+def merge_layers(layers: Layers, count: int) -> int:
+    """Rings of a plane that are near each other in centre, radius and direction made one; how many are left.
 
     Kept are their impulse, the part of it along the plane, the centre of impulse, and the flow that they carry, which
-    goes with impulse over radius.
+    goes with impulse over radius. Each ring may take up an older one close to it, and one that took part waits for the
+    next time.
     """
-    if rings.count < 2:
-        return rings
-    keep = np.ones(rings.count, dtype=np.bool_)
-    centre, radius, impulse, lean = (a.copy() for a in (rings.centre_m, rings.radius_m, rings.impulse_m4_s, rings.lean))
-    speed = ring_strength(rings) / radius
-    if not _merge_rings(centre, radius, impulse, lean, *rings.heading_kappa, speed, keep):
-        return rings
-    return Rings(centre, radius, impulse, lean).take(keep)
-
-
-@njit
-def _merge_rings(
-    centre: Array,
-    radius: Array,
-    impulse: Array,
-    lean: Array,
-    heading: Array,
-    kappa: Array,
-    speed: Array,
-    keep: np.ndarray,
-) -> bool:
-    """Let each ring take up an older one close to it; a ring that took part waits for the next time."""
-    n = radius.shape[0]
-    free, found = np.ones(n, np.bool_), False
-    logs, bessel, per_L2 = np.log(radius), log_i0s(kappa), LOG_WIDTH**-2
-    for b in range(n - 1, 0, -1):
+    if count < 2:
+        return count
+    centre, radius, impulse, lean = layers.centre, layers.radius, layers.impulse, layers.lean
+    free, keep, found = np.ones(count, np.bool_), np.ones(count, np.bool_), False
+    heading, kappa = leaning(lean[:count])
+    logs, bessel, per_L2 = np.log(radius[:count]), log_i0s(kappa), LOG_WIDTH**-2
+    speed = STRENGTH * impulse[:count] / radius[:count] ** 3
+    for b in range(count - 1, 0, -1):
         if not free[b]:
             continue
         for a in range(b - 1, -1, -1):
-            if not free[a]:
+            if not free[a] or layers.plane[a] != layers.plane[b]:
                 continue
             dx, dy = centre[a, 0] - centre[b, 0], centre[a, 1] - centre[b, 1]
             apart2 = per_L2 * ((logs[a] - logs[b]) ** 2 + (dx * dx + dy * dy) / min(radius[a], radius[b]) ** 2)
@@ -269,37 +349,12 @@ def _merge_rings(
                 continue
             total = impulse[a] + impulse[b]
             share = impulse[a] / total
-            centre[b] = share * centre[a] + (1 - share) * centre[b]
-            lean[b] = share * lean[a] + (1 - share) * lean[b]
+            for k in range(2):
+                centre[b, k] = share * centre[a, k] + (1 - share) * centre[b, k]
+                lean[b, k] = share * lean[a, k] + (1 - share) * lean[b, k]
             radius[b] = 1.0 / (share / radius[a] + (1 - share) / radius[b])
             impulse[b] = total
             keep[a] = free[a] = free[b] = False
             found = True
             break
-    return found
-
-
-@njit
-def _sum_layers(centre: Array, radius: Array, strength: Array, heading: Array, kappa: Array, out: Array) -> None:
-    """For each ring, strengths weighted with nearness in log radius, centre and direction, over its radius."""
-    n, per_L = radius.shape[0], 1.0 / LOG_WIDTH
-    logs, bessel = np.log(radius), log_i0s(kappa)
-    out[:] = strength
-    for i in range(n):
-        for j in range(i + 1, n):
-            apart = (logs[i] - logs[j]) * per_L
-            alike = 0.5 * apart * apart
-            if alike >= 12.0:
-                continue
-            dx, dy = centre[i, 0] - centre[j, 0], centre[i, 1] - centre[j, 1]
-            off = 2.0 * (dx * dx + dy * dy)
-            for_i, for_j = alike + off / (radius[i] * radius[i]), alike + off / (radius[j] * radius[j])
-            if min(for_i, for_j) >= 12.0:
-                continue
-            shared = log_overlap(heading[i], kappa[i], bessel[i], heading[j], kappa[j], bessel[j])
-            if for_i < 12.0:
-                out[i] += strength[j] * math.exp(shared - for_i)
-            if for_j < 12.0:
-                out[j] += strength[i] * math.exp(shared - for_j)
-    for i in range(n):
-        out[i] /= radius[i]
+    return kept_rings(layers, count, keep) if found else count

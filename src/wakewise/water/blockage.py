@@ -11,17 +11,43 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from wakewise.arrays import Array, IntArray, freeze
 from wakewise.compiled import njit
 from wakewise.targets import Target
-from wakewise.water.induction import FixedSources, smooth_share
+from wakewise.water.chunks import over_points
+from wakewise.water.induction import SINGLE, FixedSources, smooth_share, sum_sources
+from wakewise.water.space_order import in_space
 
 _POINTS = 480
 _SOURCES = 160
 _DAMPING = 1e-4  # of the mean square singular value: strengths stay of the order of the flow
+
+
+class BodyRows(NamedTuple):
+    """A `Blockage` as the compiled step takes it; of no body all are empty.
+
+    `points` and `normals`, shape (k, 3), are as in `Blockage`, and `answers`, shape (k, s), its response the other way
+    round; `sources`, shape (4, 2 s), are the sources' places and one over their sizes, images after originals, and
+    `per_area`, shape (s,), is one over their sizes squared. `ball`, shape (4,), is the middle and how far it is felt.
+    """
+
+    points: Array
+    normals: Array
+    answers: Array
+    sources: np.ndarray
+    per_area: Array
+    ball: Array
+    constants: np.ndarray
+
+    @classmethod
+    def none(cls) -> BodyRows:
+        """No body."""
+        v = np.zeros((0, 3))
+        return cls(v, v, np.zeros((0, 0)), np.zeros((4, 0), np.float32), np.zeros(0), np.zeros(4), SINGLE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +72,7 @@ class Blockage:
     sigmas_m: Array
     response: Array
     bed_z_m: float
-    _both: FixedSources = field(init=False, repr=False)
-    _middle: Array = field(init=False, repr=False)
-    _reach_m: float = field(init=False, repr=False)
+    rows: BodyRows = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         k, s = len(self.points_m), len(self.sigmas_m)
@@ -56,49 +80,55 @@ class Blockage:
         images[:, 2] = 2 * self.bed_z_m - images[:, 2]
         both = FixedSources(np.concatenate([self.sources_m, images]), np.tile(self.sigmas_m, 2))
         middle = np.mean(self.points_m, axis=0)
-        object.__setattr__(self, "_both", both)
-        object.__setattr__(self, "_middle", middle)
-        object.__setattr__(self, "_reach_m", 4.0 * float(np.linalg.norm(self.points_m - middle, axis=1).max()))
+        reach = 4.0 * float(np.linalg.norm(self.points_m - middle, axis=1).max())
+        rows = BodyRows(
+            np.ascontiguousarray(self.points_m, dtype=np.float64),
+            np.ascontiguousarray(self.normals, dtype=np.float64),
+            np.ascontiguousarray(self.response.T, dtype=np.float64),
+            both.columns,
+            1.0 / self.sigmas_m**2,
+            np.array([*middle, reach]),
+            SINGLE,
+        )
+        object.__setattr__(self, "rows", rows)
         freeze(self, points_m=(k, 3), normals=(k, 3), sources_m=(s, 3), sigmas_m=(s,), response=(s, k))
 
     @classmethod
     def of(cls, target: Target) -> Blockage:
         """For a target on its bed; the same target always gives the same sources."""
         points, normals, area = _surface(target, _POINTS, np.random.default_rng(0))
+        order = in_space(points)  # which suits the sums over jets there
+        points, normals = points[order], normals[order]
         inner, inward, _ = _surface(target, _SOURCES, np.random.default_rng(1))
         # Deep enough to lie inside the body, where they may make water: half ball flow is then right to 6 %.
         size = math.sqrt(area / _SOURCES)
         sigmas = np.full(_SOURCES, 0.5 * size)
         sources = inner - 0.8 * size * inward
         across = _across(points, normals, sources, sigmas, target.bed_z_m)
-        # Least squares over strengths that sum to zero: work in the space across (1, ..., 1).
-        closed = np.eye(_SOURCES) - 1.0 / _SOURCES
-        M = across @ closed
-        normal = M.T @ M
-        damping = _DAMPING * float(np.trace(normal)) / _SOURCES
-        response = -(closed @ np.linalg.solve(normal + damping * np.eye(_SOURCES), M.T))
+        response = _least_squares(across, _DAMPING)
         return cls(points, normals, sources, sigmas, response, target.bed_z_m)
 
     def strengths_m3_s(self, undisturbed_m_s: Array) -> Array:
         """Source strengths, shape (s,), for the velocity that there would be at `points_m` without the body."""
-        strengths: Array = self.response @ np.einsum("ni,ni->n", undisturbed_m_s, self.normals)
+        strengths: Array = answer(self.rows, np.ascontiguousarray(undisturbed_m_s))
         return strengths
 
     def near(self, points_W_m: Array) -> IntArray:
         """Indices of the points, shape (n, 3), that are within four times the body's radius."""
-        return _near(points_W_m, self._middle, self._reach_m)
+        near: IntArray = near_body(self.rows, points_W_m)
+        return near
 
     def velocity(self, points_W_m: Array, strengths_m3_s: Array) -> Array:
         """What the sources add, shape (n, 3), at points, shape (n, 3); nothing beyond four times the body's radius."""
         out = np.zeros_like(points_W_m)
-        self.add_velocity(points_W_m, self.near(points_W_m), strengths_m3_s, out)
+        self.add_velocity(points_W_m, strengths_m3_s, out)
         return out
 
-    def add_velocity(self, points_W_m: Array, near: IntArray, strengths_m3_s: Array, out: Array) -> None:
-        """Add to `out` what the sources add at some of the points."""
-        if len(near):
-            both = np.concatenate([strengths_m3_s, strengths_m3_s])
-            out[near] += self._both.velocity(points_W_m[near], both)
+    def add_velocity(self, points_W_m: Array, strengths_m3_s: Array, out: Array) -> None:
+        """Add to `out` what the sources add, both shape (n, 3)."""
+        points = np.ascontiguousarray(points_W_m, dtype=np.float64)
+        cost = len(points) * self.rows.sources.shape[1] // 4
+        over_points(lambda some, result: add_body(self.rows, some, strengths_m3_s, result), points, out, cost)
 
     def leakage(self, undisturbed_m_s: Array) -> float:
         """Root mean square velocity across the surface with the body's answer, over that without it."""
@@ -108,16 +138,92 @@ class Blockage:
         return float(np.sqrt(np.mean(after**2) / max(np.mean(before**2), 1e-30)))
 
 
-@njit
-def _near(points: Array, middle: Array, reach: float) -> IntArray:
+@njit(nogil=True)
+def answer(body: BodyRows, undisturbed_m_s: Array) -> Array:
+    """Strengths, shape (s,): see `Blockage.strengths_m3_s`. In one order, whatever the number of threads."""
+    out = np.zeros(body.answers.shape[1])
+    for p in range(body.answers.shape[0]):
+        across = 0.0
+        for k in range(3):
+            across += undisturbed_m_s[p, k] * body.normals[p, k]
+        unit = body.answers[p]
+        for i in range(out.shape[0]):
+            out[i] += unit[i] * across
+    return out
+
+
+@njit(nogil=True)
+def near_body(body: BodyRows, points: Array) -> IntArray:
+    """Indices of the points, shape (n, 3), that feel the body."""
     found = np.empty(points.shape[0], np.int64)
     count = 0
     for p in range(points.shape[0]):
-        dx, dy, dz = points[p, 0] - middle[0], points[p, 1] - middle[1], points[p, 2] - middle[2]
-        if dx * dx + dy * dy + dz * dz < reach * reach:
+        dx, dy, dz = points[p, 0] - body.ball[0], points[p, 1] - body.ball[1], points[p, 2] - body.ball[2]
+        if dx * dx + dy * dy + dz * dz < body.ball[3] ** 2:
             found[count] = p
             count += 1
     return found[:count]
+
+
+@njit(nogil=True)
+def add_body(body: BodyRows, points: Array, strengths_m3_s: Array, out: Array) -> None:
+    """Add to `out` what the body's sources add at points, both shape (n, 3)."""
+    near = near_body(body, points)
+    if near.shape[0] == 0:
+        return
+    some, result = np.empty((near.shape[0], 3), np.float32), np.empty((near.shape[0], 3))
+    for q in range(near.shape[0]):
+        for k in range(3):
+            some[q, k] = points[near[q], k]
+    s = strengths_m3_s.shape[0]
+    both = np.empty(2 * s, np.float32)
+    for i in range(s):
+        both[i] = both[s + i] = strengths_m3_s[i] * body.per_area[i]
+    S = body.sources
+    sum_sources(some, S[0], S[1], S[2], both, S[3], body.constants, result)
+    for q in range(near.shape[0]):
+        for k in range(3):
+            out[near[q], k] += result[q, k]
+
+
+@njit
+def _least_squares(across: Array, damping: float) -> Array:
+    """Strengths, shape (s, k), that leave least of a unit velocity across the surface at each point.
+
+    `across`, shape (k, s), is what unit strengths make there. Strengths sum to zero: the search is in the space across
+    (1, ..., 1). By Cholesky's way, written out: a library's sums would depend on the number of threads.
+    """
+    k, s = across.shape
+    M = across.copy()
+    for p in range(k):
+        M[p] -= across[p].mean()
+    L, trace = np.zeros((s, s)), 0.0
+    for p in range(k):
+        for i in range(s):
+            trace += M[p, i] ** 2
+            for j in range(i + 1):
+                L[i, j] += M[p, i] * M[p, j]
+    for i in range(s):
+        L[i, i] += damping * trace / s
+    for j in range(s):
+        for i in range(j, s):
+            for n in range(j):
+                L[i, j] -= L[i, n] * L[j, n]
+            L[i, j] = math.sqrt(L[j, j]) if i == j else L[i, j] / L[j, j]
+    out = np.empty((s, k))
+    x = np.empty(s)
+    for p in range(k):
+        for i in range(s):
+            x[i] = -M[p, i]
+            for n in range(i):
+                x[i] -= L[i, n] * x[n]
+            x[i] /= L[i, i]
+        for i in range(s - 1, -1, -1):
+            for n in range(i + 1, s):
+                x[i] -= L[n, i] * x[n]
+            x[i] /= L[i, i]
+        out[:, p] = x - x.mean()
+    return out
 
 
 def _across(points: Array, normals: Array, sources: Array, sigmas: Array, bed_z_m: float) -> Array:

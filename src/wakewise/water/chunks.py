@@ -7,25 +7,28 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache
+from typing import TypeVar
 
-from wakewise.arrays import Array
+from wakewise.arrays import Array, IntArray
 
-_CHUNK = 192  # least points of a piece
-_BLOCKS = 64
+A = TypeVar("A", Array, IntArray)
+
+_CHUNK = 256  # least points of a piece
+_BLOCKS = 256
 _THREADED_PAIRS = 700_000  # about 0.7 ms of work; below it threads cost more than they save
 _MOST = 8  # threads
 _PIECES = 4  # per thread: they are not all as long
 
 
-def over_points(kernel: Callable[[Array, Array], None], points: Array, out: Array, pairs: int) -> None:
-    """Call `kernel(points, out)` on all points, in pieces on several threads if there are many pairs.
+def over_points(kernel: Callable[[A, A], None], points: A, out: A, pairs: int) -> None:
+    """Call `kernel(points, out)` on all points or indices, in pieces on several threads if there are many pairs.
 
     The kernel must release the interpreter's lock and compute each row of `out` from its own point alone, or from its
-    own block of successive points whose length divides 64; then the result does not depend on the pieces. The caller
+    own group of successive points whose length divides 256; then the result does not depend on the pieces. The caller
     takes pieces, too: a thread that only waited would leave its core to the one that it has just woken, and the others
     idle for the milliseconds that all this takes.
     """
-    if pairs < _THREADED_PAIRS or len(points) < 2 * _CHUNK or (workers := min(os.cpu_count() or 1, _MOST)) == 1:
+    if pairs < _THREADED_PAIRS or len(points) < 2 * _CHUNK or (workers := min(cores(), _MOST)) == 1:
         kernel(points, out)
         return
     # Whole blocks: kernels may look up to `_BLOCKS` successive points up together.
@@ -49,6 +52,13 @@ def over_points(kernel: Callable[[Array, Array], None], points: Array, out: Arra
         wait(begun)
     for other in begun:
         other.result()
+
+
+@cache
+def cores() -> int:
+    """How many cores this process may use."""
+    there = os.cpu_count() or 1
+    return min(there, len(os.sched_getaffinity(0))) if hasattr(os, "sched_getaffinity") else there
 
 
 @cache

@@ -2,25 +2,27 @@
 
 Impulses in one cell of a coarse grid, alike in size, form a cluster. From far off it acts as one dipole: the sum of its
 impulses, at their centre weighted with their sizes, which is right to first order in the cluster's size over the
-distance where they are parallel, as along a jet. Points are taken in blocks of neighbours; for each block a cluster is
-far if the block lies beyond `_OPENING` of its radii and beyond `_DIPOLE` sigma of its largest impulse (a Gaussian
-impulse is a dipole to 1e-3 there). Dipoles that are farther off than `_SERIES` of the block's own radii are not summed
-at every point either: their velocity in the block is a power series about its middle, of second order, which has no
-divergence and no curl, as the whole has none. What a sum comes to depends on the list of points only, never on the
-number of threads.
+distance where they are parallel, as along a jet. Points are taken in groups of blocks of neighbours. For a group or a
+block a cluster is far if it lies beyond `_OPENING` of its radii and beyond `_DIPOLE` sigma of its largest impulse (a
+Gaussian impulse is a dipole to 1e-3 there); of one that is not, each impulse is looked at alone. Dipoles that are
+farther off than `_SERIES` of the group's or block's own radii are not summed at every point either: their velocity
+there is a power series about the middle, of second order, which has no divergence and no curl, as the whole has none.
+What a sum comes to depends on the list of points only, never on the number of threads.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from wakewise.arrays import Array, IntArray
 from wakewise.compiled import njit
 from wakewise.water.chunks import over_points
-from wakewise.water.induction import SINGLE, impulse_sums, impulse_velocity
+from wakewise.water.induction import SINGLE, impulse_velocity
+from wakewise.water.space_order import FEW_POINTS, sorted_keys
 
 _CELL_M = 0.35
 _SMALL_M = 0.07  # sigmas below this and above it are never in one cluster
@@ -28,59 +30,13 @@ _OPENING = 2.5
 _DIPOLE = 4.2
 _SERIES = 3.0
 _BLOCK = 32
+_GROUP = 256
 _FEW_SOURCES = 150  # and
-_FEW_POINTS = 40  # below which clusters are not worth their making
-_SIDE = 32  # cells along each side of the cube in which points are put in order
-_KEYS = 65536  # keys of two bytes are sorted digit by digit, which is quick
-
-
-def in_space(points_W_m: Array) -> IntArray:
-    """Order, shape (n,), in which points that follow each other are mostly neighbours in space: along Hilbert's curve.
-
-    J. Skilling 2004, Programming the Hilbert curve, AIP Conf. Proc. 707, 381, doi 10.1063/1.1751381.
-    """
-    if len(points_W_m) < _FEW_POINTS:
-        return np.arange(len(points_W_m))
-    key = np.empty(len(points_W_m), dtype=np.uint16)
-    _hilbert(np.ascontiguousarray(points_W_m, dtype=np.float64), key)
-    order: IntArray = np.argsort(key, kind="stable")
-    return order
-
-
-@njit
-def _hilbert(points: Array, key: np.ndarray) -> None:
-    low, high = points[0].copy(), points[0].copy()
-    for p in range(points.shape[0]):
-        for k in range(3):
-            low[k], high[k] = min(low[k], points[p, k]), max(high[k], points[p, k])
-    size = max(high[0] - low[0], high[1] - low[1], high[2] - low[2], 1e-9) * (1.0 + 1e-9)
-    x = np.zeros(3, np.int64)
-    for p in range(points.shape[0]):
-        for k in range(3):
-            x[k] = int((points[p, k] - low[k]) / size * _SIDE)
-        bit = _SIDE // 2
-        while bit > 1:
-            for k in range(3):
-                if x[k] & bit:
-                    x[0] ^= bit - 1
-                else:
-                    t = (x[0] ^ x[k]) & (bit - 1)
-                    x[0] ^= t
-                    x[k] ^= t
-            bit //= 2
-        x[1] ^= x[0]
-        x[2] ^= x[1]
-        t, bit = 0, _SIDE // 2
-        while bit > 1:
-            if x[2] & bit:
-                t ^= bit - 1
-            bit //= 2
-        at, bit = 0, _SIDE // 2
-        while bit > 0:
-            for k in range(3):
-                at = 2 * at + (1 if (x[k] ^ t) & bit else 0)
-            bit //= 2
-        key[p] = at
+_KEYS = 65536  # of two bytes
+_COLUMNS = 12
+_SINGLE = np.float32
+_ONE, _THREE, _FIVE, _SEVEN = _SINGLE(1.0), _SINGLE(3.0), _SINGLE(5.0), _SINGLE(7.0)
+_ZERO, _HALF, _PER_4_PI = _SINGLE(0.0), _SINGLE(0.5), _SINGLE(1 / (4 * math.pi))
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,12 +47,11 @@ class ImpulseField:
     ----------
     positions_m, impulses_m4_s : ndarray, shape (k, 3)
     sigmas_m : ndarray, shape (k,)
-    rows : ndarray of float32, shape (7, k)
-        As the kernel takes them: position, impulse over sigma cubed, one over sigma; by cluster.
+    rows : ndarray of float32, shape (k + c, 12)
+        As the kernel takes them, impulses by cluster and then the clusters: position, impulse over sigma cubed, one
+        over sigma, impulse, the distance beyond which it is a dipole, and nothing.
     starts : ndarray of int, shape (c + 1,)
-        Cluster i has the rows from starts[i] to starts[i + 1].
-    clusters : ndarray, shape (c, 7)
-        Centre, impulse, and the distance beyond which it is far.
+        Cluster i has the impulses from starts[i] to starts[i + 1]. Of few impulses there are no clusters.
     """
 
     positions_m: Array
@@ -104,23 +59,20 @@ class ImpulseField:
     sigmas_m: Array
     rows: np.ndarray
     starts: IntArray
-    clusters: Array
 
     @classmethod
     def of(cls, positions_m: Array, impulses_m4_s: Array, sigmas_m: Array) -> ImpulseField:
         """Sort impulses into clusters."""
-        if len(sigmas_m) < _FEW_SOURCES:
-            empty = np.zeros((7, 0), np.float32), np.zeros(1, np.int64), np.zeros((0, 7))
-            return cls(positions_m, impulses_m4_s, sigmas_m, *empty)
-        key = np.empty(len(sigmas_m), np.uint16)
-        _cells(positions_m, sigmas_m, key)
-        order = np.argsort(key, kind="stable")
-        rows, starts, clusters = _clusters(positions_m, impulses_m4_s, sigmas_m, key, order)
-        return cls(positions_m, impulses_m4_s, sigmas_m, rows, starts, clusters)
+        return cls(positions_m, impulses_m4_s, sigmas_m, *clustered(positions_m, impulses_m4_s, sigmas_m))
+
+    @property
+    def clusters(self) -> int:
+        """How many there are."""
+        return len(self.starts) - 1
 
     def velocity(self, points_W_m: Array) -> Array:
         """Velocity in m/s, shape (n, 3), at points, shape (n, 3), best in the order of `in_space`."""
-        if len(self.clusters) == 0 or len(points_W_m) < _FEW_POINTS:
+        if self.clusters == 0 or len(points_W_m) < FEW_POINTS:
             return impulse_velocity(points_W_m, self.positions_m, self.impulses_m4_s, self.sigmas_m)
         out = np.zeros((len(points_W_m), 3))
         points = np.ascontiguousarray(points_W_m, dtype=np.float64)
@@ -128,15 +80,64 @@ class ImpulseField:
         return out
 
     def pairs(self, points: int) -> int:
-        """How many pairs of point and impulse take as long as a sum at so many points; 0 if it is not clustered."""
-        return points * len(self.sigmas_m) // 4 if len(self.clusters) and points >= _FEW_POINTS else 0
+        """How many pairs of point and impulse take as long as a sum at so many points."""
+        return points * len(self.sigmas_m) // 4
 
     def write(self, points_W_m: Array, out: Array) -> None:
         """Write the velocity at points into `out`, both shape (n, 3), on this thread."""
-        _sum(points_W_m, self.rows, self.starts, self.clusters, SINGLE, out)
+        sum_field(points_W_m, self.rows, self.starts, SINGLE, out)
 
 
-@njit
+@njit(nogil=True)
+def clustered(X: Array, m: Array, sigma: Array) -> tuple[np.ndarray, IntArray]:
+    """Rows of an `ImpulseField`, and where each cluster starts."""
+    n = sigma.shape[0]
+    few = n < _FEW_SOURCES
+    key = np.zeros(n, np.uint16)
+    if not few:
+        _cells(X, sigma, key)
+    order = np.arange(n) if few else sorted_keys(key)
+    starts = np.zeros(n + 1, np.int64)
+    count = 0
+    for i in range(n):
+        if not few and (i == 0 or key[order[i]] != key[order[i - 1]]):
+            starts[count] = i
+            count += 1
+    starts[count] = n if count else 0
+    rows = np.zeros((n + count, _COLUMNS), np.float32)
+    for i in range(n):
+        j = order[i]
+        inverse = 1.0 / sigma[j]
+        cubed = inverse * inverse * inverse
+        for k in range(3):
+            rows[i, k], rows[i, 3 + k], rows[i, 7 + k] = X[j, k], m[j, k] * cubed, m[j, k]
+        rows[i, 6], rows[i, 10] = inverse, _DIPOLE * sigma[j]
+    middle, whole = np.empty(3), np.empty(3)
+    for c in range(count):
+        total, widest, reach2 = 1e-30, 0.0, 0.0
+        middle[:], whole[:] = 0.0, 0.0
+        for i in range(starts[c], starts[c + 1]):
+            j = order[i]
+            size = math.sqrt(m[j, 0] ** 2 + m[j, 1] ** 2 + m[j, 2] ** 2) + 1e-30
+            total += size
+            widest = max(widest, sigma[j])
+            for k in range(3):
+                middle[k] += size * X[j, k]
+                whole[k] += m[j, k]
+        for k in range(3):
+            middle[k] /= total
+            rows[n + c, k], rows[n + c, 7 + k] = middle[k], whole[k]
+        for i in range(starts[c], starts[c + 1]):
+            away2 = 0.0
+            for k in range(3):
+                away2 += (X[order[i], k] - middle[k]) ** 2
+            reach2 = max(reach2, away2)
+        reach = math.sqrt(reach2)
+        rows[n + c, 10] = max(_OPENING * reach, reach + _DIPOLE * widest)
+    return rows, starts[: count + 1].copy()
+
+
+@njit(nogil=True)
 def _cells(X: Array, sigma: Array, key: np.ndarray) -> None:
     """Which cell each impulse is in; cells grow where there would be more than keys."""
     low, high = X[0].copy(), X[0].copy()
@@ -156,185 +157,219 @@ def _cells(X: Array, sigma: Array, key: np.ndarray) -> None:
         key[j] = 2 * at + (1 if sigma[j] > _SMALL_M else 0)
 
 
-@njit
-def _clusters(X: Array, m: Array, sigma: Array, key: np.ndarray, order: IntArray) -> tuple[np.ndarray, IntArray, Array]:
-    """Rows and clusters of an `ImpulseField`, and where each cluster starts."""
-    n = order.shape[0]
-    rows, starts = np.empty((7, n), np.float32), np.empty(n + 1, np.int64)
-    count = 0
-    for i in range(n):
-        j = order[i]
-        if i == 0 or key[j] != key[order[i - 1]]:
-            starts[count] = i
-            count += 1
-        inverse = 1.0 / sigma[j]
-        cubed = inverse * inverse * inverse
-        for k in range(3):
-            rows[k, i], rows[3 + k, i] = X[j, k], m[j, k] * cubed
-        rows[6, i] = inverse
-    starts[count] = n
-    out = np.zeros((count, 7))
-    for c in range(count):
-        total, widest, reach2 = 1e-30, 0.0, 0.0
-        for i in range(starts[c], starts[c + 1]):
-            j = order[i]
-            size = math.sqrt(m[j, 0] ** 2 + m[j, 1] ** 2 + m[j, 2] ** 2) + 1e-30
-            total += size
-            widest = max(widest, sigma[j])
-            for k in range(3):
-                out[c, k] += size * X[j, k]
-                out[c, 3 + k] += m[j, k]
-        for k in range(3):
-            out[c, k] /= total
-        for i in range(starts[c], starts[c + 1]):
-            away2 = 0.0
-            for k in range(3):
-                away2 += (X[order[i], k] - out[c, k]) ** 2
-            reach2 = max(reach2, away2)
-        reach = math.sqrt(reach2)
-        out[c, 6] = max(_OPENING * reach, reach + _DIPOLE * widest)
-    return rows, starts[: count + 1].copy(), out
-
-
 @njit(nogil=True, fastmath=True)
-def _sum(points: Array, rows: np.ndarray, starts: IntArray, clusters: Array, K: np.ndarray, out: Array) -> None:
-    near, far = np.empty((7, rows.shape[1]), np.float32), np.empty((6, rows.shape[1]), np.float32)
-    farther = np.empty((6, clusters.shape[0]), np.float32)
-    some, result = np.empty((_BLOCK, 3), np.float32), np.empty((_BLOCK, 3))
-    for block in range(0, points.shape[0], _BLOCK):
-        n = min(_BLOCK, points.shape[0] - block)
-        centre, about = np.zeros(3), 0.0
-        for k in range(3):
-            low = high = points[block, k]
+def sum_field(points: Array, rows: np.ndarray, starts: IntArray, K: np.ndarray, out: Array) -> None:
+    """Write the velocity of clustered impulses at points, shape (n, 3), into `out`; of few, one by one."""
+    many = starts.shape[0] - 1
+    impulses = rows.shape[0] - many
+    lanes, wide, narrow = np.zeros((6, _BLOCK), np.float32), np.empty(16, np.float32), np.empty(16, np.float32)
+    left, near = np.empty(many + 1, np.int64), np.arange(impulses + 1)
+    far, farther = np.empty(rows.shape[0] + 1, np.int64), np.empty(rows.shape[0] + 1, np.int64)
+    beside = np.empty((6, rows.shape[0]), np.float32)
+    # Of few, or at few points, each is summed at each.
+    plain = many == 0 or points.shape[0] < FEW_POINTS
+    middle, centre = np.empty(3, np.float32), np.empty(3, np.float32)
+    for group in range(0, points.shape[0], _GROUP):
+        end = min(group + _GROUP, points.shape[0])
+        about = _ball(points, group, end, middle)
+        series2 = (_SINGLE(_SERIES) * about) ** 2
+        farthers = lefts = 0
+        # Both lists are written to, whichever it is: quicker than a branch that cannot be foreseen.
+        for i in range(0 if plain else many):
+            j = impulses + i
+            away2 = _away2(rows, j, middle)
+            gone = away2 > series2 and away2 > (rows[j, 10] + about) ** 2
+            farther[farthers], left[lefts] = j, i
+            farthers, lefts = farthers + (1 if gone else 0), lefts + (0 if gone else 1)
+        _series(rows, farther, farthers, middle, beside, wide)
+        for block in range(group, end, _BLOCK):
+            n = min(_BLOCK, end - block)
+            about = _ball(points, block, block + n, centre)
+            if plain:
+                middle[:], centre[:] = _ZERO, _ZERO  # then what a point gets depends on no other
+            # Lengths are counted from the block's centre: single precision then loses nothing of nearby distances.
             for p in range(n):
-                low, high = min(low, points[block + p, k]), max(high, points[block + p, k])
-            centre[k] = 0.5 * (low + high)
-            about += (0.5 * (high - low)) ** 2
-        about = math.sqrt(about)
-        # Lengths are counted from the block's centre: single precision then loses nothing of nearby distances.
-        for p in range(n):
-            for k in range(3):
-                some[p, k] = points[block + p, k] - centre[k]
-        nears = fars = farthers = 0
-        series = _SERIES * about
-        for i in range(clusters.shape[0]):
-            dx, dy, dz = clusters[i, 0] - centre[0], clusters[i, 1] - centre[1], clusters[i, 2] - centre[2]
-            away = math.sqrt(dx * dx + dy * dy + dz * dz)
-            if away - about <= clusters[i, 6]:
-                for j in range(starts[i], starts[i + 1]):
-                    dx, dy, dz = rows[0, j] - centre[0], rows[1, j] - centre[1], rows[2, j] - centre[2]
-                    size = 1.0 / rows[6, j]
-                    away = math.sqrt(dx * dx + dy * dy + dz * dz)
-                    if away - about > _DIPOLE * size:
-                        cubed = size * size * size
-                        far[0, fars], far[1, fars], far[2, fars] = dx, dy, dz
-                        for k in range(3, 6):
-                            far[k, fars] = rows[k, j] * cubed
-                        fars += 1
-                        continue
-                    near[0, nears], near[1, nears], near[2, nears] = dx, dy, dz
-                    for k in range(3, 7):
-                        near[k, nears] = rows[k, j]
-                    nears += 1
-            elif away > series:
-                farther[0, farthers], farther[1, farthers], farther[2, farthers] = dx, dy, dz
-                for k in range(3, 6):
-                    farther[k, farthers] = clusters[i, k]
-                farthers += 1
-            else:
-                far[0, fars], far[1, fars], far[2, fars] = dx, dy, dz
-                for k in range(3, 6):
-                    far[k, fars] = clusters[i, k]
-                fars += 1
-        impulse_sums(
-            some[:n],
-            near[0, :nears],
-            near[1, :nears],
-            near[2, :nears],
-            near[3, :nears],
-            near[4, :nears],
-            near[5, :nears],
-            near[6, :nears],
-            K,
-            result[:n],
-        )
-        _add_dipoles(some[:n], far, fars, result[:n])
-        _add_series(some[:n], farther, farthers, result[:n])
-        out[block : block + n] = result[:n]
+                lanes[0, p], lanes[1, p] = points[block + p, 0] - centre[0], points[block + p, 1] - centre[1]
+                lanes[2, p] = points[block + p, 2] - centre[2]
+            lanes[3:] = _ZERO
+            nears, fars, farthers = impulses if plain else 0, 0, 0
+            series2 = (_SINGLE(_SERIES) * about) ** 2
+            for q in range(lefts):
+                j = impulses + left[q]
+                away2 = _away2(rows, j, centre)
+                if away2 > (rows[j, 10] + about) ** 2:
+                    farther[farthers] = far[fars] = j
+                    gone = away2 > series2
+                    farthers, fars = farthers + (1 if gone else 0), fars + (0 if gone else 1)
+                    continue
+                for i in range(starts[left[q]], starts[left[q] + 1]):
+                    away2 = _away2(rows, i, centre)
+                    close, gone = away2 <= (rows[i, 10] + about) ** 2, away2 > series2
+                    near[nears] = far[fars] = farther[farthers] = i
+                    nears += 1 if close else 0
+                    farthers += 1 if gone and not close else 0
+                    fars += 0 if gone or close else 1
+            _series(rows, farther, farthers, centre, beside, narrow)
+            some = (n + 7) // 8 * 8  # the compiler works on eight at once
+            X, Y, Z, U, V, W = lanes[0], lanes[1], lanes[2], lanes[3], lanes[4], lanes[5]
+            _add_impulses(some, X, Y, Z, rows, near, nears, centre, K, U, V, W)
+            _add_dipoles(some, X, Y, Z, rows, far, fars, centre, U, V, W)
+            x, y, z = centre[0] - middle[0], centre[1] - middle[1], centre[2] - middle[2]
+            _add_series(some, X, Y, Z, narrow, _ZERO, _ZERO, _ZERO, U, V, W)
+            _add_series(some, X, Y, Z, wide, x, y, z, U, V, W)
+            for p in range(n):
+                out[block + p, 0], out[block + p, 1], out[block + p, 2] = U[p], V[p], W[p]
 
 
 @njit(inline="always")
-def _add_dipoles(points: np.ndarray, far: np.ndarray, count: int, out: Array) -> None:
+def _away2(rows: np.ndarray, j: int, centre: np.ndarray) -> Any:
+    dx, dy, dz = rows[j, 0] - centre[0], rows[j, 1] - centre[1], rows[j, 2] - centre[2]
+    return dx * dx + dy * dy + dz * dz
+
+
+@njit(inline="always")
+def _ball(points: Array, first: int, end: int, centre: np.ndarray) -> Any:
+    """Write the middle of the box round some points into `centre`; the radius of the ball round the box."""
+    about = 0.0
+    for k in range(3):
+        low = high = points[first, k]
+        for p in range(first, end):
+            low, high = min(low, points[p, k]), max(high, points[p, k])
+        centre[k] = 0.5 * (low + high)
+        about += (0.5 * (high - low)) ** 2
+    return _SINGLE(math.sqrt(about) * 1.000001 + 1e-6)
+
+
+@njit(inline="always")
+def _add_impulses(
+    n: int,
+    X: Array,
+    Y: Array,
+    Z: Array,
+    rows: np.ndarray,
+    near: IntArray,
+    count: int,
+    centre: np.ndarray,
+    K: np.ndarray,
+    U: Array,
+    V: Array,
+    W: Array,
+) -> None:
+    """As `induction.impulse_sums`, for one impulse after another at a block of points side by side."""
+    p0, p1, p2, p3, p4, p5, p6, p7, p8, p9 = K[0], K[1], K[2], K[3], K[4], K[5], K[6], K[7], K[8], K[9]
+    e0, e1, e2, e3, e4, e5, e6, e7, e8 = K[10], K[11], K[12], K[13], K[14], K[15], K[16], K[17], K[18]
+    one, half_more, two, per_scale = K[19], K[20], K[21], K[22]
+    for q in range(count):
+        j = near[q]
+        x, y, z, s = rows[j, 0] - centre[0], rows[j, 1] - centre[1], rows[j, 2] - centre[2], rows[j, 6]
+        mx, my, mz = rows[j, 3], rows[j, 4], rows[j, 5]
+        for i in range(n):
+            dx, dy, dz = (X[i] - x) * s, (Y[i] - y) * s, (Z[i] - z) * s
+            w = one / (one + (dx * dx + dy * dy + dz * dz) * per_scale)
+            p = ((((((((p9 * w + p8) * w + p7) * w + p6) * w + p5) * w + p4) * w + p3) * w + p2) * w + p1) * w + p0
+            slope = (((((((e8 * w + e7) * w + e6) * w + e5) * w + e4) * w + e3) * w + e2) * w + e1) * w + e0
+            t = half_more * p + w * slope
+            r = two * w * math.sqrt(w)
+            across = r * (p - (one - w) * t)
+            along = per_scale * r * w * t * (mx * dx + my * dy + mz * dz)
+            U[i] += across * mx + along * dx
+            V[i] += across * my + along * dy
+            W[i] += across * mz + along * dz
+
+
+@njit(inline="always")
+def _add_dipoles(
+    n: int,
+    X: Array,
+    Y: Array,
+    Z: Array,
+    rows: np.ndarray,
+    far: IntArray,
+    count: int,
+    centre: np.ndarray,
+    U: Array,
+    V: Array,
+    W: Array,
+) -> None:
     """Velocity (3 (m.d) d / d^2 - m) / (4 pi d^3) of each dipole."""
-    zero = points[0, 0] - points[0, 0]
-    one, three, scale = np.float32(1.0), np.float32(3.0), np.float32(1 / (4 * math.pi))
-    X, Y, Z, MX, MY, MZ = far[0], far[1], far[2], far[3], far[4], far[5]
-    for p in range(points.shape[0]):
-        x, y, z = points[p, 0], points[p, 1], points[p, 2]
-        u = v = w = zero
-        for j in range(count):
-            dx, dy, dz = x - X[j], y - Y[j], z - Z[j]
-            mx, my, mz = MX[j], MY[j], MZ[j]
-            per_d2 = one / (dx * dx + dy * dy + dz * dz)
-            per_d3 = scale * per_d2 * math.sqrt(per_d2)
-            along = three * per_d2 * (mx * dx + my * dy + mz * dz)
-            u += per_d3 * (along * dx - mx)
-            v += per_d3 * (along * dy - my)
-            w += per_d3 * (along * dz - mz)
-        out[p, 0] += u
-        out[p, 1] += v
-        out[p, 2] += w
+    for q in range(count):
+        j = far[q]
+        x, y, z = rows[j, 0] - centre[0], rows[j, 1] - centre[1], rows[j, 2] - centre[2]
+        mx, my, mz = rows[j, 7], rows[j, 8], rows[j, 9]
+        for p in range(n):
+            dx, dy, dz = X[p] - x, Y[p] - y, Z[p] - z
+            per_d2 = _ONE / (dx * dx + dy * dy + dz * dz)
+            per_d3 = _PER_4_PI * per_d2 * math.sqrt(per_d2)
+            along = _THREE * per_d2 * (mx * dx + my * dy + mz * dz)
+            U[p] += per_d3 * (along * dx - mx)
+            V[p] += per_d3 * (along * dy - my)
+            W[p] += per_d3 * (along * dz - mz)
 
 
 @njit(inline="always")
-def _add_series(points: np.ndarray, far: np.ndarray, count: int, out: Array) -> None:
-    """Dipoles' velocity as a power series about 0: their potential's derivatives there up to the fourth.
+def _series(
+    rows: np.ndarray, far: IntArray, count: int, centre: np.ndarray, beside: np.ndarray, out: np.ndarray
+) -> None:
+    """Sum the power series about a centre of dipoles' velocity: their potential's derivatives there up to the fourth.
 
     With e = -d / |d| towards the dipole at d, and m.e = a, the velocity's derivatives are, over 4 pi |d|^3,
     u = 3 a e - m;  in l: -(15 a e e_l - 3 (m e_l + e m_l + a I_l)) / |d|;  in l and k likewise, over |d|^2.
     """
-    zero = points[0, 0] - points[0, 0]
-    one, three, five, seven = np.float32(1.0), np.float32(3.0), np.float32(5.0), np.float32(7.0)
-    scale, half = np.float32(1 / (4 * math.pi)), np.float32(0.5)
-    X, Y, Z, MX, MY, MZ = far[0], far[1], far[2], far[3], far[4], far[5]
-    u0 = v0 = w0 = gxx = gyy = gxy = gxz = gyz = zero
-    hxxx = hyyy = hzzz = hxxy = hxxz = hxyy = hyyz = hxzz = hyzz = hxyz = zero
-    for j in range(count):
-        mx, my, mz = MX[j], MY[j], MZ[j]
-        per_d2 = one / (X[j] * X[j] + Y[j] * Y[j] + Z[j] * Z[j])
+    X, Y, Z, MX, MY, MZ = beside[0], beside[1], beside[2], beside[3], beside[4], beside[5]
+    for q in range(count):
+        j = far[q]
+        X[q], Y[q], Z[q] = centre[0] - rows[j, 0], centre[1] - rows[j, 1], centre[2] - rows[j, 2]
+        MX[q], MY[q], MZ[q] = rows[j, 7], rows[j, 8], rows[j, 9]
+    u0 = v0 = w0 = gxx = gyy = gxy = gxz = gyz = _ZERO
+    hxxx = hyyy = hzzz = hxxy = hxxz = hxyy = hyyz = hxyz = _ZERO
+    for q in range(count):
+        x, y, z, mx, my, mz = X[q], Y[q], Z[q], MX[q], MY[q], MZ[q]
+        per_d2 = _ONE / (x * x + y * y + z * z)
         per_d = math.sqrt(per_d2)
-        ex, ey, ez = -X[j] * per_d, -Y[j] * per_d, -Z[j] * per_d
+        ex, ey, ez = x * per_d, y * per_d, z * per_d
         a = mx * ex + my * ey + mz * ez
-        s = scale * per_d * per_d2
-        u0 += s * (three * a * ex - mx)
-        v0 += s * (three * a * ey - my)
-        w0 += s * (three * a * ez - mz)
-        s *= three * per_d
-        b = five * a
+        s = _PER_4_PI * per_d * per_d2
+        u0 += s * (_THREE * a * ex - mx)
+        v0 += s * (_THREE * a * ey - my)
+        w0 += s * (_THREE * a * ez - mz)
+        s *= _THREE * per_d
+        b = _FIVE * a
         gxx += s * (mx * ex + mx * ex + a - b * ex * ex)
         gyy += s * (my * ey + my * ey + a - b * ey * ey)
         gxy += s * (mx * ey + my * ex - b * ex * ey)
         gxz += s * (mx * ez + mz * ex - b * ex * ez)
         gyz += s * (my * ez + mz * ey - b * ey * ez)
         s *= per_d
-        b = seven * a
+        b = _SEVEN * a
         # 3 [35 a e e e - 5 (m e e + ..) - 5 a (I e + ..) + (m I + ..)], s holds the 3.
-        hxxx += s * (three * mx + five * (ex * ex * (b * ex - three * mx) - three * a * ex))
-        hyyy += s * (three * my + five * (ey * ey * (b * ey - three * my) - three * a * ey))
-        hzzz += s * (three * mz + five * (ez * ez * (b * ez - three * mz) - three * a * ez))
-        hxxy += s * (my + five * (ex * (ex * (b * ey - my) - mx * ey - mx * ey) - a * ey))
-        hxxz += s * (mz + five * (ex * (ex * (b * ez - mz) - mx * ez - mx * ez) - a * ez))
-        hxyy += s * (mx + five * (ey * (ey * (b * ex - mx) - my * ex - my * ex) - a * ex))
-        hyyz += s * (mz + five * (ey * (ey * (b * ez - mz) - my * ez - my * ez) - a * ez))
-        hxyz += s * five * (b * ex * ey * ez - mx * ey * ez - my * ex * ez - mz * ex * ey)
+        hxxx += s * (_THREE * mx + _FIVE * (ex * ex * (b * ex - _THREE * mx) - _THREE * a * ex))
+        hyyy += s * (_THREE * my + _FIVE * (ey * ey * (b * ey - _THREE * my) - _THREE * a * ey))
+        hzzz += s * (_THREE * mz + _FIVE * (ez * ez * (b * ez - _THREE * mz) - _THREE * a * ez))
+        hxxy += s * (my + _FIVE * (ex * (ex * (b * ey - my) - mx * ey - mx * ey) - a * ey))
+        hxxz += s * (mz + _FIVE * (ex * (ex * (b * ez - mz) - mx * ez - mx * ez) - a * ez))
+        hxyy += s * (mx + _FIVE * (ey * (ey * (b * ex - mx) - my * ex - my * ex) - a * ex))
+        hyyz += s * (mz + _FIVE * (ey * (ey * (b * ez - mz) - my * ez - my * ez) - a * ez))
+        hxyz += s * _FIVE * (b * ex * ey * ez - mx * ey * ez - my * ex * ez - mz * ex * ey)
+    out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7] = u0, v0, w0, gxx, gyy, gxy, gxz, gyz
+    out[8], out[9], out[10], out[11], out[12], out[13], out[14] = hxxx, hyyy, hzzz, hxxy, hxxz, hxyy, hyyz
+    out[15] = hxyz
+
+
+@njit(inline="always")
+def _add_series(
+    n: int, X: Array, Y: Array, Z: Array, c: np.ndarray, x0: Any, y0: Any, z0: Any, U: Array, V: Array, W: Array
+) -> None:
+    """Add a power series; its middle lies at minus (x0, y0, z0)."""
+    u0, v0, w0, gxx, gyy, gxy, gxz, gyz = c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]
+    hxxx, hyyy, hzzz, hxxy, hxxz, hxyy, hyyz, hxyz = c[8], c[9], c[10], c[11], c[12], c[13], c[14], c[15]
     # The potential has no Laplacian: what is left follows.
     gzz = -gxx - gyy
     hxzz, hyzz = -hxxx - hxyy, -hxxy - hyyy
-    for p in range(points.shape[0]):
-        x, y, z = points[p, 0], points[p, 1], points[p, 2]
-        xx, yy, zz = half * x * x, half * y * y, half * z * z
+    for p in range(n):
+        x, y, z = X[p] + x0, Y[p] + y0, Z[p] + z0
+        xx, yy, zz = _HALF * x * x, _HALF * y * y, _HALF * z * z
         xy, xz, yz = x * y, x * z, y * z
         u, v, w = u0 + gxx * x + gxy * y + gxz * z, v0 + gxy * x + gyy * y + gyz * z, w0 + gxz * x + gyz * y + gzz * z
-        out[p, 0] += u + hxxx * xx + hxyy * yy + hxzz * zz + hxxy * xy + hxxz * xz + hxyz * yz
-        out[p, 1] += v + hxxy * xx + hyyy * yy + hyzz * zz + hxyy * xy + hxyz * xz + hyyz * yz
-        out[p, 2] += w + hxxz * xx + hyyz * yy + hzzz * zz + hxyz * xy + hxzz * xz + hyzz * yz
+        U[p] += u + hxxx * xx + hxyy * yy + hxzz * zz + hxxy * xy + hxxz * xz + hxyz * yz
+        V[p] += v + hxxy * xx + hyyy * yy + hyzz * zz + hxyy * xy + hxyz * xz + hyyz * yz
+        W[p] += w + hxxz * xx + hyyz * yy + hzzz * zz + hxyz * xy + hxzz * xz + hyzz * yz

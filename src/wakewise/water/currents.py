@@ -38,7 +38,9 @@ class SteadyCurrent:
 
     def velocity(self, points_W_m: Array, time_s: float) -> Array:  # noqa: ARG002
         """Velocity of the water, shape (n, 3)."""
-        return np.tile(self.velocity_W_m_s, (len(points_W_m), 1))
+        out = np.empty((len(points_W_m), 3))
+        out[:] = self.velocity_W_m_s
+        return out
 
 
 def wave_number_per_m(period_s: float, depth_m: float) -> float:

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from wakewise.arrays import Array, IntArray
+from wakewise.arrays import Array
 from wakewise.compiled import njit
 
 LEAST_IMAGE_M_S = 5e-5
@@ -97,42 +97,57 @@ class Room:
             faces += [Face(f"wall {'xy'[axis]}{'-+'[side > 0]}", axis, side, side * half) for side in (-1, 1)]
         return cls(tuple(face for face in faces if math.isfinite(face.at_m)))
 
+    @cached_property
+    def walls(self) -> Array:
+        """Axis, place, side and the speed that an image must reach there, of each face in order, shape (k, 4)."""
+        rows = [(f.axis, f.at_m, f.side, 0.0 if f.name == "bed" else LEAST_IMAGE_M_S) for f in self.faces]
+        return np.array(rows, dtype=np.float64).reshape(-1, 4)
+
     def with_images(self, positions_m: Array, impulses_m4_s: Array, sigmas_m: Array) -> tuple[Array, Array, Array]:
         """Impulses and those of their images that matter: positions, impulses, sizes.
 
         Faces across one axis mirror what the faces across the others have made, so that edges and corners hold too;
         opposite faces do not mirror each other's images, which lie at least the tank's size away.
         """
-        X, m, sigma = positions_m, impulses_m4_s, sigmas_m
-        if not len(sigma):
-            return X, m, sigma
-        for axis in (2, 1, 0):
-            faces = [face for face in self.faces if face.axis == axis]
-            if faces:
-                at, side = np.array([face.at_m for face in faces]), np.array([face.side for face in faces])
-                least = np.array([0.0 if face.name == "bed" else LEAST_IMAGE_M_S for face in faces])
-                X, m, sigma = _mirror(X, m, sigma, axis, at, side, least)
-        return X, m, sigma
+        images: tuple[Array, Array, Array] = mirrored(positions_m, impulses_m4_s, sigmas_m, self.walls)
+        return images
 
 
-@njit
-def _mirror(
-    X: Array, m: Array, sigma: Array, axis: int, at: Array, side: IntArray, least: Array
-) -> tuple[Array, Array, Array]:
-    """Append images in parallel faces; a dipole m at distance h sends at most 2 m / (4 pi h^3) across a face."""
-    n, faces = sigma.shape[0], at.shape[0]
-    places, impulses = np.empty(((1 + faces) * n, 3)), np.empty(((1 + faces) * n, 3))
-    sizes = np.empty((1 + faces) * n)
+@njit(nogil=True)
+def mirrored(X: Array, m: Array, sigma: Array, walls: Array) -> tuple[Array, Array, Array]:
+    """Append images in faces; a dipole m at distance h sends at most 2 m / (4 pi h^3) across a face."""
+    n = sigma.shape[0]
+    room = 4 * n
+    places, impulses, sizes = np.empty((room, 3)), np.empty((room, 3)), np.empty(room)
     places[:n], impulses[:n], sizes[:n] = X, m, sigma
     count = n
-    for f in range(faces):
-        for j in range(n):
-            gap = max(side[f] * (at[f] - X[j, axis]), 1e-6)
-            length = math.sqrt(m[j, 0] ** 2 + m[j, 1] ** 2 + m[j, 2] ** 2)
-            if length <= 2 * math.pi * least[f] * gap**3:
+    for axis in (2, 1, 0):
+        first = count
+        for f in range(walls.shape[0]):
+            if walls[f, 0] != axis:
                 continue
-            places[count], impulses[count], sizes[count] = X[j], m[j], sigma[j]
-            places[count, axis] = 2 * at[f] - X[j, axis]
-            impulses[count, axis] = -m[j, axis]
-            count += 1
+            at, side, least = walls[f, 1], walls[f, 2], walls[f, 3]
+            if count + first > room:
+                room = 2 * (count + first)
+                places, impulses = longer(places, room), longer(impulses, room)
+                sizes = longer(sizes.reshape(-1, 1), room).ravel()
+            for j in range(first):
+                gap = max(side * (at - places[j, axis]), 1e-6)
+                length2 = impulses[j, 0] ** 2 + impulses[j, 1] ** 2 + impulses[j, 2] ** 2
+                if length2 <= (2 * math.pi * least * gap * gap * gap) ** 2:
+                    continue
+                for k in range(3):
+                    places[count, k], impulses[count, k] = places[j, k], impulses[j, k]
+                places[count, axis] = 2 * at - places[j, axis]
+                impulses[count, axis] = -impulses[j, axis]
+                sizes[count] = sizes[j]
+                count += 1
     return places[:count], impulses[:count], sizes[:count]
+
+
+@njit(nogil=True)
+def longer(rows: Array, room: int) -> Array:
+    """A copy of rows, shape (n, k), with room for so many; what is new is not set."""
+    out = np.empty((room, rows.shape[1]))
+    out[: rows.shape[0]] = rows
+    return out

@@ -64,13 +64,14 @@ class FixedSources:
     """Sources that stay where they are: positions (k, 3), sizes (k,); only their strengths change."""
 
     def __init__(self, positions_m: Array, sigmas_m: Array) -> None:
-        self._columns = [np.ascontiguousarray(column, dtype=np.float32) for column in positions_m.T]
-        self._inverse = np.ascontiguousarray(1.0 / sigmas_m, dtype=np.float32)
+        self.columns = np.ascontiguousarray(np.vstack([positions_m.T, 1.0 / sigmas_m]), dtype=np.float32)
         self._per_area = 1.0 / sigmas_m**2
 
     def velocity(self, points_W_m: Array, strengths_m3_s: Array) -> Array:
         """Velocity, shape (n, 3), at points, shape (n, 3)."""
-        return _sum(_sources, points_W_m, [*self._columns, strengths_m3_s * self._per_area, self._inverse], exact=False)
+        return _sum(
+            sum_sources, points_W_m, [*self.columns[:3], strengths_m3_s * self._per_area, self.columns[3]], exact=False
+        )
 
 
 def _sum(kernel: Any, points_W_m: Array, rows: list[Any], exact: bool) -> Array:
@@ -127,7 +128,8 @@ def impulse_sums(
 
 
 @njit(nogil=True, fastmath=True)
-def _sources(points: Array, X: Array, Y: Array, Z: Array, Q: Array, S: Array, K: Array, out: Array) -> None:
+def sum_sources(points: Array, X: Array, Y: Array, Z: Array, Q: Array, S: Array, K: Array, out: Array) -> None:
+    """Write the velocity of sources over sigma squared (Q), of sizes 1 / S, at each point into `out`."""
     p0, p1, p2, p3, p4, p5, p6, p7, p8, p9 = K[0], K[1], K[2], K[3], K[4], K[5], K[6], K[7], K[8], K[9]
     one, per_scale = K[19], K[22]
     for i in range(points.shape[0]):

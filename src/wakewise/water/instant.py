@@ -11,15 +11,18 @@ from functools import cached_property
 import numpy as np
 from scipy.special import i0
 
-from wakewise.arrays import Array
+from wakewise.arrays import Array, IntArray
 from wakewise.interfaces import Current
 from wakewise.water.bedjets import Rings, layer_speed
 from wakewise.water.bedjets_sums import LOG_WIDTH, REACH
 from wakewise.water.blockage import Blockage
 from wakewise.water.chunks import over_points
-from wakewise.water.clusters import ImpulseField, in_space
+from wakewise.water.clusters import ImpulseField
 from wakewise.water.faces import Room
+from wakewise.water.induction import SINGLE
 from wakewise.water.parcels import CENTRE_SPEED, Parcels, gusty_impulse_m4_s
+from wakewise.water.space_order import in_space
+from wakewise.water.stepping import flow_at
 from wakewise.water.walljets import WallRows
 
 
@@ -86,31 +89,16 @@ class Instant:
 
     def jets(self, points: Array) -> Array:
         """Free jets and wall jets with their images, without the body's answer, shape (n, 3)."""
-        # In an order that suits both sums.
-        order = in_space(points)
-        sorted_points = np.ascontiguousarray(points[order])
         field, rows, bed = self._field, self._rows, self._bed
-        pairs = field.pairs(len(points))
-        if not pairs:
-            sums = field.velocity(sorted_points)
-            sums[sorted_points[:, 2] == bed, 2] = 0.0  # there is only rounding
-            sums += rows.velocity(sorted_points)
-        else:
-            sums = np.zeros_like(sorted_points)
+        points = np.ascontiguousarray(points, dtype=np.float64)
+        u = np.empty_like(points)
 
-            def both(some: Array, result: Array) -> None:
-                field.write(some, result)
-                result[some[:, 2] == bed, 2] = 0.0
-                rows.add(some, result)
+        def some(order: IntArray, _: IntArray) -> None:
+            flow_at(points, order, field.rows, field.starts, rows.planes, rows.starts, rows.packed, bed, SINGLE, u)
 
-            over_points(both, sorted_points, sums, pairs + rows.pairs(len(points)))
-        u = np.empty_like(sums)
-        u[order] = sums
+        order = in_space(points)
+        over_points(some, order, order, field.pairs(len(points)) + rows.pairs(len(points)))
         return u
-
-    def answer_to_jets(self) -> Array:
-        """Strengths in m3/s of the body's sources against the jets, shape (s,); none without a body."""
-        return self._answer_to_jets
 
     def stirred_bed(self, least_speed_m_s: float) -> Array:
         """Circles (x, y, radius), shape (n, 3), round the bed where jets may be faster than a speed."""
@@ -155,12 +143,10 @@ class Instant:
     def _turned_aside(self, points: Array, u: Array, *, jets: bool, ambient: bool) -> Array:
         """Add the body's answer to the jets and to the ambient water, if any point is near enough to feel it."""
         body = self._body
-        if body is None:
+        if body is None or not len(body.near(points)):
             return u
-        near = body.near(points)
-        if len(near):
-            u = u.copy()
-            strengths = [self._answer_to_jets] if jets else []
-            strengths += [self._answer_to_ambient] if ambient else []
-            body.add_velocity(points, near, np.add.reduce(strengths), u)
+        u = u.copy()
+        strengths = [self._answer_to_jets] if jets else []
+        strengths += [self._answer_to_ambient] if ambient else []
+        body.add_velocity(points, np.add.reduce(strengths), u)
         return u

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,9 +25,27 @@ CENTRE_SPEED = 2 / (3 * (2 * math.pi) ** 1.5)
 """Speed at the centre of a parcel of unit impulse and size: two thirds of its impulse's density there."""
 
 
+class Jets(NamedTuple):
+    """Room for parcels, oldest first, of which the first so many are in use; the step writes into it.
+
+    Fields as of `Parcels`, each as long as there is room.
+    """
+
+    position: Array
+    impulse: Array
+    sigma: Array
+    diameter: Array
+    stream: IntArray
+    gust: Array
+    disk: Array
+    share: Array
+    flow: Array
+    held: Array
+
+
 @dataclass(frozen=True, eq=False)
 class Parcels:
-    """Impulse parcels, oldest first; a plain container whose arrays the water replaces at every step.
+    """Impulse parcels at one instant, oldest first.
 
     Parameters
     ----------
@@ -99,10 +118,20 @@ class Parcels:
         """Those that a mask or an index array picks."""
         return Parcels(*(getattr(self, field.name)[keep] for field in fields(self)))
 
-    def joined(self, *later: Parcels) -> Parcels:
-        """These followed by the later ones."""
-        groups = (self, *later)
-        return Parcels(*(np.concatenate([getattr(group, f.name) for group in groups]) for f in fields(self)))
+    def with_room(self, room: int) -> Jets:
+        """A copy with room for so many."""
+        columns = [
+            np.zeros((room, *np.shape(getattr(self, f.name))[1:]), getattr(self, f.name).dtype) for f in fields(self)
+        ]
+        for column, field in zip(columns, fields(self), strict=True):
+            column[: self.count] = getattr(self, field.name)
+        return Jets(*columns)
+
+    @classmethod
+    def of(cls, jets: Jets, count: int) -> Parcels:
+        """A copy of the first so many."""
+        copies: tuple[Any, ...] = tuple(column[:count].copy() for column in jets)
+        return cls(*copies)
 
 
 def parcel_velocity(
@@ -154,73 +183,91 @@ def gusty_impulse_m4_s(parcels: Parcels, scale: float) -> Array:
 
 
 def merged(parcels: Parcels, spacing: float) -> Parcels:
+    """`merge_rows` of a copy."""
+    jets = parcels.with_room(parcels.count)
+    return Parcels.of(jets, merge_rows(jets, parcels.count, spacing))
+
+
+def merged_across(parcels: Parcels, spacing: float) -> Parcels:
+    """`merge_across` of a copy."""
+    jets = parcels.with_room(parcels.count)
+    return Parcels.of(jets, merge_across(jets, parcels.count, spacing))
+
+
+@njit(nogil=True)
+def kept_only(jets: Jets, count: int, keep: np.ndarray) -> int:
+    """Close the ranks: of the first `count`, only those that a mask picks stay; how many they are."""
+    left = 0
+    for i in range(count):
+        if not keep[i]:
+            continue
+        if left < i:
+            jets.sigma[left], jets.diameter[left], jets.stream[left] = jets.sigma[i], jets.diameter[i], jets.stream[i]
+            jets.share[left], jets.held[left] = jets.share[i], jets.held[i]
+            for k in range(3):
+                jets.position[left, k], jets.impulse[left, k] = jets.position[i, k], jets.impulse[i, k]
+                jets.gust[left, k], jets.disk[left, k] = jets.gust[i, k], jets.disk[i, k]
+                jets.flow[left, k] = jets.flow[i, k]
+        left += 1
+    return left
+
+
+@njit(nogil=True)
+def merge_rows(jets: Jets, count: int, spacing: float) -> int:
     """Pairs of successive parcels of one jet closer than `spacing` sigma made one; their impulse is conserved.
 
-    For old parcels `row_widening` makes the distance longer.
+    For old parcels `row_widening` makes the distance longer. How many are left.
 
     Sizes are averaged, not widened by the distance: in a row the distance lies along the jet, and widening would
     spread the jet sideways as well.
     """
-    if parcels.count < 2:
-        return parcels
-    return _merged(parcels, np.arange(parcels.count), parcels.stream, spacing)
+    if count < 2:
+        return count
+    return _merge(jets, count, np.arange(count), jets.stream, spacing)
 
 
-def merged_across(parcels: Parcels, spacing: float) -> Parcels:
+@njit(nogil=True)
+def merge_across(jets: Jets, count: int, spacing: float) -> int:
     """Pairs of far-travelled parcels of different jets, alike in size and direction and very close, made one.
 
     Parcels are sorted into cells of half the spacing at most, level by level of size; neighbours in a cell may merge.
     """
-    old = np.flatnonzero(parcels.sigma_m > parcels.diameter_m)  # 12 diameters of path
-    if len(old) < 2:
-        return parcels
-    level = np.floor(2 * np.log2(parcels.sigma_m[old])).astype(np.int64)
-    cell = np.floor(parcels.position_m[old] / (_OLD_SPACING * spacing * 2.0 ** (level / 2))[:, None]).astype(np.int64)
-    # Eight bits for the level, eighteen for each of the others: cells of the size of their parcels never number more.
-    key = (((level + 128) * 2**18 + cell[:, 0] + 2**17) * 2**18 + cell[:, 1] + 2**17) * 2**18 + cell[:, 2] + 2**17
-    order = np.argsort(key, kind="stable")
-    labels = np.empty(parcels.count, dtype=np.int64)
-    labels[old[order]] = np.cumsum(np.diff(key[order], prepend=key[order[0]]) != 0)
-    return _merged(parcels, old[order], labels, spacing)
+    old = np.flatnonzero(jets.sigma[:count] > jets.diameter[:count])  # 12 diameters of path
+    if old.shape[0] < 2:
+        return count
+    key = np.empty(old.shape[0], np.int64)
+    for q in range(old.shape[0]):
+        level = math.floor(2 * math.log2(jets.sigma[old[q]]))
+        side = _OLD_SPACING * spacing * 2.0 ** (level / 2)
+        # Eight bits for the level, eighteen for each of the others: cells of their parcels' size never number more.
+        key[q] = level + 128
+        for k in range(3):
+            key[q] = key[q] * 2**18 + math.floor(jets.position[old[q], k] / side) + 2**17
+    order = np.argsort(key, kind="mergesort")
+    labels = np.zeros(count, np.int64)
+    label = 0
+    for q in range(1, order.shape[0]):
+        label += 1 if key[order[q]] != key[order[q - 1]] else 0
+        labels[old[order[q]]] = label
+    return _merge(jets, count, old[order], labels, spacing)
 
 
-def _merged(parcels: Parcels, order: IntArray, label: IntArray, spacing: float) -> Parcels:
+@njit(nogil=True)
+def _merge(jets: Jets, count: int, order: IntArray, label: IntArray, spacing: float) -> int:
     """Walk through parcels in an order; each may take up the one before it with the same label."""
-    position, impulse = parcels.position_m.copy(), parcels.impulse_m4_s.copy()
-    sigma, gust, disk = parcels.sigma_m.copy(), parcels.gust.copy(), parcels.disk_m_s.copy()
-    share, flow, held = parcels.share.copy(), parcels.flow_m_s.copy(), parcels.held_s.copy()
-    keep = np.ones(parcels.count, dtype=np.bool_)
-    labels = int(label[order].max()) + 1
-    reach = spacing * row_widening(sigma, parcels.diameter_m)
-    if not _merge_pairs(order, position, impulse, sigma, gust, disk, share, flow, held, label, labels, reach, keep):
-        return parcels
-    out = Parcels(position, impulse, sigma, parcels.diameter_m, parcels.stream, gust, disk, share, flow, held)
-    return out.take(keep)
-
-
-@njit
-def _merge_pairs(
-    order: IntArray,
-    X: Array,
-    m: Array,
-    sigma: Array,
-    gust: Array,
-    disk: Array,
-    share: Array,
-    flow: Array,
-    held: Array,
-    label: IntArray,
-    labels: int,
-    spacing: Array,
-    keep: np.ndarray,
-) -> bool:
-    last, found = np.full(labels, -1), False
+    labels = 0
+    for j in order:
+        labels = max(labels, label[j] + 1)
+    last, keep, found = np.full(labels, -1), np.ones(count, np.bool_), False
+    X, m, sigma, share, held = jets.position, jets.impulse, jets.sigma, jets.share, jets.held
     for j in order:
         i = last[label[j]]
         last[label[j]] = j
         if i < 0:
             continue
-        reach = min(spacing[i], spacing[j]) * min(sigma[i], sigma[j])
+        wide_i = min(max(sigma[i] / (_OLD_D * jets.diameter[i]), 1.0), _OLD_SPACING)
+        wide_j = min(max(sigma[j] / (_OLD_D * jets.diameter[j]), 1.0), _OLD_SPACING)
+        reach = spacing * min(wide_i, wide_j) * min(sigma[i], sigma[j])
         gap2 = aa = bb = ab = 0.0
         for k in range(3):
             gap2 += (X[i, k] - X[j, k]) ** 2
@@ -234,14 +281,14 @@ def _merge_pairs(
         held[j] = max(held[i], held[j])
         for k in range(3):
             X[j, k] = p * X[i, k] + q * X[j, k]
-            disk[j, k] = p * disk[i, k] + q * disk[j, k]
-            flow[j, k] = p * flow[i, k] + q * flow[j, k]
-            gust[j, k] = (p * gust[i, k] + q * gust[j, k]) / math.sqrt(p * p + q * q)
+            jets.disk[j, k] = p * jets.disk[i, k] + q * jets.disk[j, k]
+            jets.flow[j, k] = p * jets.flow[i, k] + q * jets.flow[j, k]
+            jets.gust[j, k] = (p * jets.gust[i, k] + q * jets.gust[j, k]) / math.sqrt(p * p + q * q)
             m[j, k] += m[i, k]
         keep[i], found = False, True
         # A merged parcel waits for the next step, so that rows thin evenly.
         last[label[j]] = -1
-    return found
+    return kept_only(jets, count, keep) if found else count
 
 
 def _gust_per_turbulence() -> float:

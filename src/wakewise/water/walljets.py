@@ -2,24 +2,67 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from wakewise.arrays import Array, IntArray
 from wakewise.compiled import njit
-from wakewise.water.bedjets import Rings, coarsened, grown, layer_speed, packed_rings, planes_velocity, with_ring_images
-from wakewise.water.bedjets_sums import COLUMNS, sum_planes
-from wakewise.water.faces import Face, Room
-from wakewise.water.meeting import Sheet
+from wakewise.water.bedjets import (
+    STRIKE_HEIGHT,
+    Layers,
+    fill_row,
+    grow_layers,
+    kept_rings,
+    layer_speeds,
+    merge_layers,
+)
+from wakewise.water.bedjets_sums import COLUMNS, finish_rows, leaning, with_images
+from wakewise.water.faces import Face, Room, longer
 
-Plane = Face | Sheet
-
-_SINGLE = np.zeros(0, np.float32)
+LEAST_RING_IMAGE_M_S = 2e-4  # images whose crest would not reach this speed at the wall are left out
 _MOST = 400  # rings
 _REST = 3.0  # wall jets rest at this many times the parcels' rest speed: on the bed 3 mm/s,
 _SHEET_REST = 10.0  # and the jets of a meeting, of which there may be many, at this many
+SPREADS_FASTER = 3.0
+"""How many times as fast as a wall jet the radial jet of a meeting spreads: see `wakewise.water.meeting`."""
+_SHEETS = 128  # room for planes in which jets meet: those remembered, and those whose rings still run
+
+
+class Planes(NamedTuple):
+    """What rings run along: the faces first, then room for the planes in which jets meet.
+
+    `frames`, shape (p, 14), are as in `bedjets.planes_velocity`; `thickness` and `stretch` the `least_m` and `stretch`
+    of `bedjets.packed_rings`, and `per_height` its own; `key`, shape (p, 2), tells which two jets meet there, and
+    `used` when that was last looked up, 0 if it is forgotten. `walls`, shape (f, 4), are the faces as `Room.walls`.
+    """
+
+    frames: Array
+    thickness: Array
+    stretch: Array
+    per_height: Array
+    key: IntArray
+    used: IntArray
+    walls: Array
+
+    @classmethod
+    def of(cls, room: Room) -> Planes:
+        """The faces of a room, and no meeting yet."""
+        many, faces = len(room.faces) + _SHEETS, len(room.faces)
+        planes = cls(
+            np.zeros((many, 14)),
+            np.zeros(many),
+            np.full(many, SPREADS_FASTER),
+            np.zeros(many),
+            np.zeros((many, 2), np.int64),
+            np.zeros(many, np.int64),
+            np.array(room.walls),
+        )
+        for k, face in enumerate(room.faces):
+            planes.frames[k], planes.per_height[k] = face.frame, _per_height(face, room)
+        planes.stretch[:faces] = 1.0
+        return planes
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,101 +73,9 @@ class WallRows:
     starts: IntArray
     packed: Array
 
-    def velocity(self, points_W_m: Array) -> Array:
-        """Velocity of all of them, shape (n, 3), at points, shape (n, 3)."""
-        return planes_velocity(points_W_m, self.planes, self.starts, self.packed)
-
     def pairs(self, points: int) -> int:
         """How many pairs of a point and an impulse take as long as the sum at so many points."""
         return 2 * points * len(self.packed)
-
-    def add(self, points_W_m: Array, out: Array) -> None:
-        """Add the velocity at points to `out`, both shape (n, 3), on this thread."""
-        sum_planes(points_W_m, self.planes, self.starts, self.packed, _SINGLE, out)
-
-
-class WallJets:
-    """Rings by the plane that they run along."""
-
-    def __init__(self, room: Room) -> None:
-        self._room = room
-        self._reach_m = 2 * max((abs(face.at_m) for face in room.faces if face.axis != 2), default=np.inf)
-        faces = [(face.axis, face.side, face.depth_m) for face in room.faces]
-        self._faces = np.array(faces, dtype=np.float64).reshape(-1, 3)
-        self._per_height = {face: _per_height(face, room) for face in room.faces}
-        self._rings: dict[Plane, Rings] = {}
-        self._seen: WallRows | None = None
-
-    @property
-    def count(self) -> int:
-        """How many rings there are."""
-        return sum(rings.count for rings in self._rings.values())
-
-    def on_bed(self) -> Rings:
-        """Rings on the bed."""
-        for plane, rings in self._rings.items():
-            if isinstance(plane, Face) and plane.name == "bed":
-                return rings
-        return Rings.none()
-
-    def start(self, plane: Plane, rings: Rings) -> None:
-        """Let new rings start, given in the plane's own frame."""
-        self._rings[plane] = self._rings.get(plane, Rings.none()).joined(rings)
-        self._seen = None
-
-    def grow(self, dt_s: float, rest_speed_m_s: float, ambient: Callable[[Array], Array]) -> None:
-        """Let rings run out for dt_s, carried along the plane by the ambient water at their centres.
-
-        Those that have come to rest, have left the tank with the current by half their radius, or reach beyond twice
-        the tank are gone.
-        """
-        if not self._rings:
-            return
-        frames = [plane.frame for plane in self._rings]
-        places = [_to_world(rings.centre_m, frame) for rings, frame in zip(self._rings.values(), frames, strict=True)]
-        carried = ambient(np.concatenate(places))
-        kept: dict[Plane, Rings] = {}
-        at = 0
-        for (plane, rings), frame, place in zip(self._rings.items(), frames, places, strict=True):
-            current, at = _to_plane(carried[at : at + rings.count], frame), at + rings.count
-            thickness, stretch = (plane.thickness_m, plane.stretch) if isinstance(plane, Sheet) else (0.0, 1.0)
-            wider, layer = grown(rings, current, dt_s, thickness, stretch)
-            rest = rest_speed_m_s * (_SHEET_REST if isinstance(plane, Sheet) else _REST)
-            keep = (layer >= rest) & (wider.radius_m < self._reach_m) & _inside(place, rings.radius_m, self._faces)
-            if not keep.all():
-                wider = wider.take(keep)
-            if wider.count:
-                kept[plane] = wider
-        self._rings = kept
-        self._seen = None
-
-    def thin(self) -> None:
-        """Make neighbouring rings of a jet one; of too many, let the slowest go."""
-        self._rings = {plane: coarsened(rings) for plane, rings in self._rings.items()}
-        if self.count > _MOST:
-            speeds = {plane: layer_speed(rings) for plane, rings in self._rings.items()}
-            least = np.sort(np.concatenate(list(speeds.values())))[-_MOST]
-            self._rings = {plane: rings.take(speeds[plane] >= least) for plane, rings in self._rings.items()}
-        self._seen = None
-
-    def rows(self) -> WallRows:
-        """All of them with their images, as they are now."""
-        if self._seen is None:
-            self._seen = self._packed()
-        return self._seen
-
-    def _packed(self) -> WallRows:
-        planes, rows = [np.zeros((0, 14))], [np.zeros((0, COLUMNS))]
-        for plane, rings in self._rings.items():
-            if not rings.count:
-                continue
-            if isinstance(plane, Face):
-                rows.append(with_ring_images(packed_rings(rings, 0.0, self._per_height[plane]), plane, self._room))
-            else:
-                rows.append(packed_rings(rings, plane.thickness_m, stretch=plane.stretch))
-            planes.append(plane.frame[None])
-        starts = np.cumsum([len(row) for row in rows])
-        return WallRows(np.concatenate(planes), starts, np.concatenate(rows))
 
 
 def _per_height(face: Face, room: Room) -> float:
@@ -133,34 +84,131 @@ def _per_height(face: Face, room: Room) -> float:
     return 1.0 / abs(opposite[0].at_m - face.at_m) if opposite else 0.0
 
 
-@njit
-def _to_world(centre: Array, frame: Array) -> Array:
-    """Places in a plane's frame, shape (n, 2), in the world, shape (n, 3)."""
-    out = np.empty((centre.shape[0], 3))
-    for j in range(centre.shape[0]):
+@njit(nogil=True)
+def start_ring(
+    layers: Layers, count: int, planes: Planes, plane: int, position: Array, impulse: Array, sigma: float
+) -> int:
+    """Let a parcel that has come down to a plane go on as a ring behind the first `count`; how many there are then."""
+    f = planes.frames[plane]
+    size = np.sqrt(impulse[0] ** 2 + impulse[1] ** 2 + impulse[2] ** 2)
+    layers.plane[count], layers.radius[count], layers.impulse[count] = plane, STRIKE_HEIGHT * sigma, size
+    for i in range(2):
+        place = along = 0.0
         for k in range(3):
-            along = frame[3 + k] * centre[j, 0] + frame[6 + k] * centre[j, 1] + frame[9 + k] * frame[12]
-            out[j, k] = frame[k] + along
+            place += f[3 + 3 * i + k] * (position[k] - f[k])
+            along += f[3 + 3 * i + k] * impulse[k]
+        layers.centre[count, i], layers.lean[count, i] = place, along / size if size > 0.0 else 0.0
+    return count + 1
+
+
+@njit(nogil=True)
+def ring_places(layers: Layers, count: int, planes: Planes) -> Array:
+    """Centres of the first `count` rings in the world, shape (count, 3)."""
+    out = np.empty((count, 3))
+    for j in range(count):
+        f = planes.frames[layers.plane[j]]
+        for k in range(3):
+            along = f[3 + k] * layers.centre[j, 0] + f[6 + k] * layers.centre[j, 1]
+            out[j, k] = f[k] + along + f[9 + k] * f[12]
     return out
 
 
-@njit
-def _to_plane(vectors: Array, frame: Array) -> Array:
-    """Vectors of the world, shape (n, 3), in a plane's frame."""
-    out = np.empty((vectors.shape[0], 3))
-    for j in range(vectors.shape[0]):
-        for i in range(3):
-            a = 3 + 3 * i
-            out[j, i] = frame[a] * vectors[j, 0] + frame[a + 1] * vectors[j, 1] + frame[a + 2] * vectors[j, 2]
-    return out
+@njit(nogil=True)
+def grow(
+    layers: Layers, count: int, planes: Planes, places: Array, ambient: Array, dt_s: float, rest_speed_m_s: float
+) -> int:
+    """Let rings run out for dt_s, carried along their planes by the ambient water at their centres; how many are left.
+
+    Those that have come to rest, have left the tank with the current by half their radius, or reach beyond twice the
+    tank are gone. `places` and `ambient`, shape (count, 3), are their centres and the water there, in the world.
+    """
+    walls, reach = planes.walls, np.inf
+    for f in range(walls.shape[0]):
+        reach = (
+            2 * abs(walls[f, 1]) if walls[f, 0] != 2 and (reach == np.inf or 2 * abs(walls[f, 1]) > reach) else reach
+        )
+    before, current, speed = layers.radius[:count].copy(), np.zeros((count, 3)), np.empty(count)
+    for j in range(count):
+        f = planes.frames[layers.plane[j]]
+        for i in range(2):
+            for k in range(3):
+                current[j, i] += f[3 + 3 * i + k] * ambient[j, k]
+    grow_layers(layers, count, current, planes.thickness, planes.stretch, dt_s, speed)
+    keep = np.ones(count, np.bool_)
+    for j in range(count):
+        rest = rest_speed_m_s * (_REST if layers.plane[j] < walls.shape[0] else _SHEET_REST)
+        keep[j] = speed[j] >= rest and layers.radius[j] < reach
+        for f in range(walls.shape[0]):
+            behind = walls[f, 2] * (places[j, int(walls[f, 0])] - walls[f, 1])
+            keep[j] &= behind < 0.5 * before[j]
+    return kept_rings(layers, count, keep)
 
 
-@njit
-def _inside(places: Array, radius: Array, faces: Array) -> np.ndarray:
-    """Which rings' centres are no farther behind any face (axis, side, depth) than half their radius."""
-    keep = np.ones(radius.shape[0], np.bool_)
-    for j in range(radius.shape[0]):
-        for f in range(faces.shape[0]):
-            if faces[f, 2] - faces[f, 1] * places[j, int(faces[f, 0])] <= -0.5 * radius[j]:
-                keep[j] = False
-    return keep
+@njit(nogil=True)
+def thin(layers: Layers, count: int) -> int:
+    """Make neighbouring rings of a plane one; of too many, let the slowest go. How many are left."""
+    count = merge_layers(layers, count)
+    if count > _MOST:
+        speeds = layer_speeds(layers, count)
+        least = np.sort(speeds)[count - _MOST]
+        count = kept_rings(layers, count, speeds >= least)
+    return count
+
+
+@njit(nogil=True)
+def wall_rows(layers: Layers, count: int, planes: Planes) -> tuple[Array, IntArray, Array]:
+    """Planes with rings, where each one's rings start, and the rings with their images, as `WallRows` has them."""
+    heading, kappa = leaning(layers.lean[:count])
+    faces, many = planes.walls.shape[0], planes.frames.shape[0]
+    on = np.zeros(many, np.int64)
+    for j in range(count):
+        on[layers.plane[j]] += 1
+    frames, starts = np.empty((many, 14)), np.zeros(many + 1, np.int64)
+    packed, used = np.empty((4 * count, COLUMNS)), 0
+    for p in range(many):
+        if on[p] == 0:
+            continue
+        rows, n = np.empty((on[p], COLUMNS)), 0
+        for j in range(count):
+            if layers.plane[j] == p:
+                _fill_row(rows[n], layers, j, planes, heading[j], kappa[j])
+                n += 1
+        finish_rows(rows)
+        if p < faces:
+            rows = with_images(rows, _walls_across(planes.walls, p), LEAST_RING_IMAGE_M_S)
+        end = starts[used] + rows.shape[0]
+        if end > packed.shape[0]:
+            packed = longer(packed, 2 * end)
+        packed[starts[used] : end] = rows
+        frames[used] = planes.frames[p]
+        used += 1
+        starts[used] = end
+    return frames[:used].copy(), starts[: used + 1].copy(), packed[: starts[used]].copy()
+
+
+@njit(nogil=True)
+def _fill_row(row: Array, layers: Layers, j: int, planes: Planes, heading: Array, kappa: float) -> None:
+    p = layers.plane[j]
+    fill_row(
+        row,
+        layers.centre[j],
+        layers.radius[j],
+        layers.impulse[j],
+        heading,
+        kappa,
+        planes.thickness[p],
+        planes.per_height[p],
+        planes.stretch[p],
+    )
+
+
+@njit(nogil=True)
+def _walls_across(walls: Array, face: int) -> Array:
+    """Of the faces that stand across one: which of its two axes they stand on, where, and on which side."""
+    out, count = np.empty((walls.shape[0], 3)), 0
+    for f in range(walls.shape[0]):
+        turn = (int(walls[f, 0]) - int(walls[face, 0])) % 3
+        if turn:
+            out[count, 0], out[count, 1], out[count, 2] = turn - 1, walls[f, 1], walls[f, 2]
+            count += 1
+    return out[:count]

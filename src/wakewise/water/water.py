@@ -18,26 +18,25 @@ from __future__ import annotations
 
 import logging
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.interfaces import Current
-from wakewise.water.bedjets import STRIKE_HEIGHT, Rings, rings_from_strikes
-from wakewise.water.blockage import Blockage
-from wakewise.water.closure import PLAIN, Spreading, disk_share, first_sigma_m, travel
-from wakewise.water.drift import EMISSION_SPACING, drifted, due, gust_memory, slugs
-from wakewise.water.faces import Face, Room
+from wakewise.water.bedjets import Layers, Rings
+from wakewise.water.blockage import Blockage, BodyRows
+from wakewise.water.closure import PLAIN, PUFF_SPREAD, Spreading, first_sigma_m
+from wakewise.water.drift import EMISSION_SPACING, count_sent
+from wakewise.water.faces import Room
+from wakewise.water.induction import SINGLE
 from wakewise.water.instant import Instant
-from wakewise.water.meeting import Meetings
 from wakewise.water.parcels import GUST_PER_TURBULENCE, MERGE_SPACING, Parcels, merged, merged_across
-from wakewise.water.walljets import WallJets
+from wakewise.water.space_order import curve
+from wakewise.water.stepping import Laws, Tally, Thrusters, advance, places_of
+from wakewise.water.walljets import Planes, WallRows, wall_rows
 
-_MANY = 800  # parcels; with more, old ones of different jets merge over distances that grow in proportion
-_ACROSS_EVERY = 2  # steps after which different jets and rings are looked through for what may become one
-_ANSWER_EVERY = 2  # steps after which the body's answer to what carries parcels is found anew
-_STEEPEST_GRAZE = math.sin(math.radians(10))  # parcels that come in flatter than this slide along the face
+_ROOM = 512  # parcels and rings to begin with; there is always room for a ring of each parcel
 
 log = logging.getLogger(__name__)
 
@@ -57,6 +56,8 @@ class WaterCounts:
 @dataclass(frozen=True)
 class _Uniform:
     velocity_W_m_s: Array
+    steady = True
+    uniform = True
 
     def velocity(self, points_W_m: Array, time_s: float) -> Array:  # noqa: ARG002
         return np.tile(self.velocity_W_m_s, (len(points_W_m), 1))
@@ -108,8 +109,7 @@ class Water:
         spreading: Spreading = PLAIN,
         body: Blockage | None = None,
     ) -> None:
-        self._areas = np.array(disk_areas_m2, dtype=np.float64)
-        self._diameters = np.sqrt(4 * self._areas / math.pi)
+        areas = np.array(disk_areas_m2, dtype=np.float64)
         self._density = density_kg_m3
         self._bed = bed_z_m
         self._ambient = ambient or _Uniform(np.zeros(3) if current_W_m_s is None else np.array(current_W_m_s, float))
@@ -119,19 +119,20 @@ class Water:
         self._max_parcels = max_parcels
         self._spreading = spreading
         self._body = body
+        self._body_rows = BodyRows.none() if body is None else body.rows
         self._rng = rng
         self._time = 0.0
-        self._parcels = Parcels.none()
-        self._walls = WallJets(self._room)
-        self._meetings = Meetings()
-        streams = (len(self._areas), 2)
-        self._waiting_impulse = np.zeros(streams)  # m4/s, not yet sent as a parcel
-        self._waiting_slug_m = np.zeros(streams)  # length of the jet's core that it stands for
-        self._retired = self._struck = self._met = 0.0
+        self._jets = Parcels.none().with_room(_ROOM)
+        self._layers = Layers(*(_with_room(column, 2 * _ROOM) for column in Rings.none().layers()))
+        self._planes = Planes.of(self._room)
+        spacing = EMISSION_SPACING * first_sigma_m(np.sqrt(4 * areas / math.pi))
+        streams = (len(areas), 2)
+        self._thrusters = Thrusters(areas, spacing, np.zeros(streams), np.zeros(streams))
+        sources = self._body_rows.answers.shape[1]
+        self._tally = Tally(np.zeros(2, np.int64), np.array([0, -1]), np.zeros(sources), np.zeros(3))
         self._forced_merges = 0
         self._now: Instant | None = None
-        self._held_answer: Array | None = None  # of the body, to what carries parcels
-        self._steps = 0
+        self._answer_to_steady: Array | None = None
 
     @property
     def bed_z_m(self) -> float:
@@ -146,22 +147,24 @@ class Water:
     @property
     def parcels(self) -> Parcels:
         """The free jets at this instant."""
-        return self._parcels
+        return self.now.parcels
 
     @property
     def rings(self) -> Rings:
         """The wall jets on the bed at this instant."""
-        return self._walls.on_bed()
+        return self.now.rings
 
     @property
     def counts(self) -> WaterCounts:
         """Sizes and the impulse that has gone."""
+        parcels, rings = self._tally.rows.tolist()
+        retired, struck, met = (self._tally.gone * self._density).tolist()
         return WaterCounts(
-            parcels=self._parcels.count,
-            rings=self._walls.count,
-            retired_N_s=self._retired * self._density,
-            struck_N_s=self._struck * self._density,
-            met_N_s=self._met * self._density,
+            parcels=parcels,
+            rings=rings,
+            retired_N_s=retired,
+            struck_N_s=struck,
+            met_N_s=met,
             forced_merges=self._forced_merges,
         )
 
@@ -169,7 +172,18 @@ class Water:
     def now(self) -> Instant:
         """The flow at this instant; it stays as it is when the water moves on."""
         if self._now is None:
-            self._now = self._instant(self._gust_scale)
+            parcels, rings = self._tally.rows.tolist()
+            self._now = Instant(
+                time_s=self._time,
+                parcels=Parcels.of(self._jets, parcels),
+                rings=Rings.of(self._layers, rings, 0) if math.isfinite(self._bed) else Rings.none(),
+                rows=WallRows(*wall_rows(self._layers, rings, self._planes)),
+                room=self._room,
+                bed_z_m=self._bed,
+                ambient=self._ambient,
+                body=self._body,
+                gust_scale=self._gust_scale,
+            )
         return self._now
 
     def velocity(self, points_W_m: Array) -> Array:
@@ -197,135 +211,89 @@ class Water:
         impulses_N_s : ndarray, shape (n, 2)
             Integral over the step of forward and of reverse thrust, both positive.
         """
-        self._drift(dt_s)
-        self._emit(dt_s, origins_before_m, origins_m, axes_W, impulses_N_s)
-        self._meet()
-        self._strike()
-        self._thin()
+        forward, back = np.asarray(origins_m, dtype=np.float64), np.asarray(origins_before_m, dtype=np.float64)
+        disks = np.stack([forward, (forward - back) / dt_s, axes_W])
+        impulses = np.ascontiguousarray(impulses_N_s, dtype=np.float64) / self._density
+        thrusters = self._thrusters
+        sent = count_sent(impulses, dt_s, thrusters.areas, thrusters.spacing, thrusters.waiting_slug)
+        known = int(self._tally.rows[0]) + sent
+        self._make_room(known)
+        places = places_of(self._jets, self._layers, self._planes, self._tally.rows, disks[0])
+        ambient = self._ambient_velocity(places)
+        noise = self._rng.standard_normal((known, 3)) if self._gust_scale > 0.0 else np.zeros((known, 3))
+        advance(
+            self._jets,
+            self._layers,
+            self._planes,
+            self._body_rows,
+            self._laws(dt_s),
+            thrusters,
+            self._tally,
+            places,
+            ambient,
+            self._answer_to_ambient(),
+            disks,
+            impulses,
+            noise,
+        )
+        if self._tally.rows[0] > self._max_parcels:
+            self._coarsen()
         self._time += dt_s
         self._now = None
-        self._steps += 1
-        if self._steps % _ANSWER_EVERY == 0:
-            self._held_answer = None
 
-    def _instant(self, gust_scale: float) -> Instant:
-        return Instant(
-            time_s=self._time,
-            parcels=self._parcels,
-            rings=self._walls.on_bed(),
-            rows=self._walls.rows(),
-            room=self._room,
-            bed_z_m=self._bed,
-            ambient=self._ambient,
-            body=self._body,
-            gust_scale=gust_scale,
-        )
+    def _laws(self, dt_s: float) -> Laws:
+        spread = self._spreading
+        drift = np.array([spread.core_spread, spread.spread, max(PUFF_SPREAD, spread.spread), dt_s])
+        return Laws(drift, self._rest_speed, self._gust_scale > 0.0, self._bed, curve(), SINGLE)
 
-    def _carrying(self, mean: Instant, points: Array) -> Array:
-        """Velocity of the jets' water, shape (n, 3); the body's answer to them is found anew every second step."""
-        u = mean.jets(points)
-        body = self._body
-        if body is not None and len(near := body.near(points)):
-            if self._held_answer is None:
-                self._held_answer = mean.answer_to_jets()
-            body.add_velocity(points, near, self._held_answer, u)
-        return u
+    def _ambient_velocity(self, places_W_m: Array) -> Array:
+        """Velocity of the ambient water at places, both shape (n, 3)."""
+        if getattr(self._ambient, "uniform", False) and len(places_W_m):
+            even = np.empty((len(places_W_m), 3))
+            even[:] = self._ambient.velocity(places_W_m[:1], self._time)
+            return even
+        return np.array(self._ambient.velocity(places_W_m, self._time), dtype=np.float64)
 
-    def _drift(self, dt_s: float) -> None:
-        """Carry parcels and rings, let them grow, and retire what has come to rest."""
-        parcels = self._parcels
-        mean = self.now if self._gust_scale == 0.0 else self._instant(0.0)
-        if parcels.count:
-            # Gusts are heard everywhere but do not carry parcels: the growth of sigma stands for that mixing already.
-            X, u, held = parcels.position_m, parcels.flow_m_s.copy(), parcels.held_s.copy()
-            look = due(u, held, parcels.sigma_m, dt_s)
-            if len(look):
-                u[look] = self._carrying(mean, X[look])
-            position, sigma, share, speed = drifted(
-                parcels, u, mean.ambient_velocity(X), dt_s, self._spreading, self._room.faces
-            )
-            gust = parcels.gust
-            if self._gust_scale > 0.0:
-                memory = gust_memory(parcels.sigma_m, speed, dt_s)
-                gust = memory * gust + np.sqrt(1 - memory**2) * self._rng.standard_normal(gust.shape)
-            moved = replace(
-                parcels, position_m=position, sigma_m=sigma, gust=gust, share=share, flow_m_s=u, held_s=held
-            )
-            resting = speed < self._rest_speed
-            if resting.any():
-                self._retired += float(parcels.size_m4_s[resting].sum())
-                moved = moved.take(~resting)
-            self._parcels = moved
-        self._walls.grow(dt_s, self._rest_speed, mean.ambient_velocity)
+    def _answer_to_ambient(self) -> Array:
+        """Strengths in m3/s of the body's sources against the ambient water, shape (s,)."""
+        if self._body is None:
+            return np.zeros(0)
+        if self._answer_to_steady is not None:
+            return self._answer_to_steady
+        strengths = self._body.strengths_m3_s(self._ambient.velocity(self._body.points_m, self._time))
+        if getattr(self._ambient, "steady", False):
+            self._answer_to_steady = strengths
+        return strengths
 
-    def _emit(self, dt_s: float, before: Array, after: Array, axes_W: Array, impulses_N_s: Array) -> None:
-        """Send parcels at equal spacing along the slug of water that passed each disk, wherever the disk then was."""
-        if not np.any(impulses_N_s > 0.0):
-            return
-        disk_m_s = (after - before) / dt_s
-        spacing = EMISSION_SPACING * first_sigma_m(self._diameters)
-        thruster, reversed_, age, exits, sent = slugs(
-            impulses_N_s / self._density, dt_s, self._areas, spacing, self._waiting_impulse, self._waiting_slug_m
-        )
-        if len(age):
-            D, ages = self._diameters[thruster], age[:, None]
-            path, sigma = travel(first_sigma_m(D), D, exits, age, self._spreading)
-            jet_W = axes_W[thruster] * np.where(reversed_ == 1, 1.0, -1.0)[:, None]
-            ambient, disk = self._ambient.velocity(after, self._time)[thruster], disk_m_s[thruster]
-            carried = ambient + disk_share(sigma, D)[:, None] * (disk - ambient)
-            position = after[thruster] + (carried - disk) * ages + path[:, None] * jet_W
-            for face in self._room.faces:
-                position[:, face.axis] -= face.side * np.maximum(-face.gap_m(position), 0.0)
-            gusts = self._rng.standard_normal if self._gust_scale > 0.0 else np.zeros
-            impulses = sent[:, None] * jet_W
-            stream = 2 * thruster + reversed_
-            self._parcels = self._parcels.joined(
-                Parcels.sent(position, impulses, sigma, D, stream, gusts((len(D), 3)), disk)
-            )
+    def _make_room(self, parcels: int) -> None:
+        """Let there be room for so many parcels, and for a ring of each besides those there are."""
+        if parcels > len(self._jets.sigma):
+            self._jets = Parcels.of(self._jets, int(self._tally.rows[0])).with_room(2 * parcels)
+        if int(self._tally.rows[1]) + parcels > len(self._layers.radius):
+            room = 2 * (int(self._tally.rows[1]) + parcels)
+            self._layers = Layers(*(_with_room(column, room) for column in self._layers))
 
-    def _meet(self) -> None:
-        """Let parcels that meet head-on turn aside."""
-        self._parcels, born, taken = self._meetings.turn_aside(self._parcels)
-        self._met += taken
-        for sheet, rings in born:
-            self._walls.start(sheet, rings)
-
-    def _strike(self) -> None:
-        """Hand parcels that come up to a face over to wall jets."""
-        for face in self._room.faces:
-            parcels = self._parcels
-            hit = self._hits(face, parcels)
-            if not hit.any():
-                continue
-            gone = parcels.take(hit)
-            self._struck += float(gone.size_m4_s.sum())
-            self._parcels = parcels.take(~hit)
-            position, impulse = face.local(gone.position_m), face.local(gone.impulse_m4_s)
-            self._walls.start(face, rings_from_strikes(position, impulse, gone.sigma_m))
-
-    @staticmethod
-    def _hits(face: Face, parcels: Parcels) -> np.ndarray:
-        towards = face.side * parcels.impulse_m4_s[:, face.axis] > _STEEPEST_GRAZE * parcels.size_m4_s
-        hits: np.ndarray = towards & (face.gap_m(parcels.position_m) < STRIKE_HEIGHT * parcels.sigma_m)
-        return hits
-
-    def _thin(self) -> None:
-        """Keep rows no finer than their parcels need, and the number of parcels bounded."""
-        self._parcels = merged(self._parcels, MERGE_SPACING)
-        if self._steps % _ACROSS_EVERY == 0:
-            self._parcels = merged_across(self._parcels, MERGE_SPACING * max(1.0, self._parcels.count / _MANY))
-            self._walls.thin()
-        spacing = MERGE_SPACING
-        while self._parcels.count > self._max_parcels:
+    def _coarsen(self) -> None:
+        """Make rows coarser until there are no more parcels than there may be."""
+        parcels, spacing = Parcels.of(self._jets, int(self._tally.rows[0])), MERGE_SPACING
+        while parcels.count > self._max_parcels:
             spacing *= 1.5
             if spacing > 50.0:
                 # Nothing more to merge: let the weakest go, most of them long past mattering.
-                size = self._parcels.size_m4_s
-                strength = size / self._parcels.sigma_m**3
+                size = parcels.size_m4_s
+                strength = size / parcels.sigma_m**3
                 keep = np.sort(np.argsort(-strength, kind="stable")[: self._max_parcels])
-                self._retired += float(size.sum() - size[keep].sum())
-                self._parcels = self._parcels.take(keep)
+                self._tally.gone[0] += float(size.sum() - size[keep].sum())
+                parcels = parcels.take(keep)
             else:
-                self._parcels = merged_across(merged(self._parcels, spacing), spacing)
+                parcels = merged_across(merged(parcels, spacing), spacing)
             self._forced_merges += 1
             log.warning("more than %d parcels: rows made coarser (%.2f sigma apart)", self._max_parcels, spacing)
+        self._jets = parcels.with_room(len(self._jets.sigma))
+        self._tally.rows[0] = parcels.count
+
+
+def _with_room(column: np.ndarray, room: int) -> np.ndarray:
+    out = np.zeros((room, *column.shape[1:]), column.dtype)
+    out[: len(column)] = column
+    return out

@@ -1,0 +1,50 @@
+"""Work done beside the one who asked for it, on a second core where there is one."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import cache
+
+from wakewise.water.chunks import cores
+
+
+class Lane:
+    """Does one piece of work after another, in the order in which they were given, on a thread of its own.
+
+    Where there is one core only, each is done at once. Threads are shared by all lanes of a name, and the order of a
+    lane's own pieces is kept among those of others; what a piece does must not depend on what others do meanwhile.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._last: Future[None] | None = None
+
+    def do(self, work: Callable[[], None]) -> None:
+        """Take on a piece of work; what an earlier one raised is raised here or by `wait`."""
+        self._check()
+        if cores() == 1:
+            work()
+        else:
+            self._last = _thread(self._name).submit(work)
+
+    def wait(self) -> None:
+        """Return once all of it is done; raise what the last piece raised."""
+        last, self._last = self._last, None
+        if last is not None:
+            last.result()
+
+    def _check(self) -> None:
+        if self._last is not None and self._last.done():
+            self.wait()
+
+
+@cache
+def _thread(name: str) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(1, thread_name_prefix=name)
+
+
+# Threads do not survive a fork, where there is such a thing; the child starts its own.
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_thread.cache_clear)
