@@ -44,7 +44,7 @@ def test_once_warm_a_flight_compiles_nothing() -> None:
 
 
 def test_what_cannot_be_compiled_is_told_and_holds_nothing_up(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
-    """A kernel that is not there gives a line; the job is not noted as done, and is not tried again."""
+    """A kernel that is not there gives a line, now and whenever somebody asks; it is not tried again."""
     wrong = Listed(name="wakewise.compiled.nothing", types=("float64",), job="more", cost_s=1.0)
     monkeypatch.setattr(warming, "listed", lambda: (wrong,))
     monkeypatch.setattr(warming, "_made_from", lambda job: "0")
@@ -54,9 +54,22 @@ def test_what_cannot_be_compiled_is_told_and_holds_nothing_up(monkeypatch: pytes
     made = warm(("more",), lambda *now: told.append(now))
     assert made.kernels == 0
     assert "AttributeError" in made.amiss[0]
-    assert not list(tmp_path.glob("*.warm"))
     assert told[0][:2] == (0.0, 1.0)
-    assert warm(("more",)).amiss == ()
+    monkeypatch.setattr(warming, "_tried", set())
+    assert warming.is_warm(("more",))
+    assert warm(("more",)) == made
+
+
+def test_a_killed_process_is_no_verdict_on_a_kernel(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
+    """The job is not noted as done: another try is made by the next process."""
+    one = Listed(name="wakewise.vehicles.runge_kutta.normalise", types=("float64[1C]",), job="more", cost_s=1.0)
+    monkeypatch.setattr(warming, "listed", lambda: (one,))
+    monkeypatch.setattr(warming, "_made_from", lambda job: "0")
+    monkeypatch.setattr(warming, "_tried", set())
+    monkeypatch.setattr(warming, "_asked", lambda *_: "")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert warm(("more",)).amiss == ("wakewise.vehicles.runge_kutta.normalise: its process ended",)
+    assert not warming.is_warm(("more",))
 
 
 def test_a_note_is_taken_when_a_job_is_done(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:

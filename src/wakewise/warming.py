@@ -28,7 +28,7 @@ LIST = Path(__file__).with_name("kernels.json")
 JOBS = ("plan", "fly", "photograph", "reconstruct", "more")
 """In the order in which a scan needs them; "more" is what other commands call."""
 
-_DONE, _FAILED = "done", "failed"
+_DONE, _FAILED, _KILLED = "done", "failed", "its process ended"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +84,7 @@ def of_jobs(jobs: Iterable[str]) -> tuple[Listed, ...]:
 
 
 def is_warm(jobs: Sequence[str] = JOBS) -> bool:
-    """Whether all kernels of the jobs were compiled from the sources, and by the Numba, that are here now."""
+    """Whether the jobs were done with the sources, and the Numba, that are here now."""
     return all(_note(job).exists() for job in jobs if of_jobs([job]))
 
 
@@ -112,8 +112,9 @@ class Warming:
         self._cost = {job: sum(kernel.cost_s for kernel in of_jobs([job])) for job in cold}
         self._spent = dict.fromkeys(cold, 0.0)
         self._total = sum(self._left.values())
-        self._amiss: list[str] = []
+        self._amiss: dict[str, list[str]] = {job: [] for job in cold}
         self._change = threading.Condition()
+        self._fault = ""
         self._workers: list[subprocess.Popen[str]] = []
         for job in cold:
             for kernel in sorted(of_jobs([job]), key=lambda kernel: -kernel.cost_s):
@@ -135,7 +136,12 @@ class Warming:
         except BaseException:
             self.stop()
             raise
-        return Warmed(kernels=self._total - sum(self._left.values()), amiss=tuple(self._amiss))
+        amiss = [line for job in jobs if job in JOBS for line in (self._amiss.get(job) or _noted(job))]
+        failed = sum(map(len, self._amiss.values()))
+        return Warmed(
+            kernels=self._total - sum(self._left.values()) - failed,
+            amiss=tuple([*amiss, self._fault] if self._fault else amiss),
+        )
 
     def is_done(self, jobs: Sequence[str]) -> bool:
         """Whether there is nothing left to compile of some jobs."""
@@ -169,7 +175,7 @@ class Warming:
                     self._finish(kernel, _asked(kernel, worker.stdin, worker.stdout))
                 worker.stdin.close()
         except OSError as fault:
-            self._amiss.append(f"no process to compile in: {fault}")
+            self._fault = f"no process to compile in: {fault}"
         finally:
             with self._change:
                 self._running -= 1
@@ -183,13 +189,13 @@ class Warming:
 
     def _finish(self, kernel: Listed, answer: str) -> None:
         with self._change:
-            if answer.startswith(_DONE):
-                self._left[kernel.job] -= 1
-                if not self._left[kernel.job]:
-                    _take_note(kernel.job)
-            else:
-                self._amiss.append(f"{kernel.name}: {answer.removeprefix(_FAILED).strip() or 'its process ended'}")
+            if not answer.startswith(_DONE):
+                reason = answer.removeprefix(_FAILED).strip() or _KILLED
+                self._amiss[kernel.job].append(f"{kernel.name}: {reason}")
+            self._left[kernel.job] -= 1
             self._spent[kernel.job] += kernel.cost_s
+            if not self._left[kernel.job] and not any(line.endswith(_KILLED) for line in self._amiss[kernel.job]):
+                _take_note(kernel.job, self._amiss[kernel.job])
             self._change.notify_all()
 
 
@@ -234,20 +240,28 @@ def _cores() -> int:
 
 
 def _note(job: str) -> Path:
-    """File that is there once all kernels of a job are kept; its name holds what they were made from."""
+    """File that is there once a job is done; its name holds what its kernels were made from."""
     given = os.environ.get(VARIABLE)
     beside = Path(__file__).parent / "__pycache__"
     place = Path(given) if given else beside if can_be_written(beside) else user_cache(os.environ)
     return place / f"wakewise-{job}-{_made_from(job)}.warm"
 
 
-def _take_note(job: str) -> None:
+def _take_note(job: str, amiss: Sequence[str]) -> None:
+    """Write the note; it holds a line for each kernel that cannot be compiled, as where an extra is missing."""
     path = _note(job)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.touch()
+        path.write_text("".join(f"{line}\n" for line in amiss), encoding="utf-8")
     except OSError:  # then it is looked through again the next time, which takes a second
         return
+
+
+def _noted(job: str) -> list[str]:
+    try:
+        return _note(job).read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return []
 
 
 @cache
