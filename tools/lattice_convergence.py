@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 import time
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from wakewise.cli.console import Bars
+from wakewise.errors import WakewiseError
 from wakewise.lattice import CASES, LatticeRun, compute_run, find_case
 from wakewise.lattice.crossing import crossing_figures
 from wakewise.lattice.engines import DEVICES
@@ -30,10 +30,10 @@ def measured(run: LatticeRun) -> dict[str, Any]:
 
 
 def change_pct(fine: Any, coarse: Any) -> Any:
-    """Coarse against fine, in per cent of fine, number by number."""
-    a, b = np.asarray(fine, float), np.asarray(coarse, float)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.round(100 * (b / a - 1), 1).tolist()
+    """Coarse against fine, in per cent of fine, number by number; None where either is missing."""
+    if isinstance(fine, list):
+        return [change_pct(a, b) for a, b in zip(fine, coarse, strict=False)]
+    return round(100 * (coarse / fine - 1), 1) if fine and coarse is not None else None
 
 
 def main() -> None:
@@ -65,4 +65,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except WakewiseError as fault:
+        sys.exit(str(fault))

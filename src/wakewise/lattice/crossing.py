@@ -28,7 +28,7 @@ def crossing_figures(run: LatticeRun) -> dict[str, Any]:
     -------
     dict
         speed: along the bisector, over U0. half_height_D and half_width_D: how far out of the jets' plane and in it
-        half of that speed is found; NaN where it is not within 4 D or the box. rise: fastest speed out of the plane
+        half of that speed is found; None where it is not within 4 D or the box. rise: fastest speed out of the plane
         within 2 D of the crossing, over U0.
 
     Raises
@@ -51,14 +51,14 @@ def crossing_figures(run: LatticeRun) -> dict[str, Any]:
         return np.asarray(direction @ np.stack(parts))
 
     out = np.arange(0.0, _REACH_D, _STEP_D)
-    found: dict[str, list[float]] = {"speed": [], "half_height_D": [], "half_width_D": []}
+    found: dict[str, list[float | None]] = {"speed": [], "half_height_D": [], "half_width_D": []}
     for away in AWAY_D:
         here = centre + away * along
         found["speed"].append(float(at(here[None], along)[0]))
         for name, side in (("half_height_D", up), ("half_width_D", across)):
             profile = np.mean([at(here + sign * out[:, None] * side, along) for sign in (1, -1)], axis=0)
             below = np.flatnonzero(profile < 0.5 * profile[0])
-            found[name].append(float(out[below[0]]) if len(below) else float("nan"))
+            found[name].append(float(out[below[0]]) if len(below) else None)
     x, y, z = (np.abs(c - m) for c, m in zip(run.cell_centres_D(), centre, strict=True))
     near = np.ix_(x < 2.0, y < 2.0, z < 2.0)
     return {"away_D": list(AWAY_D), **found, "rise": float(np.abs(means[2][near]).max())}

@@ -262,26 +262,24 @@ def fill_slots(src: Lattice, x: int, p: int, ny: int, nz: int, faces: IntArray, 
     """Fill the slots that the piece of plane x from p on will pull from; `made` has room for five rows of a piece."""
     nx, mz, start = src.shape[1] - 2, nz + 2, origin(nz)
     end = x in (1, nx)
-    if x == 1:
-        _face_row(src, x, p, p + PIECE, 0, faces[0], mz, made)
-    if x == nx:
-        _face_row(src, x, p, p + PIECE, 1, faces[1], mz, made)
+    # One call of each function only: the compiler makes a copy of it wherever it is called.
+    for face in range(4):
+        first, last = p, p + PIECE
+        beside = x == (1 if face == 0 else nx)
+        if face >= 2:
+            row = start + (1 if face == 2 else ny) * mz
+            first, last = max(p, row + 1), min(p + PIECE, row + 1 + nz)
+            beside = not end and first < last
+        if beside:
+            _face_row(src, x, first, last, face, faces[face], mz, made)
     for y in range(max(1, (p - start) // mz), min(ny, (p + PIECE - 1 - start) // mz) + 1):
-        row = start + y * mz
-        first, last = max(p, row + 1), min(p + PIECE, row + 1 + nz)
-        if end and y in (1, ny):
-            for at in range(first, last):
-                _any_cell(src, x, y, at - row, ny, nz, faces, made)
-            continue
-        if y == 1:
-            _face_row(src, x, first, last, 2, faces[2], mz, made)
-        if y == ny:
-            _face_row(src, x, first, last, 3, faces[3], mz, made)
-        inner = not end and y not in (1, ny)
-        for z, face in ((1, 4), (nz, 5)):
-            if not first <= row + z < last or (inner and faces[face] == PERIODIC):
+        edge = end and y in (1, ny)
+        for z in range(1, nz + 1, 1 if edge else nz - 1):
+            at, face = start + y * mz + z, 4 if z == 1 else 5
+            inner = not end and y not in (1, ny)
+            if at < p or at >= p + PIECE or (inner and faces[face] == PERIODIC):
                 continue
             if inner and faces[face] == OPEN:
-                _open_end(src, x, row + z, face, mz)
+                _open_end(src, x, at, face, mz)
             else:
                 _any_cell(src, x, y, z, ny, nz, faces, made)

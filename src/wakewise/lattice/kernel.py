@@ -1,8 +1,8 @@
 """One step of the D3Q19 lattice on processors: pull populations from neighbours, collide, write.
 
 A plane is worked through in pieces of `PIECE` cells: they are pulled and collide into nineteen rows of one small array,
-which are then written line by line past the caches, while the next piece is on its way from memory. So the writes, too,
-are nineteen long rows and not nineteen streams at once, and it matters little how far apart the nineteen lie.
+which are then written line by line past the caches, unless all of the lattice stays in them. So the writes are one row
+after another and not nineteen streams at once, and it matters little how far apart the nineteen lie.
 """
 
 from __future__ import annotations
@@ -14,9 +14,11 @@ from wakewise.arrays import Array, IntArray
 from wakewise.compiled import njit, prange
 from wakewise.lattice.collision import collide, collide_forced
 from wakewise.lattice.faces import fill_slots
-from wakewise.lattice.memory import LINE, copy_line, fetch_line, peek, poke, settle_stores, stream_line
+from wakewise.lattice.memory import LINE, copy_line, peek, poke, settle_stores, stream_line
 from wakewise.lattice.stencil import PERIODIC, PIECE, VELOCITIES, Lattice, box, origin
 
+_CACHED = 2**20
+"""Populations of a lattice that a core's second-level cache holds for the next step."""
 _1 = float32(1.0)
 _cell = njit(fastmath=True, inline="always")(collide)
 _forced = njit(collide_forced)
@@ -114,7 +116,7 @@ def step(
     mz, planes, size = nz + 2, src.shape[1], src.shape[2]
     start = origin(nz) + mz + 1
     pieces = (ny * mz - 2 + PIECE - 1) // PIECE
-    streams = dst.ctypes.data % (4 * LINE) == 0
+    streams = dst.ctypes.data % (4 * LINE) == 0 and dst.size > _CACHED
     strength = float32(eddies)
     came, went = src.reshape(-1), dst.reshape(-1)
     for k in prange(planes - 2):
@@ -126,8 +128,6 @@ def step(
             for i in range(19):
                 c = VELOCITIES[i]
                 starts[i] = (i * planes + x - c[0]) * size + p - c[1] * mz - c[2]
-                for n in range(PIECE, 2 * PIECE, LINE):
-                    fetch_line(came, starts[i] + n)
             _collide(came, starts, tau_x[x], tau_yz, p, strength, f)
             for i in range(19):
                 at = (i * planes + x) * size + p

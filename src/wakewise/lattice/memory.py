@@ -1,4 +1,4 @@
-"""Reading and writing long rows of float32 as fast as memory allows: four small words for kernels.
+"""Reading and writing long rows of float32 as fast as memory allows: five small words for kernels.
 
 A loop that reads nineteen rows and writes others is worked on several cells at a time only if the compiler knows that
 no write falls on a row still to be read. Rows whose places are known when the program runs leave it hundreds of pairs
@@ -15,7 +15,6 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.core.typing.templates import Signature
 from numba.extending import intrinsic
 
@@ -84,22 +83,6 @@ def copy_line(_: Any, into: Any, at: Any, source: Any, start: Any) -> _Intrinsic
 def stream_line(_: Any, into: Any, at: Any, source: Any, start: Any) -> _Intrinsic:
     """`copy_line` past the caches; into[at] must begin a line."""
     return types.void(into, at, source, start), _copy(past_caches=True)
-
-
-@intrinsic
-def fetch_line(_: Any, array: Any, at: Any) -> _Intrinsic:
-    """Ask for the line that holds array[at], which will soon be read; the place need not exist."""
-
-    def generate(context: Any, builder: ir.IRBuilder, signature: Signature, arguments: Any) -> Any:
-        word = ir.IntType(32)
-        place = builder.bitcast(_place(context, builder, signature, arguments, 0), ir.IntType(8).as_pointer())
-        kind = ir.FunctionType(ir.VoidType(), [place.type, word, word, word])
-        prefetch = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
-        # To read, into the second-level cache, data.
-        builder.call(prefetch, [place, word(0), word(2), word(1)])
-        return context.get_dummy_value()
-
-    return types.void(array, at), generate
 
 
 @intrinsic
