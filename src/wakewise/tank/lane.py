@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
@@ -19,25 +20,21 @@ class Lane:
 
     def __init__(self, name: str) -> None:
         self._name = name
-        self._last: Future[None] | None = None
+        self._under_way: deque[Future[None]] = deque()
 
     def do(self, work: Callable[[], None]) -> None:
         """Take on a piece of work; what an earlier one raised is raised here or by `wait`."""
-        self._check()
+        while self._under_way and self._under_way[0].done():
+            self._under_way.popleft().result()
         if cores() == 1:
             work()
         else:
-            self._last = _thread(self._name).submit(work)
+            self._under_way.append(_thread(self._name).submit(work))
 
     def wait(self) -> None:
-        """Return once all of it is done; raise what the last piece raised."""
-        last, self._last = self._last, None
-        if last is not None:
-            last.result()
-
-    def _check(self) -> None:
-        if self._last is not None and self._last.done():
-            self.wait()
+        """Return once all of it is done; raise what a piece raised."""
+        while self._under_way:
+            self._under_way.popleft().result()
 
 
 @cache
