@@ -33,7 +33,7 @@ from wakewise.operation import (
     write_scenario,
 )
 from wakewise.processes import alone
-from wakewise.reconstruction import read_cloud, read_lens, reconstruct
+from wakewise.reconstruction import mesh_model, read_cloud, read_lens, reconstruct
 from wakewise.targets import write_mesh
 from wakewise.trials.metrics import Figures, Gathering, comparison
 from wakewise.trials.stages import Ledger, Quiet, Watch, of_the_computer
@@ -60,14 +60,21 @@ _SURFACE_FIGURES = (
     "icp_matched_pct",
     "outside_pct",
 )
-_MODEL_FIGURES = ("reprojection_px", "cameras_rmse_mm", "features_per_image", "inlier_matches")
+_MODEL_FIGURES = ("reprojection_px", "cameras_rmse_mm", "features_per_image", "inlier_matches", "mapping")
 
 REGION_SHARE = 1.25
 """What is reconstructed is a little more than the target: estimated cameras put it some millimetres off its place."""
 
 
-def run_trial(flight: Parts | Scenario, folder: Path, watch: Watch | None = None) -> Figures:
+def run_trial(
+    flight: Parts | Scenario, folder: Path, watch: Watch | None = None, told: Callable[[Figures], None] | None = None
+) -> Figures:
     """Run what is left of a trial and return its figures, which are the content of metrics.json.
+
+    Parameters
+    ----------
+    told : callable, optional
+        Called with the figures as soon as they are known and written, before the mesh and its colours are made.
 
     Raises
     ------
@@ -79,17 +86,21 @@ def run_trial(flight: Parts | Scenario, folder: Path, watch: Watch | None = None
         If the disk is full, or a file cannot be read or written; the stages before it are kept.
     """
     need("a trial", "photos", "logs")
-    need("a trial", "photos", "logs")
     watch = watch or Quiet()
     parts = flight if isinstance(flight, Parts) else flight.parts()
     scenario = as_flown(parts)
     _ = parts.preflight
     claim(folder, scenario)
     with alone(folder):
-        return _run(parts, scenario, folder, watch)
+        result = _figures(parts, scenario, folder, watch)
+        if told is not None:
+            told(result)
+        _surface(parts, folder, watch)
+        return result
 
 
-def _run(parts: Parts, scenario: Scenario, folder: Path, watch: Watch) -> Figures:
+def _figures(parts: Parts, scenario: Scenario, folder: Path, watch: Watch) -> Figures:
+    """Run the stages that figures come from and write metrics.json."""
     ledger = Ledger(folder / "stages.json")
 
     def stage(name: str, product: str, work: Callable[[Callable[..., None]], None]) -> None:
@@ -112,14 +123,24 @@ def _run(parts: Parts, scenario: Scenario, folder: Path, watch: Watch) -> Figure
     gathering.add({"wall_s": ledger.total("wall_s"), "cpu_s": ledger.total("cpu_s")})
     result = gathering.finish()
     write_json(folder / "metrics.json", result)
-    # For people only, so it is no part of what the trial is said to have cost.
-    mesh, coloured = folder / "mesh.ply", folder / "mesh.glb"
+    return result
+
+
+def _surface(parts: Parts, folder: Path, watch: Watch) -> None:
+    """Mesh and colours: for people only, so after the figures and no part of what the trial is said to have cost."""
+    settings, mesh, coloured = parts.scenario.reconstruction, folder / "mesh.ply", folder / "mesh.glb"
+    if not settings.mesh or not (folder / "dense.ply").exists():
+        return
+    if mesh.exists() and mesh.stat().st_mtime >= (folder / "dense.ply").stat().st_mtime:
+        watch.skipped("mesh")
+    else:
+        with watch.stage("mesh") as progress, suppress(StageError):
+            mesh_model(folder, settings, progress)
     if coloured.exists() and mesh.exists() and coloured.stat().st_mtime >= mesh.stat().st_mtime:
         watch.skipped("colours")
     elif mesh.exists():
         with watch.stage("colours") as progress:
             texture_trial(parts, folder, progress)
-    return result
 
 
 def compare_methods(flights: Mapping[str, Parts | Scenario], folder: Path, watch: Watch | None = None) -> Figures:
@@ -195,15 +216,15 @@ def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None])
     photos = pl.read_csv(folder / "images.csv")
     names = photos["name"].to_list()
     centres = photos.select("est_x_m", "est_y_m", "est_z_m").to_numpy()
-    axes = matrix_from_quat(photos.select("est_qw", "est_qx", "est_qy", "est_qz").to_numpy())[:, :, 2]
+    rotations = matrix_from_quat(photos.select("est_qw", "est_qx", "est_qy", "est_qz").to_numpy())
     try:
         model = reconstruct(
             folder / "images",
             folder,
-            parts.scenario.reconstruction,
+            parts.scenario.reconstruction.model_copy(update={"mesh": False}),
             lens=read_lens(folder),
             reference_positions=dict(zip(names, centres, strict=True)),
-            reference_axes=dict(zip(names, axes, strict=True)),
+            reference_rotations=dict(zip(names, rotations, strict=True)),
             region=(parts.target.centre_W_m, REGION_SHARE * parts.target.radius_m),
             progress=progress,
         )
