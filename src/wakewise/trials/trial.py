@@ -23,6 +23,7 @@ from wakewise.geometry import matrix_from_quat
 from wakewise.likeness.textured import write_textured
 from wakewise.missions import SETTLING
 from wakewise.operation import (
+    Darkroom,
     Parts,
     Scenario,
     differences,
@@ -112,8 +113,9 @@ def _figures(parts: Parts, scenario: Scenario, folder: Path, watch: Watch) -> Fi
 
     _forget_what_was_not_measured(folder)
     stage("plan", "planned.csv", lambda _: write_plan(parts, folder))
-    stage("fly", "steps.parquet", lambda progress: fly_trial(parts, folder, progress))
-    stage("photograph", "images.csv", lambda progress: photograph_flight(parts, folder, progress))
+    with Darkroom(parts, folder) as darkroom:
+        stage("fly", "steps.parquet", lambda progress: fly_trial(parts, folder, progress, darkroom.take))
+        stage("photograph", "images.csv", lambda progress: _photograph(parts, folder, darkroom, progress))
     stage("reconstruct", "model.json", lambda progress: reconstruct_trial(parts, folder, progress))
     stage("evaluate", "score.json", lambda _: write_json(folder / "score.json", evaluate_trial(parts, folder)))
     figures = json.loads((folder / "score.json").read_text(encoding="utf-8"))
@@ -124,6 +126,13 @@ def _figures(parts: Parts, scenario: Scenario, folder: Path, watch: Watch) -> Fi
     result = gathering.finish()
     write_json(folder / "metrics.json", result)
     return result
+
+
+def _photograph(parts: Parts, folder: Path, darkroom: Darkroom, progress: Callable[..., None]) -> None:
+    """Wait for the photographs that were begun during the flight, and render the others."""
+    progress(0, 1, "photographs begun during the flight")
+    darkroom.finish()
+    photograph_flight(parts, folder, progress)
 
 
 def _surface(parts: Parts, folder: Path, watch: Watch) -> None:
