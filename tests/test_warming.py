@@ -89,9 +89,9 @@ def test_a_note_is_taken_when_a_job_is_done(monkeypatch: pytest.MonkeyPatch, tmp
 
 def test_stopped_it_ends() -> None:
     """No process is left behind, and waiting returns."""
-    with Warming(("more",), processes=1) as begun:
-        begun.stop()
-        begun.wait(("more",))
+    begun = Warming(("more",), processes=1)
+    begun.stop()
+    begun.wait(("more",))
     assert all(worker.wait(10) is not None for worker in begun._workers)
 
 

@@ -5,7 +5,7 @@ Thin: each function puts rooms together that do the work, and the command line c
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -45,7 +45,12 @@ class Result:
     report: Path
 
 
-def trial(flight: Parts | Scenario, folder: str | Path, watch: Watch | None = None) -> Result:
+def trial(
+    flight: Parts | Scenario,
+    folder: str | Path,
+    watch: Watch | None = None,
+    told: Callable[[dict[str, Any]], None] | None = None,
+) -> Result:
     """Fly, photograph, reconstruct, evaluate and report; what is done already is skipped.
 
     Parameters
@@ -55,6 +60,8 @@ def trial(flight: Parts | Scenario, folder: str | Path, watch: Watch | None = No
         Where everything goes; a trial that was cut off goes on there.
     watch : Watch, optional
         Is told how far each stage is.
+    told : callable, optional
+        Called with the figures as soon as they are known; mesh and report are made after that.
 
     Raises
     ------
@@ -73,7 +80,7 @@ def trial(flight: Parts | Scenario, folder: str | Path, watch: Watch | None = No
     from wakewise.trials import Quiet, run_trial
 
     watch, place = watch or Quiet(), Path(folder)
-    figures = run_trial(flight, place, watch)
+    figures = run_trial(flight, place, watch, told)
     with watch.stage("report") as progress:
         report = write_report(place)
         progress(1, 1)

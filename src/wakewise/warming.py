@@ -18,7 +18,7 @@ from functools import cache
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
-from typing import IO, Any, Self
+from typing import IO, Any
 
 from wakewise.errors import InputError
 from wakewise.numba_cache import VARIABLE, can_be_written, user_cache
@@ -146,14 +146,6 @@ class Warming:
     def is_done(self, jobs: Sequence[str]) -> bool:
         """Whether there is nothing left to compile of some jobs."""
         return not any(self._left.get(job) for job in jobs)
-
-    def __enter__(self) -> Self:
-        """Begin nothing anew: compiling began when this was made."""
-        return self
-
-    def __exit__(self, *fault: object) -> None:
-        """Give up what is left."""
-        self.stop()
 
     def stop(self) -> None:
         """Compile nothing further; what is being compiled is given up."""

@@ -20,7 +20,7 @@ SMALL = {
 
 @pytest.mark.slow
 def test_the_bench_has_every_figure_at_the_top_and_per_coral(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Accuracy, completeness, times by stage and memory of its own process, none of them missing in clear water."""
+    """Accuracy, completeness, times and memory, none missing in clear water; the way without poses beside it."""
     small = load_scenario("quick", None, SMALL)
     monkeypatch.setattr(reconstruction, "coral_kinds", lambda: ("brain",))
     monkeypatch.setattr(reconstruction, "load_scenario", lambda *_: small)
@@ -31,5 +31,9 @@ def test_the_bench_has_every_figure_at_the_top_and_per_coral(monkeypatch: pytest
     for figures in (found, found["corals"]["brain"]):
         assert all(figures[key] is not None for key in promised)
     assert found["why"] == {}
-    assert set(found["stages_s"]) == {"match", "map", "dense", "mesh", "evaluate"}
+    assert set(found["stages_s"]) == {"match", "map", "dense", "evaluate"}
+    one = found["corals"]["brain"]
+    assert one["mesh_s"] > 0.0 and one["cpu_ratio"] > 0.0
+    assert one["mapping"] == "from known poses" and one["photos_alone"]["mapping"] == "photo by photo"
+    assert all(value is not None for value in one["photos_alone"].values())
     assert 50.0 < found["memory_MB"] < 3000.0

@@ -106,7 +106,7 @@ def test_a_photo_set_is_not_judged_on_a_full_disk(tmp_path: Path, monkeypatch: p
         focal_px=100.0,
         true_W_m=np.zeros((1, 3)),
         est_W_m=np.zeros((1, 3)),
-        est_axes_W=np.array([[0.0, 0.0, 1.0]]),
+        est_R_WC=np.eye(3)[None],
     )
     with pytest.raises(EnvironmentFailure):
         photo_model.judge(photos, target, ReconstructionSettings(), tmp_path / "model")

@@ -58,7 +58,16 @@ class Stages:
 @pytest.fixture(scope="module")
 def trial(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     folder = tmp_path_factory.mktemp("trials") / "first"
-    return folder, run_trial(small(), folder)
+    told: list[dict] = []
+
+    def tell(figures: dict) -> None:
+        assert not (folder / "mesh.ply").exists()
+        assert json.loads((folder / "metrics.json").read_text()) == figures
+        told.append(figures)
+
+    result = run_trial(small(), folder, told=tell)
+    assert told == [result]
+    return folder, result
 
 
 def test_a_folder_that_another_run_is_at_is_let_be(trial: tuple[Path, dict]) -> None:
@@ -85,6 +94,7 @@ def test_the_small_scan_makes_a_model(trial: tuple[Path, dict]) -> None:
     """Most photographs find their place and the model is near the truth, even at a quarter of the usual pixels."""
     _, figures = trial
     assert figures["registered_images"] >= 16
+    assert figures["mapping"] == "from known poses"
     assert figures["rmse_mm"] < 4.0
     assert figures["completeness_pct"] > 70.0
     assert figures["collisions"] == 0
@@ -121,7 +131,7 @@ def test_running_again_does_nothing_and_running_after_a_loss_does_only_what_is_m
     again = Stages()
     assert run_trial(small(), folder, again) == figures
     assert again.ran == []
-    assert again.skips == ["plan", "fly", "photograph", "reconstruct", "evaluate", "colours"]
+    assert again.skips == ["plan", "fly", "photograph", "reconstruct", "evaluate", "mesh", "colours"]
     copy = tmp_path / "copy"
     shutil.copytree(folder, copy)
     lost = copy / "images" / "007.png"

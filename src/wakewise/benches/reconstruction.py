@@ -1,7 +1,9 @@
 """Photographs of three corals in clear water, standard preset: how good the models are, and what they cost.
 
-Each model is made in a process of its own, so that its memory is its own. Times are of the wall, as a user waits; the
-CPU time beside them tells what a loaded machine would hide.
+Each model is made in a process of its own, so that its memory is its own, and then once more from the photographs
+alone (`photos_alone`), which is what was done before poses were used. Times are of the wall, as a user waits, from
+photographs to figures; the CPU time beside them tells what a loaded machine would hide. The mesh comes after the
+figures: `mesh_s` is apart, and its memory is counted.
 """
 
 from __future__ import annotations
@@ -18,12 +20,14 @@ import numpy as np
 
 from wakewise.benches import imaging
 from wakewise.operation import Scenario, load_scenario
+from wakewise.reconstruction import ReconstructionSettings
 from wakewise.studies.photo_model import judge
 from wakewise.studies.photo_sets import planned_views, read_photo_set, write_photos
 from wakewise.targets import coral_kinds
 from wakewise.trials.timing import BenchOptions
 
 PRESET, SEED = "standard", 1
+_ALONE = ("rmse_mm", "completeness_pct", "completeness_visible_pct", "mapping", "stages_s", "total_s", "total_cpu_s")
 _WORST_IS_MOST = ("rmse_mm", "total_s", "total_cpu_s", "memory_MB")
 
 
@@ -61,14 +65,24 @@ def model_coral(scenario: Scenario, folder: Path, options: BenchOptions) -> dict
     rng = np.random.default_rng(scenario.seed)
     views = planned_views(target, scenario.mission, scenario.imaging.exposure_s, rng)
     write_photos(folder, views, None, scenario.imaging, target, seed=scenario.seed, progress=options.progress)
+    alone = scenario.reconstruction.model_copy(update={"known_poses": False, "mesh": False})
+    found, before = (_in_a_process(scenario, folder, settings) for settings in (scenario.reconstruction, alone))
+    return found | {
+        "photos_alone": {key: before.get(key) for key in _ALONE},
+        "cpu_ratio": found["total_cpu_s"] / before["total_cpu_s"],
+    }
+
+
+def _in_a_process(scenario: Scenario, folder: Path, settings: ReconstructionSettings) -> dict[str, Any]:
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
-        return pool.submit(_model, scenario, folder).result()
+        return pool.submit(_model, scenario, folder, settings).result()
 
 
-def _model(scenario: Scenario, folder: Path) -> dict[str, Any]:
+def _model(scenario: Scenario, folder: Path, settings: ReconstructionSettings) -> dict[str, Any]:
     target = scenario.parts().target
     photos = read_photo_set(folder, scenario.imaging.camera().focal_px)
-    return judge(photos, target, scenario.reconstruction, folder) | {"memory_MB": peak_memory_MB()}
+    out = folder / ("posed" if settings.known_poses else "alone")
+    return judge(photos, target, settings, out) | {"memory_MB": peak_memory_MB()}
 
 
 def peak_memory_MB() -> float:

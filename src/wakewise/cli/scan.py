@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -21,6 +22,9 @@ from wakewise.cli.options import (
     default_folder,
     overrides,
 )
+
+if TYPE_CHECKING:
+    from wakewise.operation import Scenario
 
 Method = Annotated[
     str | None,
@@ -75,14 +79,16 @@ def scan(
     changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, method=method)
     resolved = load_scenario(preset, scenario, changes)
     folder = out or default_folder(resolved, resolved.method)
-    result = trial(resolved, folder, Bars())
-    figures, report = result.figures, result.report
-    if json:
-        print_json(figures)
-        return
+    result = trial(resolved, folder, Bars(), print_json if json else partial(_print_figures, resolved))
+    if not json:
+        typer.echo(f"report: {result.report}")
+
+
+def _print_figures(scenario: Scenario, figures: dict[str, Any]) -> None:
+    """The headlines of a trial as a table, and why some are missing."""
     from rich.table import Table
 
-    table = Table(title=f"{resolved.method}, {Path(resolved.target.kind).stem} coral, seed {resolved.seed}")
+    table = Table(title=f"{scenario.method}, {Path(scenario.target.kind).stem} coral, seed {scenario.seed}")
     table.add_column("figure")
     table.add_column("value", justify="right")
     table.add_column("unit")
@@ -91,4 +97,3 @@ def scan(
     print_table(table)
     for line in reasons_once(figures["why"], _HEADLINES):
         typer.echo(line)
-    typer.echo(f"report: {report}")

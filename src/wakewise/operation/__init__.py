@@ -5,7 +5,8 @@ one meet) and `loop.py` (the loop itself). `scenario.py` is a maker of parts, re
 names of older files), `seeds.py` its random streams; `worlds.py` and `pilots.py` are worlds and pilots by name,
 `instant_water.py` the worlds whose water answers at once; `surroundings.py` is what a planner is told to keep clear
 of, `preflight.py` refuses what does not fit, `foreign.py` guards what comes from outside; `flying.py` flies,
-`recorder.py` and `telemetry.py` keep what was, `photography.py` renders what the camera saw.
+`recorder.py` and `telemetry.py` keep what was, `photography.py` renders what the camera saw, `darkroom.py`
+while the flight goes on.
 """
 
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 from wakewise.doors import lazy_door
 
 if TYPE_CHECKING:
+    from wakewise.operation.darkroom import Darkroom
     from wakewise.operation.flying import Flight, fly, fly_trial
     from wakewise.operation.parts import PARTS, Parts
     from wakewise.operation.photography import photo_name, photograph_flight
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 __all__ = [
     "PARTS",
     "PRESETS",
+    "Darkroom",
     "Flight",
     "FlightRecorder",
     "Parts",

@@ -19,7 +19,7 @@ from wakewise.missions import SETTLING
 from wakewise.operation.loop import Step, run_loop
 from wakewise.operation.parts import Parts
 from wakewise.operation.preflight import check_begin
-from wakewise.operation.recorder import FlightRecorder
+from wakewise.operation.recorder import ExposureRecord, FlightRecorder
 from wakewise.operation.scenario import Scenario
 from wakewise.warming import warm
 
@@ -93,6 +93,7 @@ def fly(
     checked: bool = True,
     water_every_s: float = WATER_EVERY_S,
     watch: Callable[[Step, Witness | None], None] | None = None,
+    exposed: Callable[[int, ExposureRecord], None] | None = None,
 ) -> Flight:
     """Fly the parts once, from the beginning of their world; flown again they give the same flight.
 
@@ -109,6 +110,8 @@ def fly(
         How often the water at the target is measured.
     watch : callable, optional
         Called as `(step, witness)` at each step, after the record.
+    exposed : callable, optional
+        Called as `(number, exposure)` when the shutter has opened, number counting from 0.
 
     Returns
     -------
@@ -147,6 +150,7 @@ def fly(
         dt_s=dt_s,
         witness=witness,
         water_every_s=water_every_s,
+        exposed=exposed,
     )
 
     def record(step: Step) -> None:
@@ -181,17 +185,23 @@ def fly(
     return Flight(parts, recorder)
 
 
-def fly_trial(parts: Parts, folder: Path, progress: Callable[..., None] = no_progress) -> None:
+def fly_trial(
+    parts: Parts,
+    folder: Path,
+    progress: Callable[..., None] = no_progress,
+    exposed: Callable[[int, ExposureRecord], None] | None = None,
+) -> None:
     """Fly the mission once and leave its record. steps.parquet is written last: where it is, the flight is whole.
 
-    log.mcap, for viewers, is written where the extra `logs` is installed; a trial asks for it beforehand.
+    log.mcap, for viewers, is written where the extra `logs` is installed; a trial asks for it beforehand. `exposed` is
+    called with each exposure as it is recorded (see `fly`).
 
     Raises
     ------
     StageError
         If the flight ended with no exposure.
     """
-    flight = fly(parts, progress=progress)
+    flight = fly(parts, progress=progress, exposed=exposed)
     made, planned = len(flight.recorder.exposures), len(parts.route.exposures_s)
     if made != planned:
         raise StageError(f"{made} of {planned} exposures were made")

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -15,7 +17,7 @@ from numpy.typing import NDArray
 from wakewise.files import whole_file, write_text
 from wakewise.geometry import Pose
 from wakewise.imaging import SiltOptics, calibrate, photograph
-from wakewise.interfaces import ScalarGrid, no_progress
+from wakewise.interfaces import no_progress
 from wakewise.operation.parts import Parts
 from wakewise.operation.recorder import ExposureRecord, read_exposures
 from wakewise.operation.scenario import Scenario
@@ -33,29 +35,16 @@ def photograph_flight(parts: Parts, folder: Path, progress: Callable[..., None] 
     """Render the photographs that are not there yet; images.csv, written last, says that all are.
 
     cameras.txt (COLMAP) and camera.json hold the camera model; the poses of images.csv are those of its projection
-    centre, which lies off the lens's pupil where a flat port bends the rays. Each photograph draws its noise from its
-    own child of the seed, so a resumed run gives the same pictures.
+    centre, which lies off the lens's pupil where a flat port bends the rays.
     """
-    scenario = parts.scenario
     exposures = read_exposures(folder / "exposures.npz")
-    names = parts.route.exposure_names
-    camera = parts.camera
-    calibration = calibrate(camera)
+    calibration = calibrate(parts.camera)
     calibration.write(folder)
-    progress(0, len(exposures), "building the scene")
-    scene = parts.scene
-    streams = parts.seeds.imaging().spawn(len(exposures))
-    grains = SiltOptics(diameter_m=scenario.tank.silt.grain_m, density_kg_m3=scenario.tank.silt.grain_density_kg_m3)
-    images = folder / "images"
     rows = []
-    for k, (planned, exposure, rng) in enumerate(zip(names, exposures, streams, strict=True)):
-        name = photo_name(planned, scenario)
-        note = images / f".{Path(name).stem}.json"
-        if not ((images / name).exists() and note.exists()):
-            photo = photograph(scene, camera, exposure.X_WC_true, _silt(exposure), scenario.imaging, rng, grains)
-            write_image(images / name, photo.image, scenario.imaging.jpeg_quality)
-            write_text(note, json.dumps({"sharpness": photo.sharpness, "turbidity_per_m": photo.turbidity_per_m}))
-        seen = json.loads(note.read_text(encoding="utf-8"))
+    for k, exposure in enumerate(exposures):
+        name = photo_name(parts.route.exposure_names[k], parts.scenario)
+        progress(k, len(exposures), name)
+        seen = take_photograph(parts, folder, k, exposure)
         middle = exposure.X_WC_true[len(exposure.X_WC_true) // 2]
         rows.append(
             [
@@ -67,13 +56,48 @@ def photograph_flight(parts: Parts, folder: Path, progress: Callable[..., None] 
                 f"{seen['turbidity_per_m']:.6g}",
             ]
         )
-        progress(k + 1, len(exposures), name)
+    progress(len(exposures), len(exposures))
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerows([IMAGE_COLUMNS, *rows])
     write_text(folder / "images.csv", text.getvalue())
-    for note in images.glob(".*.json"):
+    for note in (folder / "images").glob(".*.json"):
         note.unlink()
+
+
+def take_photograph(parts: Parts, folder: Path, number: int, exposure: ExposureRecord) -> dict[str, Any]:
+    """Render one exposure into images/ unless that is done; return what was noted of it.
+
+    Each photograph draws its noise from its own child of the seed, so that it is the same whenever it is made. A note
+    beside it holds its sharpness, turbidity and the exposure's fingerprint: a photograph of another exposure, left by a
+    flight that was cut off, is made anew. Exposures are as `read_exposures` gives them.
+    """
+    scenario, names = parts.scenario, parts.route.exposure_names
+    image = folder / "images" / photo_name(names[number], scenario)
+    note = image.with_name(f".{image.stem}.json")
+    mark = fingerprint(exposure)
+    if image.exists() and note.exists():
+        noted: dict[str, Any] = json.loads(note.read_text(encoding="utf-8"))
+        if noted["exposure"] == mark:
+            return noted
+    rng = parts.seeds.imaging().spawn(len(names))[number]
+    grains = SiltOptics(diameter_m=scenario.tank.silt.grain_m, density_kg_m3=scenario.tank.silt.grain_density_kg_m3)
+    silt = exposure.silt if float(exposure.silt.values.max(initial=0.0)) > 0.0 else None
+    photo = photograph(parts.scene, parts.camera, exposure.X_WC_true, silt, scenario.imaging, rng, grains)
+    write_image(image, photo.image, scenario.imaging.jpeg_quality)
+    noted = {"exposure": mark, "sharpness": photo.sharpness, "turbidity_per_m": photo.turbidity_per_m}
+    write_text(note, json.dumps(noted))
+    return noted
+
+
+def fingerprint(exposure: ExposureRecord) -> str:
+    """Digest of all that a photograph's pixels hang on."""
+    digest = hashlib.blake2b(digest_size=16)
+    for X_WC in exposure.X_WC_true:
+        digest.update(X_WC.p_m.tobytes() + X_WC.q.tobytes())
+    silt = exposure.silt
+    digest.update(np.array([silt.spacing_m, *silt.origin_W_m, *silt.values.shape]).tobytes() + silt.values.tobytes())
+    return digest.hexdigest()
 
 
 def photo_name(planned: str, scenario: Scenario) -> str:
@@ -86,10 +110,6 @@ def write_image(path: Path, image: NDArray[np.uint8], jpeg_quality: int = 92) ->
     options = [cv2.IMWRITE_JPEG_QUALITY, jpeg_quality] if path.suffix == ".jpg" else []
     with whole_file(path) as temporary:
         temporary.write_bytes(cv2.imencode(path.suffix, image[..., ::-1], options)[1].tobytes())
-
-
-def _silt(exposure: ExposureRecord) -> ScalarGrid | None:
-    return exposure.silt if float(exposure.silt.values.max(initial=0.0)) > 0.0 else None
 
 
 def _numbers(X_WC: Pose) -> list[str]:

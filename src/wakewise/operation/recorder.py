@@ -6,8 +6,10 @@ timings.parquet. Column names carry units; frames and meanings are in docs/conve
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from pathlib import Path
+from typing import IO, Any
 
 import numpy as np
 import polars as pl
@@ -67,6 +69,8 @@ class FlightRecorder:
         Without one, true columns and water columns are NaN and no exposure is rendered.
     water_every_s : float
         How often the water is asked about; in between the last answer stands.
+    exposed : callable, optional
+        Called as `(number, exposure)` for each exposure when it has been recorded; number counts from 0.
     """
 
     route: Route
@@ -77,6 +81,7 @@ class FlightRecorder:
     dt_s: float
     witness: Witness | None
     water_every_s: float = 0.1
+    exposed: Callable[[int, ExposureRecord], None] | None = None
     exposures: list[ExposureRecord] = field(default_factory=list)
     _rows: list[Array] = field(default_factory=list)
     _legs: list[str] = field(default_factory=list)
@@ -128,6 +133,8 @@ class FlightRecorder:
                     silt=self.witness.silt(),
                 )
             )
+            if self.exposed is not None:
+                self.exposed(len(self.exposures) - 1, self.exposures[-1])
 
     @property
     def duration_s(self) -> float:
@@ -163,22 +170,25 @@ def state_vector(state: BodyState) -> Array:
 def write_exposures(path: Path, exposures: list[ExposureRecord], exposure_s: float) -> None:
     """Write what each photograph needs to be rendered later."""
     with whole_file(path) as temporary, temporary.open("wb") as file:
-        np.savez_compressed(
-            file,
-            time_s=np.array([e.time_s for e in exposures]),
-            X_WC_p_m=np.array([[X.p_m for X in e.X_WC_true] for e in exposures]),
-            X_WC_q=np.array([[X.q for X in e.X_WC_true] for e in exposures]),
-            X_WC_est_p_m=np.array([e.X_WC_est.p_m for e in exposures]),
-            X_WC_est_q=np.array([e.X_WC_est.q for e in exposures]),
-            silt_origin_W_m=exposures[0].silt.origin_W_m,
-            silt_spacing_m=np.array(exposures[0].silt.spacing_m),
-            silt_kg_m3=np.array([e.silt.values for e in exposures], dtype=np.float32),
-            exposure_s=np.array(exposure_s),
-        )
+        np.savez_compressed(file, exposure_s=np.array(exposure_s), **exposure_arrays(exposures))
 
 
-def read_exposures(path: Path) -> list[ExposureRecord]:
-    """Read what `write_exposures` wrote."""
+def exposure_arrays(exposures: list[ExposureRecord]) -> dict[str, Any]:
+    """What an exposure is, as the arrays that are kept of it; silt in single precision."""
+    return {
+        "time_s": np.array([e.time_s for e in exposures]),
+        "X_WC_p_m": np.array([[X.p_m for X in e.X_WC_true] for e in exposures]),
+        "X_WC_q": np.array([[X.q for X in e.X_WC_true] for e in exposures]),
+        "X_WC_est_p_m": np.array([e.X_WC_est.p_m for e in exposures]),
+        "X_WC_est_q": np.array([e.X_WC_est.q for e in exposures]),
+        "silt_origin_W_m": exposures[0].silt.origin_W_m,
+        "silt_spacing_m": np.array(exposures[0].silt.spacing_m),
+        "silt_kg_m3": np.array([e.silt.values for e in exposures], dtype=np.float32),
+    }
+
+
+def read_exposures(path: Path | IO[bytes]) -> list[ExposureRecord]:
+    """Read what `write_exposures` wrote, or the same arrays from an open file."""
     with np.load(path) as data:
         origin, spacing = data["silt_origin_W_m"], float(data["silt_spacing_m"])
         p, q, silt = data["X_WC_p_m"], data["X_WC_q"], data["silt_kg_m3"]

@@ -16,6 +16,7 @@ from wakewise.files import whole_file
 from wakewise.interfaces import Progress
 from wakewise.processes import half_done
 from wakewise.reconstruction.colmap import call, pycolmap, settle, workroom
+from wakewise.reconstruction.guided import Poses, match_by_poses
 from wakewise.reconstruction.lenses import Lens
 from wakewise.reconstruction.pairs import Pairs
 from wakewise.reconstruction.photos import Photo, PhotoStore
@@ -39,6 +40,7 @@ def match_photos(
     progress: Progress,
     store: PhotoStore | None = None,
     lens: Lens | None = None,
+    poses: Poses | None = None,
 ) -> dict[str, Any]:
     """Find SIFT features, match and verify; write COLMAP's database whole.
 
@@ -52,11 +54,15 @@ def match_photos(
         Photos that are decoded already.
     lens : Lens, optional
         The camera that took them all, instead of a focal length.
+    poses : dict, optional
+        Rough R_WC, shape (3, 3), and p_WC_m, shape (3,), by photo name: pairs are matched along epipolar lines first,
+        and only those that do not verify among all features.
 
     Returns
     -------
     dict
-        features_per_image, inlier_matches (verified, all pairs together), verified_pairs.
+        features_per_image, inlier_matches (verified, all pairs together), verified_pairs, pairs, posed_pairs (those
+        verified along epipolar lines).
 
     Raises
     ------
@@ -73,8 +79,9 @@ def match_photos(
         work.touch()
         _extract(store or PhotoStore(folder), photos, work, settings, focal_px, lens, progress)
         _check_all_there(work, folder, names)
-        _match(work, settings, pairs, progress)
-        figures = _figures(work, len(photos))
+        left = pairs if poses is None else match_by_poses(work, pairs, poses, settings.threads, progress)
+        _match(work, settings, left, progress)
+        figures = _figures(work, len(photos)) | {"pairs": len(pairs), "posed_pairs": len(pairs) - len(left)}
         settle(work)
         shutil.copyfile(work, whole)
         if figures["inlier_matches"] == 0:

@@ -17,7 +17,9 @@ from wakewise.evaluation import robust_similarity
 from wakewise.files import whole_folder
 from wakewise.interfaces import Progress
 from wakewise.reconstruction.colmap import call, no_stderr, pycolmap, settle, workroom
+from wakewise.reconstruction.guided import Poses
 from wakewise.reconstruction.photos import PhotoStore
+from wakewise.reconstruction.seeded import Seeded, map_from_poses
 from wakewise.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
 
 # Most iterations of a bundle adjustment; fewer registered photos than that are a failure.
@@ -29,6 +31,8 @@ GROWTH = 1.4
 # OpenCV's remap takes no wider image.
 MOST_COLUMNS = 30_000
 NEVER = 2**31 - 1
+MAPPINGS = {"poses": "from known poses", "incremental": "photo by photo", "global": "all photos at once"}
+"""Ways to a sparse model, in words."""
 # No photo sees sharply from nearer, and none of a scan from farther: beyond, the positions are hardly in metres.
 SENSIBLE_RANGE_M = (0.01, 1000.0)
 
@@ -43,6 +47,7 @@ def map_photos(
     references: dict[str, Array] | None,
     progress: Progress,
     store: PhotoStore | None = None,
+    poses: Poses | None = None,
 ) -> dict[str, Any]:
     """Structure from motion; keep the largest model, bring it to the reference positions, write it whole.
 
@@ -59,10 +64,14 @@ def map_photos(
         model's shape does not bend to them unless `position_priors` is set.
     store : PhotoStore, optional
         Photos that are decoded already.
+    poses : dict, optional
+        Rough R_WC, shape (3, 3), and p_WC_m, shape (3,), by photo name, to begin the model from (see `seeded`); where
+        the result does not pass, the model is built from the photos alone.
 
     Returns
     -------
     dict
+        mapping (how the model came about, one of `MAPPINGS`), poses_refused (why not from the poses),
         registered_images, points, reprojection_px, reprojection_met, track_length, focal_px, cameras_rmse_mm and
         cameras_max_mm over all registered photos with a reference, reference_inliers, scale, surface_distance_m (median
         from camera to sparse point), suspicion; None where no references were given.
@@ -77,13 +86,19 @@ def map_photos(
         copy = Path(shutil.copyfile(database, room / "database.db"))
         if settings.position_priors and references is not None:
             _write_priors(copy, references, settings.prior_sigma_m)
-        models = _solve(folder, copy, room, settings, photos, progress)
-    if not models:
+        seeded = Seeded(model=None, refusal=None)
+        if poses is not None:
+            seeded = map_from_poses(copy, poses, settings, photos, progress)
+        model, way = seeded.model, MAPPINGS["poses"]
+        if model is None:
+            models = _solve(folder, copy, room, settings, photos, progress)
+            model = max(models.values(), key=lambda one: one.num_reg_images(), default=None)
+            way = MAPPINGS[settings.mapper]
+    if model is None:
         raise StageError(
             f"mapping: none of the {photos} photos register; they show too little in common or were taken "
             "from one place"
         )
-    model = max(models.values(), key=lambda one: one.num_reg_images())
     registered = model.num_reg_images()
     least = min(MIN_REGISTERED, photos)
     if registered < least:
@@ -102,6 +117,8 @@ def map_photos(
     colour_points(model, store or PhotoStore(folder), settings.threads)
     error_px = float(model.compute_mean_reprojection_error())
     figures |= {
+        "mapping": way,
+        "poses_refused": seeded.refusal,
         "registered_images": registered,
         "points": model.num_points3D(),
         "reprojection_px": error_px,

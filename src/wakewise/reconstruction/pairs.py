@@ -14,8 +14,9 @@ from wakewise.reconstruction.settings import ReconstructionSettings
 
 Pairs = list[tuple[str, str]]
 # Views whose axes differ by more hardly share a SIFT match (Mikolajczyk & Schmid 2005, doi 10.1109/TPAMI.2005.188).
-EXHAUSTIVE_UP_TO, SEQUENCE_OVERLAP, POSE_NEIGHBOURS = 80, 10, 8
-"""Photos up to which `auto` matches every pair; photos that each is matched with, in sequence and by poses."""
+EXHAUSTIVE_UP_TO, SEQUENCE_OVERLAP, POSE_NEIGHBOURS, BAND_NEIGHBOURS = 80, 10, 8, 6
+"""Photos up to which `auto` matches every pair; photos that each is matched with, in sequence, by poses, and along
+epipolar lines of poses: those find more in a pair, and with 6 cameras came out as precise as with 8."""
 MAX_ANGLE_RAD = np.radians(45.0)
 
 
@@ -24,6 +25,7 @@ def choose_pairs(
     settings: ReconstructionSettings,
     centres_W_m: dict[str, Array] | None = None,
     axes_W: dict[str, Array] | None = None,
+    neighbours: int = POSE_NEIGHBOURS,
 ) -> Pairs:
     """Pairs as the settings ask for them.
 
@@ -33,6 +35,9 @@ def choose_pairs(
         Photo names in order.
     centres_W_m, axes_W : dict, optional
         Camera centres and optical axes, shape (3,) each, by name. Without axes all are taken to look the same way.
+
+    neighbours : int
+        How many each is matched with at least, by poses.
 
     Raises
     ------
@@ -47,7 +52,7 @@ def choose_pairs(
         axes = None
         if axes_W is not None and all(name in axes_W for name in names):
             axes = np.array([axes_W[name] for name in names])
-        return pose_pairs(names, centres, axes, POSE_NEIGHBOURS)
+        return pose_pairs(names, centres, axes, neighbours)
     if settings.matching == "sequential" or (settings.matching == "auto" and len(names) > EXHAUSTIVE_UP_TO):
         return sequence_pairs(names, SEQUENCE_OVERLAP)
     return list(combinations(names, 2))

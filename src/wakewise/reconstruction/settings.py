@@ -32,6 +32,11 @@ class ReconstructionSettings(Settings):
     mapper: Literal["incremental", "global"] = Field(
         default="incremental", description="one photo after the other, or all at once (GLOMAP)"
     )
+    known_poses: bool = Field(
+        default=True,
+        description="where camera poses come with the photos, match along epipolar lines and begin the model from "
+        "the poses; else, and where they turn out not to fit, go by the photos alone",
+    )
     reprojection_px: float = Field(
         default=0.5,
         gt=0.0,

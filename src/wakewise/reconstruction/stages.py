@@ -50,7 +50,7 @@ def run_stage(
         If a file cannot be read or written, or the disk is full; whatever `work` raises else.
     """
     stamp = folder / "stages" / f"{name}.json"
-    known = _read_stamp(stamp)
+    known = read_stamp(folder, name)
     if known.get("key") == key and all(path.exists() for path in products):
         return StageResult(figures=known["figures"], wall_s=known["wall_s"], key=key, skipped=True)
     start = time.perf_counter()
@@ -111,8 +111,9 @@ def make_folder(folder: Path) -> None:
         raise InputError(f"{folder}: cannot be made a folder for the model ({fault.strerror})") from None
 
 
-def _read_stamp(path: Path) -> dict[str, Any]:
-    """What a stamp says; nothing if it is missing or damaged."""
+def read_stamp(folder: Path, name: str) -> dict[str, Any]:
+    """What the stamp of a stage says: key, wall_s, figures; nothing if it is missing or damaged."""
+    path = folder / "stages" / f"{name}.json"
     try:
         value = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):

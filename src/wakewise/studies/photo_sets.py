@@ -16,7 +16,7 @@ import numpy as np
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
 from wakewise.files import write_text
-from wakewise.geometry import Pose, quat_from_rotvec, quat_multiply
+from wakewise.geometry import Pose, matrix_from_quat, quat_from_rotvec, quat_multiply
 from wakewise.imaging import ImagingSettings, Render, Scene, photograph_of, render
 from wakewise.interfaces import Progress, ScalarGrid, no_progress
 from wakewise.missions import MissionSettings, plan_route
@@ -38,17 +38,22 @@ class View:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PhotoSet:
-    """A folder of photographs with the poses that go with them; centres have shape (n, 3), axes are optical axes."""
+    """A folder of photographs with the poses that go with them; centres have shape (n, 3), `est_R_WC` (n, 3, 3)."""
 
     folder: Path
     names: tuple[str, ...]
     true_W_m: Array
     est_W_m: Array
-    est_axes_W: Array
+    est_R_WC: Array
     focal_px: float
 
     def __post_init__(self) -> None:
-        freeze(self, true_W_m=(None, 3), est_W_m=(None, 3), est_axes_W=(None, 3))
+        freeze(self, true_W_m=(None, 3), est_W_m=(None, 3), est_R_WC=(None, 3, 3))
+
+    @property
+    def rotations(self) -> dict[str, Array]:
+        """Estimated R_WC by photo name."""
+        return dict(zip(self.names, self.est_R_WC, strict=True))
 
     @property
     def references(self) -> dict[str, Array]:
@@ -126,9 +131,9 @@ def write_photos(
         write_image(path, photograph_of(clean, camera, view.X_WC, silt, imaging, rng).image)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("name", "x_m", "y_m", "z_m", "true_x_m", "true_y_m", "true_z_m", "axis_x", "axis_y", "axis_z"))
+    writer.writerow(("name", "x_m", "y_m", "z_m", "true_x_m", "true_y_m", "true_z_m", "qw", "qx", "qy", "qz"))
     for view in views:
-        numbers = (*view.X_WC_est.p_m, *view.X_WC[1].p_m, *view.X_WC_est.R[:, 2])
+        numbers = (*view.X_WC_est.p_m, *view.X_WC[1].p_m, *view.X_WC_est.q)
         writer.writerow((view.name, *(f"{value:.9f}" for value in numbers)))
     write_text(folder / "poses.csv", text.getvalue())
     return read_photo_set(folder, camera.focal_px)
@@ -140,19 +145,21 @@ def read_photo_set(folder: Path, focal_px: float) -> PhotoSet:
     Raises
     ------
     InputError
-        If poses.csv is not there.
+        If poses.csv is not there, or is an older version's.
     """
     path = folder / "poses.csv"
     if not path.is_file():
         raise InputError(f"{path}: does not exist; the folder holds no finished set of photographs")
     with path.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.reader(file))[1:]
+        head, *rows = csv.reader(file)
+    if head[-4:] != ["qw", "qx", "qy", "qz"]:
+        raise InputError(f"{path}: ends with columns {', '.join(head[-4:])}, needs qw, qx, qy, qz; make the set anew")
     numbers = np.array([[float(word) for word in row[1:]] for row in rows])
     return PhotoSet(
         folder=folder / "images",
         names=tuple(row[0] for row in rows),
         est_W_m=numbers[:, 0:3],
         true_W_m=numbers[:, 3:6],
-        est_axes_W=numbers[:, 6:9],
+        est_R_WC=matrix_from_quat(numbers[:, 6:10]),
         focal_px=focal_px,
     )

@@ -26,7 +26,8 @@ _FIGURES: dict[str, tuple[str, str, Better]] = {
                 "each distance capped at rmse_cap_mm; only what stands 10 mm or more above the bed counts", "less"),
     "rmse_cap_mm": ("mm", "cap on a single distance in rmse_mm", "none"),
     "accuracy_median_mm": ("mm", "median distance from the cloud to the true surface", "less"),
-    "completeness_pct": ("%", "share of the true surface with a cloud point within 3 mm", "more"),
+    "completeness_pct": ("%", "share of the true surface with a cloud point within 3 mm, over samples spread evenly by "
+                         "area", "more"),
     "completeness_visible_pct": ("%", "the same, over surface seen by at least three photographs", "more"),
     "completeness_1mm_pct": ("%", "share of the true surface with a cloud point within 1 mm", "more"),
     "completeness_2mm_pct": ("%", "share of the true surface with a cloud point within 2 mm", "more"),
@@ -36,6 +37,8 @@ _FIGURES: dict[str, tuple[str, str, Better]] = {
     "registered_images": ("", "photographs that found their place in the model", "more"),
     "features_per_image": ("", "mean number of SIFT keypoints in a photograph", "more"),
     "inlier_matches": ("", "feature matches that passed two-view geometry, summed over pairs", "more"),
+    "mapping": ("", "how cameras were found: from known poses (the vehicle's, triangulated and adjusted), or from the "
+                "photographs alone, as where the poses did not fit (photo by photo, all photos at once)", "none"),
     "reprojection_px": ("px", "mean reprojection error of the sparse model", "less"),
     "cameras_rmse_mm": ("mm", "rms distance of reconstructed camera centres from the vehicle's estimates, aligned",
                         "less"),

@@ -23,6 +23,7 @@ from wakewise.geometry import matrix_from_quat
 from wakewise.likeness.textured import write_textured
 from wakewise.missions import SETTLING
 from wakewise.operation import (
+    Darkroom,
     Parts,
     Scenario,
     differences,
@@ -34,15 +35,15 @@ from wakewise.operation import (
 )
 from wakewise.operation.flying import FLIGHT_JOBS
 from wakewise.processes import alone
-from wakewise.reconstruction import read_cloud, read_lens, reconstruct
+from wakewise.reconstruction import mesh_model, read_cloud, read_lens, reconstruct
 from wakewise.targets import write_mesh
 from wakewise.trials.metrics import Figures, Gathering, comparison
 from wakewise.trials.stages import Ledger, Quiet, Watch, of_the_computer
 from wakewise.trials.yardstick import add_yardsticks
-from wakewise.warming import Warming
+from wakewise.warming import is_warm, warm
 
 JOBS = (*FLIGHT_JOBS, "photograph", "reconstruct")
-"""What is compiled for a trial, if it is not yet; the later ones while the vehicle flies."""
+"""What is compiled before a trial, if it is not yet: photographs are rendered while the vehicle flies."""
 
 MAIN_SURFACE_FIGURES = (
     "rmse_mm",
@@ -65,14 +66,21 @@ _SURFACE_FIGURES = (
     "icp_matched_pct",
     "outside_pct",
 )
-_MODEL_FIGURES = ("reprojection_px", "cameras_rmse_mm", "features_per_image", "inlier_matches")
+_MODEL_FIGURES = ("reprojection_px", "cameras_rmse_mm", "features_per_image", "inlier_matches", "mapping")
 
 REGION_SHARE = 1.25
 """What is reconstructed is a little more than the target: estimated cameras put it some millimetres off its place."""
 
 
-def run_trial(flight: Parts | Scenario, folder: Path, watch: Watch | None = None) -> Figures:
+def run_trial(
+    flight: Parts | Scenario, folder: Path, watch: Watch | None = None, told: Callable[[Figures], None] | None = None
+) -> Figures:
     """Run what is left of a trial and return its figures, which are the content of metrics.json.
+
+    Parameters
+    ----------
+    told : callable, optional
+        Called with the figures as soon as they are known and written, before the mesh and its colours are made.
 
     Raises
     ------
@@ -84,36 +92,38 @@ def run_trial(flight: Parts | Scenario, folder: Path, watch: Watch | None = None
         If the disk is full, or a file cannot be read or written; the stages before it are kept.
     """
     need("a trial", "photos", "logs")
-    need("a trial", "photos", "logs")
     watch = watch or Quiet()
     parts = flight if isinstance(flight, Parts) else flight.parts()
     scenario = as_flown(parts)
-    with Warming(JOBS) as warming:
-        if not warming.is_done(FLIGHT_JOBS):
-            with watch.stage("compile") as progress:
-                warming.wait(FLIGHT_JOBS, progress)
-        _ = parts.preflight
-        claim(folder, scenario)
-        with alone(folder):
-            return _run(parts, scenario, folder, watch, warming)
+    if not is_warm(JOBS):
+        with watch.stage("compile") as progress:
+            warm(JOBS, progress)
+    _ = parts.preflight
+    claim(folder, scenario)
+    with alone(folder):
+        result = _figures(parts, scenario, folder, watch)
+        if told is not None:
+            told(result)
+        _surface(parts, folder, watch)
+        return result
 
 
-def _run(parts: Parts, scenario: Scenario, folder: Path, watch: Watch, warming: Warming) -> Figures:
+def _figures(parts: Parts, scenario: Scenario, folder: Path, watch: Watch) -> Figures:
+    """Run the stages that figures come from and write metrics.json."""
     ledger = Ledger(folder / "stages.json")
 
     def stage(name: str, product: str, work: Callable[[Callable[..., None]], None]) -> None:
         if (folder / product).exists():
             watch.skipped(name)
             return
-        with watch.stage(name) as progress:
-            warming.wait((name,), progress)
-            with ledger.account(name):
-                work(progress)
+        with watch.stage(name) as progress, ledger.account(name):
+            work(progress)
 
     _forget_what_was_not_measured(folder)
     stage("plan", "planned.csv", lambda _: write_plan(parts, folder))
-    stage("fly", "steps.parquet", lambda progress: fly_trial(parts, folder, progress))
-    stage("photograph", "images.csv", lambda progress: photograph_flight(parts, folder, progress))
+    with Darkroom(parts, folder) as darkroom:
+        stage("fly", "steps.parquet", lambda progress: fly_trial(parts, folder, progress, darkroom.take))
+        stage("photograph", "images.csv", lambda progress: _photograph(parts, folder, darkroom, progress))
     stage("reconstruct", "model.json", lambda progress: reconstruct_trial(parts, folder, progress))
     stage("evaluate", "score.json", lambda _: write_json(folder / "score.json", evaluate_trial(parts, folder)))
     figures = json.loads((folder / "score.json").read_text(encoding="utf-8"))
@@ -123,14 +133,31 @@ def _run(parts: Parts, scenario: Scenario, folder: Path, watch: Watch, warming: 
     gathering.add({"wall_s": ledger.total("wall_s"), "cpu_s": ledger.total("cpu_s")})
     result = gathering.finish()
     write_json(folder / "metrics.json", result)
-    # For people only, so it is no part of what the trial is said to have cost.
-    mesh, coloured = folder / "mesh.ply", folder / "mesh.glb"
+    return result
+
+
+def _photograph(parts: Parts, folder: Path, darkroom: Darkroom, progress: Callable[..., None]) -> None:
+    """Wait for the photographs that were begun during the flight, and render the others."""
+    progress(0, 1, "photographs begun during the flight")
+    darkroom.finish()
+    photograph_flight(parts, folder, progress)
+
+
+def _surface(parts: Parts, folder: Path, watch: Watch) -> None:
+    """Mesh and colours: for people only, so after the figures and no part of what the trial is said to have cost."""
+    settings, mesh, coloured = parts.scenario.reconstruction, folder / "mesh.ply", folder / "mesh.glb"
+    if not settings.mesh or not (folder / "dense.ply").exists():
+        return
+    if mesh.exists() and mesh.stat().st_mtime >= (folder / "dense.ply").stat().st_mtime:
+        watch.skipped("mesh")
+    else:
+        with watch.stage("mesh") as progress, suppress(StageError):
+            mesh_model(folder, settings, progress)
     if coloured.exists() and mesh.exists() and coloured.stat().st_mtime >= mesh.stat().st_mtime:
         watch.skipped("colours")
     elif mesh.exists():
         with watch.stage("colours") as progress:
             texture_trial(parts, folder, progress)
-    return result
 
 
 def compare_methods(flights: Mapping[str, Parts | Scenario], folder: Path, watch: Watch | None = None) -> Figures:
@@ -206,15 +233,15 @@ def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None])
     photos = pl.read_csv(folder / "images.csv")
     names = photos["name"].to_list()
     centres = photos.select("est_x_m", "est_y_m", "est_z_m").to_numpy()
-    axes = matrix_from_quat(photos.select("est_qw", "est_qx", "est_qy", "est_qz").to_numpy())[:, :, 2]
+    rotations = matrix_from_quat(photos.select("est_qw", "est_qx", "est_qy", "est_qz").to_numpy())
     try:
         model = reconstruct(
             folder / "images",
             folder,
-            parts.scenario.reconstruction,
+            parts.scenario.reconstruction.model_copy(update={"mesh": False}),
             lens=read_lens(folder),
             reference_positions=dict(zip(names, centres, strict=True)),
-            reference_axes=dict(zip(names, axes, strict=True)),
+            reference_rotations=dict(zip(names, rotations, strict=True)),
             region=(parts.target.centre_W_m, REGION_SHARE * parts.target.radius_m),
             progress=progress,
         )

@@ -1,0 +1,120 @@
+"""Photographs beside the flight: the same bytes as after it, never in its way, and no harm where it fails."""
+
+import os
+import sys
+import time
+import warnings
+
+import numpy as np
+import pytest
+
+from wakewise.geometry import Pose, quat_from_rotvec
+from wakewise.interfaces import ScalarGrid
+from wakewise.operation import Darkroom, load_scenario, photograph_flight
+from wakewise.operation.darkroom import MOST_WAITING, packed, unpacked
+from wakewise.operation.photography import fingerprint, take_photograph
+from wakewise.operation.recorder import ExposureRecord, read_exposures, write_exposures
+
+SMALL = {
+    "mission.elevations_deg": [40],
+    "mission.views": [4],
+    "imaging.width": 160,
+    "imaging.height": 120,
+}
+
+
+@pytest.fixture(scope="module")
+def parts():
+    return load_scenario("quick", None, SMALL).parts()
+
+
+@pytest.fixture(scope="module")
+def exposures(parts):
+    """Four exposures on the planned way, moving, in patchy silt."""
+    rng = np.random.default_rng(0)
+    out = []
+    for time_s, X in zip(parts.route.exposures_s, parts.route.X_WC_planned, strict=True):
+        poses = tuple(X @ Pose(np.array([k * 2e-4, 0, 0]), quat_from_rotvec(np.zeros(3))) for k in range(5))
+        silt = ScalarGrid(
+            origin_W_m=np.array([-1.0, -1, 0.5]), spacing_m=0.1, values=rng.uniform(0, 0.004, (20, 20, 10))
+        )
+        out.append(ExposureRecord(time_s=float(time_s), X_WC_true=poses, X_WC_est=X, silt=silt))
+    return out
+
+
+def photographed(parts, exposures, folder, beside):
+    """Photographs of a trial's folder, of which those of `beside` are made by the other process."""
+    folder.mkdir()
+    with Darkroom(parts, folder) as darkroom:
+        for k in beside:
+            darkroom.take(k, exposures[k])
+        write_exposures(folder / "exposures.npz", exposures, parts.scenario.imaging.exposure_s)
+        darkroom.finish()
+        made = sorted(path.name for path in folder.glob("images/[0-9]*"))
+        photograph_flight(parts, folder)
+    return made, {path.name: path.read_bytes() for path in sorted(folder.glob("images/*"))}, folder / "images.csv"
+
+
+def test_a_photograph_has_the_same_bytes_beside_the_flight_and_after_it(parts, exposures, tmp_path):
+    """Some made by the other process, all by this one: photographs and images.csv are equal to the byte."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        none, after, listed = photographed(parts, exposures, tmp_path / "after", ())
+        some, beside, listed_too = photographed(parts, exposures, tmp_path / "beside", (0, 1, 3))
+    assert none == [] and len(some) == 3
+    assert beside == after and len(after) == 4
+    assert listed.read_bytes() == listed_too.read_bytes()
+
+
+def test_a_worker_that_fails_is_told_and_costs_no_photograph(parts, exposures, tmp_path, monkeypatch):
+    """Where the other process cannot begin, a warning gives its last word and all photographs come after the flight."""
+    monkeypatch.setattr(sys, "path", [str(tmp_path / "nowhere")])
+    with pytest.warns(RuntimeWarning, match="beside the flight"):
+        made, photos, _ = photographed(parts, exposures, tmp_path / "trial", range(4))
+    assert made == [] and len(photos) == 4
+
+
+def test_leaving_early_ends_the_other_process(parts, exposures, tmp_path):
+    """An error in the flight leaves no process behind and no half of a photograph."""
+    with pytest.raises(KeyboardInterrupt), Darkroom(parts, tmp_path) as darkroom:
+        darkroom.take(0, exposures[0])
+        number = darkroom._process.pid
+        raise KeyboardInterrupt
+    with pytest.raises(ProcessLookupError):
+        os.kill(number, 0)
+    assert all(path.suffix in (".png", ".json") for path in tmp_path.glob("images/*"))
+
+
+def test_the_flight_does_not_wait(parts, exposures, tmp_path):
+    """Ten times as many exposures as there is room for are taken at once in less time than one photograph takes."""
+    with Darkroom(parts, tmp_path) as darkroom:
+        darkroom.take(0, exposures[0])
+        began = time.thread_time()
+        for _ in range(10 * MOST_WAITING):
+            darkroom.take(0, exposures[0])
+        assert time.thread_time() - began < 1.0
+
+
+def test_an_exposure_arrives_as_the_record_keeps_it(exposures, tmp_path):
+    """What the other process reads is what is read from exposures.npz, to the bit; any change has another mark."""
+    write_exposures(tmp_path / "exposures.npz", exposures, 0.008)
+    kept = read_exposures(tmp_path / "exposures.npz")
+    marks = set()
+    for k, (exposure, written) in enumerate(zip(exposures, kept, strict=True)):
+        number, sent = unpacked(packed(k, exposure))
+        assert number == k and fingerprint(sent) == fingerprint(written)
+        assert np.array_equal(sent.silt.values, written.silt.values)
+        marks.add(fingerprint(sent))
+    assert len(marks) == len(exposures)
+
+
+def test_a_photograph_of_another_flight_is_made_anew(parts, exposures, tmp_path):
+    """A photograph left by a flight that was cut off stays only if it shows the same exposure."""
+    write_exposures(tmp_path / "exposures.npz", exposures, 0.008)
+    kept = read_exposures(tmp_path / "exposures.npz")
+    first = take_photograph(parts, tmp_path, 0, kept[0])
+    path = next(tmp_path.glob("images/*.png"))
+    before = path.read_bytes()
+    assert take_photograph(parts, tmp_path, 0, kept[0]) == first
+    again = take_photograph(parts, tmp_path, 0, kept[1])
+    assert again["exposure"] != first["exposure"] and path.read_bytes() != before
