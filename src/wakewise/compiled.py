@@ -184,3 +184,11 @@ def assign(target: Any, source: Any) -> None:
     """
     for i in range(target.size):
         target[i] = source[i]
+
+
+@njit(inline="always")
+def assign_rows(target: Any, source: Any) -> None:
+    """`target[:] = source` for matrices of one shape, within a kernel, for the same reason."""
+    for i in range(target.shape[0]):
+        for j in range(target.shape[1]):
+            target[i, j] = source[i, j]

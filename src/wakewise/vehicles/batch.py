@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wakewise.arrays import Array
-from wakewise.compiled import njit, prange
+from wakewise.compiled import assign, njit, prange
 from wakewise.errors import InputError
 from wakewise.vehicles.dynamics import RigidBody
 from wakewise.vehicles.runge_kutta import rk4_stages
@@ -108,8 +108,8 @@ def batch_kernel(packed: Array, states: Array, wrenches: Array, currents: Array,
         stages, inputs = np.empty((5, 13)), np.empty(9)
         for k in range(block * BLOCK, min(n, (block + 1) * BLOCK)):
             body = packed[k if packed.shape[0] > 1 else 0]
-            inputs[:6] = wrenches[k]
-            inputs[6:] = currents[k if currents.shape[0] > 1 else 0]
+            assign(inputs[:6], wrenches[k])
+            assign(inputs[6:], currents[k if currents.shape[0] > 1 else 0])
             for _ in range(steps):
                 rk4_stages(body, states[k], inputs, dt_s, stages)
 

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wakewise.arrays import Array, IntArray
-from wakewise.compiled import njit
+from wakewise.compiled import assign, njit
 from wakewise.water.bedjets_sums import (
     COLUMNS,
     LOG_WIDTH,
@@ -266,7 +266,7 @@ def layer_speeds(layers: Layers, count: int) -> Array:
     centre, radius, plane = layers.centre, layers.radius, layers.plane
     logs, bessel = np.log(radius[:count]), log_i0s(kappa)
     strength = STRENGTH * layers.impulse[:count] / radius[:count] ** 2
-    out[:] = strength
+    assign(out, strength)
     for i in range(count):
         for j in range(i + 1, count):
             apart = (logs[i] - logs[j]) * per_L

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.arrays import Array, IntArray
-from wakewise.compiled import njit
+from wakewise.compiled import assign_rows, njit
 
 WALL_JET_SPREAD = 0.093  # delta over R for which the layer below, entrainment included, is half as fast at 0.09 R
 LOG_WIDTH = 0.3  # L: neighbouring rings overlap; it sets how sharp a front is, not how fast
@@ -350,7 +350,7 @@ def with_images(packed: Array, walls: Array, least_m_s: float) -> Array:
     """Append images in one wall after another, so that corners hold too; rows as packed by `packed_rings`."""
     n = packed.shape[0]
     out = np.empty((n << walls.shape[0], packed.shape[1]))
-    out[:n] = packed
+    assign_rows(out[:n], packed)
     count = n
     for i in range(walls.shape[0]):
         axis, at, side = int(walls[i, 0]), walls[i, 1], walls[i, 2]

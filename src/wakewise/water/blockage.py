@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wakewise.arrays import Array, IntArray, freeze
-from wakewise.compiled import njit
+from wakewise.compiled import assign, njit
 from wakewise.targets import Target
 from wakewise.water.chunks import over_points
 from wakewise.water.induction import SINGLE, FixedSources, smooth_share, sum_sources
@@ -222,7 +222,7 @@ def _least_squares(across: Array, damping: float) -> Array:
             for n in range(i + 1, s):
                 x[i] -= L[n, i] * x[n]
             x[i] /= L[i, i]
-        out[:, p] = x - x.mean()
+        assign(out[:, p], x - x.mean())
     return out
 
 

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.compiled import njit
+from wakewise.compiled import assign, assign_rows, njit
 
 LEAST_IMAGE_M_S = 5e-5
 """Images in walls and surface that would not reach this speed there are left out; the bed's are all kept."""
@@ -119,7 +119,9 @@ def mirrored(X: Array, m: Array, sigma: Array, walls: Array) -> tuple[Array, Arr
     n = sigma.shape[0]
     room = 4 * n
     places, impulses, sizes = np.empty((room, 3)), np.empty((room, 3)), np.empty(room)
-    places[:n], impulses[:n], sizes[:n] = X, m, sigma
+    assign_rows(places[:n], X)
+    assign_rows(impulses[:n], m)
+    assign(sizes[:n], sigma)
     count = n
     for axis in (2, 1, 0):
         first = count
@@ -149,5 +151,5 @@ def mirrored(X: Array, m: Array, sigma: Array, walls: Array) -> tuple[Array, Arr
 def longer(rows: Array, room: int) -> Array:
     """A copy of rows, shape (n, k), with room for so many; what is new is not set."""
     out = np.empty((room, rows.shape[1]))
-    out[: rows.shape[0]] = rows
+    assign_rows(out[: rows.shape[0]], rows)
     return out

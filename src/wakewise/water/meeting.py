@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from wakewise.arrays import Array, IntArray
-from wakewise.compiled import njit
+from wakewise.compiled import assign, njit
 from wakewise.water.bedjets import STRIKE_HEIGHT, Layers
 from wakewise.water.parcels import CENTRE_SPEED, Jets, kept_only
 from wakewise.water.walljets import SPREADS_FASTER, Planes, start_ring
@@ -119,7 +119,10 @@ def _sheet(
         along[np.argmin(np.abs(normal))] = 1.0
         first = np.cross(normal, along)
         first /= math.sqrt(first[0] ** 2 + first[1] ** 2 + first[2] ** 2)
-        frames[s, 0:3], frames[s, 3:6], frames[s, 6:9], frames[s, 9:12] = middle, first, np.cross(normal, first), normal
+        assign(frames[s, 0:3], middle)
+        assign(frames[s, 3:6], first)
+        assign(frames[s, 6:9], np.cross(normal, first))
+        assign(frames[s, 9:12], normal)
         frames[s, 12], frames[s, 13] = 0.0, SPREADS_FASTER
         planes.thickness[s], planes.per_height[s], used[s] = sigma, 0.0, newest + 1
         planes.key[s, 0], planes.key[s, 1] = stream_a, stream_b

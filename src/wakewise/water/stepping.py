@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wakewise.arrays import Array, IntArray
-from wakewise.compiled import njit
+from wakewise.compiled import assign, assign_rows, njit
 from wakewise.water.bedjets import STRIKE_HEIGHT, Layers
 from wakewise.water.bedjets_sums import sum_planes
 from wakewise.water.blockage import BodyRows, add_body, answer
@@ -118,7 +118,9 @@ def places_of(jets: Jets, layers: Layers, planes: Planes, rows: IntArray, disks:
     """Where a step must know the ambient water: at the parcels, the rings and the disks, one after another."""
     n, r = rows[0], rows[1]
     out = np.empty((n + r + disks.shape[0], 3))
-    out[:n], out[n : n + r], out[n + r :] = jets.position[:n], ring_places(layers, r, planes), disks
+    assign_rows(out[:n], jets.position[:n])
+    assign_rows(out[n : n + r], ring_places(layers, r, planes))
+    assign_rows(out[n + r :], disks)
     return out
 
 
@@ -254,7 +256,7 @@ def _carrying(
         if tally.steps[1] < 0 or tally.steps[0] % _EVERY == 0:
             at_body, every = np.empty((body.points.shape[0], 3)), np.arange(body.points.shape[0])
             flow_at(body.points, every, rows, starts, frames, ring_starts, rings, laws.bed_z, laws.constants, at_body)
-            tally.held[:] = answer(body, at_body)
+            assign(tally.held, answer(body, at_body))
             tally.steps[1] = tally.steps[0]
         add_body(body, points, tally.held, u)
     return u

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wakewise.arrays import Array, IntArray
-from wakewise.compiled import njit
+from wakewise.compiled import assign, assign_rows, njit
 from wakewise.water.bedjets import (
     STRIKE_HEIGHT,
     Layers,
@@ -179,8 +179,8 @@ def wall_rows(layers: Layers, count: int, planes: Planes) -> tuple[Array, IntArr
         end = starts[used] + rows.shape[0]
         if end > packed.shape[0]:
             packed = longer(packed, 2 * end)
-        packed[starts[used] : end] = rows
-        frames[used] = planes.frames[p]
+        assign_rows(packed[starts[used] : end], rows)
+        assign(frames[used], planes.frames[p])
         used += 1
         starts[used] = end
     return frames[:used].copy(), starts[: used + 1].copy(), packed[: starts[used]].copy()
