@@ -65,7 +65,7 @@ def model_coral(scenario: Scenario, folder: Path, options: BenchOptions) -> dict
     rng = np.random.default_rng(scenario.seed)
     views = planned_views(target, scenario.mission, scenario.imaging.exposure_s, rng)
     write_photos(folder, views, None, scenario.imaging, target, seed=scenario.seed, progress=options.progress)
-    alone = scenario.reconstruction.model_copy(update={"known_poses": False, "mesh": False})
+    alone = scenario.reconstruction.model_copy(update={"mapper": "incremental", "mesh": False})
     found, before = (_in_a_process(scenario, folder, settings) for settings in (scenario.reconstruction, alone))
     return found | {
         "photos_alone": {key: before.get(key) for key in _ALONE},
@@ -81,7 +81,7 @@ def _in_a_process(scenario: Scenario, folder: Path, settings: ReconstructionSett
 def _model(scenario: Scenario, folder: Path, settings: ReconstructionSettings) -> dict[str, Any]:
     target = scenario.parts().target
     photos = read_photo_set(folder, scenario.imaging.camera().focal_px)
-    out = folder / ("posed" if settings.known_poses else "alone")
+    out = folder / settings.mapper
     return judge(photos, target, settings, out) | {"memory_MB": peak_memory_MB()}
 
 

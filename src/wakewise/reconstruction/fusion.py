@@ -20,69 +20,75 @@ def _agree(
     others: DepthImage,
     places: IntArray,
     cameras: Array,
+    relative: Array,
     tolerance_px: float,
 ) -> tuple[Array, IntArray, IntArray]:
     """Depth averaged over the maps that agree, their number, and the number that look through.
 
     `camera` is (focal, cx, cy, baseline, R_CW row by row, centre), shape (16,); `cameras` one row per other map, whose
     depths lie in `others` from `places[k, 0]` on, `places[k, 1]` rows of `places[k, 2]` each: a list of arrays would be
-    counted up and down at every look, which took longer than the geometry.
+    counted up and down at every look, which took longer than the geometry. `relative` takes points of this camera's
+    frame into the others': rotation row by row and shift, shape (k, 12).
     """
     height, width = depth.shape
     mean = np.zeros((height, width))
     votes = np.zeros((height, width), np.int64)
     against = np.zeros((height, width), np.int64)
     f, cx, cy, base = camera[0], camera[1], camera[2], camera[3]
-    R, c = camera[4:13], camera[13:16]
-    inverse_focal = 1.0 / cameras[:, 0]
+    columns = np.empty(width, np.int64)
+    x, y, z, across, down, away = (
+        np.empty(width), np.empty(width), np.empty(width), np.empty(width), np.empty(width), np.empty(width),
+    )  # fmt: skip
+    total, sum_z = np.empty(width), np.empty(width)
     for v in range(height):
+        count = 0
         for u in range(width):
-            if not wanted[v, u]:
-                continue
-            z = float(depth[v, u])
-            x, y = (u - cx) / f * z, (v - cy) / f * z
-            X = R[0] * x + R[3] * y + R[6] * z + c[0]
-            Y = R[1] * x + R[4] * y + R[7] * z + c[1]
-            Z = R[2] * x + R[5] * y + R[8] * z + c[2]
-            weight = (f * base / (z * z)) ** 2
-            total, sum_z = weight, weight * z
-            inverse_z = 1.0 / z
-            for k in range(len(cameras)):
-                dx, dy, dz = X - cameras[k, 13], Y - cameras[k, 14], Z - cameras[k, 15]
-                zo = cameras[k, 10] * dx + cameras[k, 11] * dy + cameras[k, 12] * dz
-                if zo <= 0.0:
+            if wanted[v, u]:
+                columns[count] = u
+                count += 1
+        for i in range(count):
+            z[i] = float(depth[v, columns[i]])
+            x[i], y[i] = (columns[i] - cx) / f * z[i], (v - cy) / f * z[i]
+            total[i] = (f * base / (z[i] * z[i])) ** 2
+            sum_z[i] = total[i] * z[i]
+        for k in range(len(cameras)):
+            focal, ox, oy, start = cameras[k, 0], cameras[k, 1], cameras[k, 2], places[k, 0]
+            high, wide, per_focal = places[k, 1], places[k, 2], 1.0 / cameras[k, 0]
+            m, t = relative[k, :9], relative[k, 9:]
+            # In a short loop over the row, so that several points go through at once.
+            for i in range(count):
+                zo = m[6] * x[i] + m[7] * y[i] + m[8] * z[i] + t[2]
+                scaled = focal / zo
+                across[i] = scaled * (m[0] * x[i] + m[1] * y[i] + m[2] * z[i] + t[0]) + ox
+                down[i] = scaled * (m[3] * x[i] + m[4] * y[i] + m[5] * z[i] + t[1]) + oy
+                away[i] = zo
+            for i in range(count):
+                if not (away[i] > 0.0 and -0.5 <= across[i] < wide and -0.5 <= down[i] < high):
                     continue
-                inverse_zo = 1.0 / zo
-                scaled = cameras[k, 0] * inverse_zo
-                uo = scaled * (cameras[k, 4] * dx + cameras[k, 5] * dy + cameras[k, 6] * dz) + cameras[k, 1]
-                vo = scaled * (cameras[k, 7] * dx + cameras[k, 8] * dy + cameras[k, 9] * dz) + cameras[k, 2]
-                col, row = int(np.floor(uo + 0.5)), int(np.floor(vo + 0.5))
-                if row < 0 or col < 0 or row >= places[k, 1] or col >= places[k, 2]:
+                col, row = int(across[i] + 0.5), int(down[i] + 0.5)
+                if row >= high or col >= wide:
                     continue
-                seen = float(others[places[k, 0] + row * places[k, 2] + col])
+                seen = float(others[start + row * wide + col])
                 if seen <= 0.0:
                     continue
                 # What the other map sees there, taken back into this one.
-                per_pixel = seen * inverse_focal[k]
-                ox, oy = (col - cameras[k, 1]) * per_pixel, (row - cameras[k, 2]) * per_pixel
-                ex = cameras[k, 4] * ox + cameras[k, 7] * oy + cameras[k, 10] * seen + cameras[k, 13] - c[0]
-                ey = cameras[k, 5] * ox + cameras[k, 8] * oy + cameras[k, 11] * seen + cameras[k, 14] - c[1]
-                ez = cameras[k, 6] * ox + cameras[k, 9] * oy + cameras[k, 12] * seen + cameras[k, 15] - c[2]
-                back = R[6] * ex + R[7] * ey + R[8] * ez
+                px, py, pz = (col - ox) * per_focal * seen - t[0], (row - oy) * per_focal * seen - t[1], seen - t[2]
+                back = m[2] * px + m[5] * py + m[8] * pz
                 if back <= 0.0:
                     continue
-                inverse_back = 1.0 / back
-                gap = f * base * (inverse_back - inverse_z)
-                bu = f * inverse_back * (R[0] * ex + R[1] * ey + R[2] * ez) + cx - u
-                bv = f * inverse_back * (R[3] * ex + R[4] * ey + R[5] * ez) + cy - v
-                if abs(gap) < tolerance_px and bu * bu + bv * bv < 4.0:
-                    votes[v, u] += 1
-                    w = (cameras[k, 0] * cameras[k, 3] / (seen * seen)) ** 2
-                    total += w
-                    sum_z += w * back
-                elif cameras[k, 0] * cameras[k, 3] * (inverse_zo - 1.0 / seen) > 3.0 * tolerance_px:
-                    against[v, u] += 1  # the other map sees something well behind this point: it looks through
-            mean[v, u] = sum_z / total
+                if abs(f * base * (1.0 / back - 1.0 / z[i])) < tolerance_px:
+                    bu = f / back * (m[0] * px + m[3] * py + m[6] * pz) + cx - columns[i]
+                    bv = f / back * (m[1] * px + m[4] * py + m[7] * pz) + cy - v
+                    if bu * bu + bv * bv < 4.0:
+                        votes[v, columns[i]] += 1
+                        w = (focal * cameras[k, 3] / (seen * seen)) ** 2
+                        total[i] += w
+                        sum_z[i] += w * back
+                        continue
+                if focal * cameras[k, 3] * (1.0 / away[i] - 1.0 / seen) > 3.0 * tolerance_px:
+                    against[v, columns[i]] += 1  # the other map sees something well behind: it looks through
+        for i in range(count):
+            mean[v, columns[i]] = sum_z[i] / total[i]
     return mean, votes, against
 
 
@@ -155,7 +161,10 @@ def fuse(maps: list[DepthMap], index: int, neighbours: list[int], agreeing: int,
     places = np.array([(start, *depth.shape) for start, depth in zip(starts, depths, strict=True)], dtype=np.int64)
     others = np.concatenate([depth.ravel() for depth in depths])
     cameras = np.array([pack(maps[k]) for k in neighbours])
-    mean, votes, against = _agree(own.depth_m, own.wanted, camera, others, places, cameras, tolerance_px)
+    turns = [maps[k].R_CW @ own.R_CW.T for k in neighbours]
+    shifts = [maps[k].R_CW @ (own.p_WC_m - maps[k].p_WC_m) for k in neighbours]
+    relative = np.concatenate([np.array(turns).reshape(-1, 9), np.array(shifts)], axis=1)
+    mean, votes, against = _agree(own.depth_m, own.wanted, camera, others, places, cameras, relative, tolerance_px)
     return _gather(mean, votes, against, own.wanted, own.colours, camera, agreeing)
 
 

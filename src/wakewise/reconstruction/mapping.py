@@ -93,7 +93,7 @@ def map_photos(
         if model is None:
             models = _solve(folder, copy, room, settings, photos, progress)
             model = max(models.values(), key=lambda one: one.num_reg_images(), default=None)
-            way = MAPPINGS[settings.mapper]
+            way = MAPPINGS["global" if settings.mapper == "global" else "incremental"]
     if model is None:
         raise StageError(
             f"mapping: none of the {photos} photos register; they show too little in common or were taken "

@@ -38,7 +38,6 @@ _STAGES = {
         "mapper",
         "refine_camera",
         "reprojection_px",
-        "known_poses",
         "position_priors",
         "prior_sigma_m",
     ),
@@ -337,7 +336,7 @@ def _poses(
     settings: ReconstructionSettings, positions: dict[str, Array] | None, rotations: dict[str, Array] | None
 ) -> Poses | None:
     """Poses to match and map from: of the photos whose place and turn are both known; None if they are not wanted."""
-    if not settings.known_poses or settings.mapper != "incremental" or settings.position_priors:
+    if settings.mapper != "poses" or settings.position_priors:
         return None
     if positions is None or rotations is None:
         return None

@@ -29,13 +29,10 @@ class ReconstructionSettings(Settings):
         description="which photos to match: all pairs, neighbours in order of name (and laps by ever wider steps), or "
         "neighbours by known camera poses; auto takes poses if known, else all pairs of a small set",
     )
-    mapper: Literal["incremental", "global"] = Field(
-        default="incremental", description="one photo after the other, or all at once (GLOMAP)"
-    )
-    known_poses: bool = Field(
-        default=True,
-        description="where camera poses come with the photos, match along epipolar lines and begin the model from "
-        "the poses; else, and where they turn out not to fit, go by the photos alone",
+    mapper: Literal["poses", "incremental", "global"] = Field(
+        default="poses",
+        description="where camera poses come with the photos and fit, match along epipolar lines and begin from them, "
+        "else one photo after the other; or that in any case; or all at once (GLOMAP)",
     )
     reprojection_px: float = Field(
         default=0.5,
