@@ -53,6 +53,28 @@ def test_excess_speeds_and_whole_pressures():
     assert measure.turbidity_per_m == measure.ray_optical_depth == 0.0
 
 
+def test_a_steady_current_is_asked_for_once_and_another_each_time():
+    """Of water that says it is steady the first answer stands, until other water is looked at."""
+    probes = TargetProbes(PYRAMID, np.random.default_rng(0))
+    steady, other, waves = (
+        Stream([0, 0, 0], [0.2, 0, 0]),
+        Stream([0, 0, 0], [0.4, 0, 0]),
+        Stream([0, 0, 0], [0.1, 0, 0]),
+    )
+    steady.steady = other.steady = True
+
+    def pressure_Pa(water):
+        return probes.measure(water, LAWS, None, EYE, 1000.0).target_pressure_mean_Pa
+
+    assert pressure_Pa(steady) == pytest.approx(20.0)
+    steady.current = np.array([9.0, 0, 0])  # which would be a lie
+    assert pressure_Pa(steady) == pytest.approx(20.0)
+    assert pressure_Pa(other) == pytest.approx(80.0)
+    for speed in (0.1, 0.3):
+        waves.current = np.array([speed, 0, 0])
+        assert pressure_Pa(waves) == pytest.approx(500 * speed**2)
+
+
 def test_even_silt_dims_a_ray_by_attenuation_times_length():
     """In an even cloud the mean optical depth is c times the mean way from the camera to the side it faces."""
     probes = TargetProbes(PYRAMID, np.random.default_rng(0))

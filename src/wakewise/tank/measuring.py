@@ -48,6 +48,8 @@ class TargetProbes:
         self.bed_W_m = bed_points(target.centre_W_m, target.bed_z_m, CLOSE_M)
         self._floor_W_m = self.bed_W_m * [1.0, 1.0, 0.0] + [0.0, 0.0, target.bed_z_m]
         self._water_W_m = water_points(target, CLOSE_M)
+        self._all_W_m = np.concatenate([self.surface_W_m, self.bed_W_m, self._floor_W_m])
+        self._steady: tuple[ExcessFlow, Array] | None = None  # a water whose ambient motion is steady, and that motion
 
     def measure(
         self,
@@ -68,9 +70,8 @@ class TargetProbes:
         camera_W_m : ndarray, shape (3,)
         density_kg_m3 : float
         """
-        points = np.concatenate([self.surface_W_m, self.bed_W_m, self._floor_W_m])
-        excess = water.excess_velocity(points)
-        whole = excess + water.ambient_velocity(points)
+        excess = water.excess_velocity(self._all_W_m)
+        whole = excess + self._ambient_m_s(water)
         n, m = len(self.surface_W_m), len(self.surface_W_m) + len(self.bed_W_m)
         at_target, at_bed = np.linalg.norm(excess[:n], axis=1), np.linalg.norm(excess[n:m], axis=1)
         pressure = 0.5 * density_kg_m3 * np.einsum("ij,ij->i", whole[:n], whole[:n])
@@ -89,6 +90,15 @@ class TargetProbes:
             ),
             ray_optical_depth=self.ray_optical_depth(laws, silt, camera_W_m),
         )
+
+    def _ambient_m_s(self, water: ExcessFlow) -> Array:
+        """Velocity without thrusters at all places, shape (n, 3); asked for once of water that says it is steady."""
+        if self._steady is None or self._steady[0] is not water:
+            velocity = water.ambient_velocity(self._all_W_m)
+            if not getattr(water, "steady", False):
+                return velocity
+            self._steady = water, velocity
+        return self._steady[1]
 
     def turbidity_per_m(self, laws: SiltLaws, silt: ScalarGrid | None) -> float:
         """Mean beam attenuation by silt near the target's centre, 1/m."""

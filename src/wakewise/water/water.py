@@ -140,6 +140,11 @@ class Water:
         return self._bed
 
     @property
+    def steady(self) -> bool:
+        """Whether the water without thrusters never changes."""
+        return bool(getattr(self._ambient, "steady", False))
+
+    @property
     def time_s(self) -> float:
         """Sum of the steps."""
         return self._time
@@ -261,7 +266,7 @@ class Water:
         if self._answer_to_steady is not None:
             return self._answer_to_steady
         strengths = self._body.strengths_m3_s(self._ambient.velocity(self._body.points_m, self._time))
-        if getattr(self._ambient, "steady", False):
+        if self.steady:
             self._answer_to_steady = strengths
         return strengths
 
