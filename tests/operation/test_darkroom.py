@@ -74,6 +74,18 @@ def test_a_worker_that_fails_is_told_and_costs_no_photograph(parts, exposures, t
     assert made == [] and len(photos) == 4
 
 
+def test_a_worker_that_cannot_be_started_is_told_and_the_flight_goes_on(parts, exposures, tmp_path, monkeypatch):
+    """Without an interpreter to start, a warning says so once and exposures are left to the stage after the flight."""
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))
+    with Darkroom(parts, tmp_path) as darkroom:
+        with pytest.warns(RuntimeWarning, match="no-python"):
+            darkroom.take(0, exposures[0])
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            darkroom.take(1, exposures[1])
+            darkroom.finish()
+
+
 def test_leaving_early_ends_the_other_process(parts, exposures, tmp_path):
     """An error in the flight leaves no process behind and no half of a photograph."""
     with pytest.raises(KeyboardInterrupt), Darkroom(parts, tmp_path) as darkroom:
@@ -82,7 +94,7 @@ def test_leaving_early_ends_the_other_process(parts, exposures, tmp_path):
         raise KeyboardInterrupt
     with pytest.raises(ProcessLookupError):
         os.kill(number, 0)
-    assert all(path.suffix in (".png", ".json") for path in tmp_path.glob("images/*"))
+    assert not [path for path in tmp_path.glob("images/.*") if path.suffix != ".json"]
 
 
 def test_the_flight_does_not_wait(parts, exposures, tmp_path):

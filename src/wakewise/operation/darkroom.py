@@ -25,6 +25,7 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 
 from wakewise.operation.recorder import ExposureRecord, exposure_arrays, read_exposures
+from wakewise.processes import sweep
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
@@ -67,6 +68,7 @@ class Darkroom:
         self._waiting.put(None)  # what waits before it is dropped, now that nobody reads
         if self._feeder is not None:
             self._feeder.join()
+        sweep(self._folder)
         self._close()
 
     def take(self, number: int, exposure: ExposureRecord) -> None:
@@ -74,7 +76,13 @@ class Darkroom:
         if not self._able or self._waiting.full():
             return
         if self._process is None:
-            self._begin()
+            try:
+                self._begin()
+            except OSError as fault:
+                self._able = False
+                _warn(str(fault))
+                self._close()
+                return
         with suppress(queue.Full):
             self._waiting.put_nowait(packed(number, exposure))
 
@@ -88,11 +96,7 @@ class Darkroom:
             self._said.seek(0)
             words = self._said.read().decode(errors="replace").strip().splitlines()
             reason = words[-1] if words else f"exit status {self._process.returncode}"
-            warnings.warn(
-                f"photographs: could not be rendered beside the flight ({reason}), so they are after it",
-                RuntimeWarning,
-                stacklevel=2,
-            )
+            _warn(reason)
         self._close()
 
     def _begin(self) -> None:
@@ -124,6 +128,11 @@ class Darkroom:
         if self._said is not None:
             self._said.close()
         self._process = self._feeder = self._said = None
+
+
+def _warn(reason: str) -> None:
+    words = f"photographs: could not be rendered beside the flight ({reason}), so they are after it"
+    warnings.warn(words, RuntimeWarning, stacklevel=3)
 
 
 def packed(number: int, exposure: ExposureRecord) -> bytes:
