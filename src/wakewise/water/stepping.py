@@ -251,16 +251,13 @@ def _carrying(
     frames, ring_starts, rings = wall_rows(layers, r, planes)
     points = X[look]
     u, look_order = np.empty((look.shape[0], 3)), ordered(points, laws.curve)
-    solid = body.points.shape[0]
-    asked = solid > 0 and (tally.steps[1] < 0 or tally.steps[0] % _EVERY == 0)
-    at_body, every = np.empty((solid, 3)), np.arange(solid)
-    for of_body in range(2 if asked else 1):  # one call written once: it is most of what is compiled here
-        where, order, out = (body.points, every, at_body) if of_body else (points, look_order, u)
-        flow_at(where, order, rows, starts, frames, ring_starts, rings, laws.bed_z, laws.constants, out)
-    if asked:
-        assign(tally.held, answer(body, at_body))
-        tally.steps[1] = tally.steps[0]
-    if solid:
+    flow_at(points, look_order, rows, starts, frames, ring_starts, rings, laws.bed_z, laws.constants, u)
+    if body.points.shape[0]:
+        if tally.steps[1] < 0 or tally.steps[0] % _EVERY == 0:
+            at_body, every = np.empty((body.points.shape[0], 3)), np.arange(body.points.shape[0])
+            flow_at(body.points, every, rows, starts, frames, ring_starts, rings, laws.bed_z, laws.constants, at_body)
+            assign(tally.held, answer(body, at_body))
+            tally.steps[1] = tally.steps[0]
         add_body(body, points, tally.held, u)
     return u
 
