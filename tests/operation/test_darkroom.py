@@ -68,8 +68,11 @@ def test_a_photograph_has_the_same_bytes_beside_the_flight_and_after_it(parts, e
 
 def test_a_worker_that_fails_is_told_and_costs_no_photograph(parts, exposures, tmp_path, monkeypatch):
     """Where the other process cannot begin, a warning gives its last word and all photographs come after the flight."""
-    monkeypatch.setattr(sys, "path", [str(tmp_path / "nowhere")])
-    with pytest.warns(RuntimeWarning, match="beside the flight"):
+    failing = tmp_path / "python"
+    failing.write_text("#!/bin/sh\necho no such thing >&2\nexit 1\n")
+    failing.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(failing))
+    with pytest.warns(RuntimeWarning, match="beside the flight.*no such thing"):
         made, photos, _ = photographed(parts, exposures, tmp_path / "trial", range(4))
     assert made == [] and len(photos) == 4
 
