@@ -113,8 +113,13 @@ def digest(path: Path) -> bytes:
     whole = hashlib.sha256()
     for file in sorted(_reached(path)):
         name = file.relative_to(PACKAGE) if PACKAGE in file.parents else file.name
-        whole.update(f"{name}\0".encode() + hashlib.sha256(file.read_bytes()).digest())
+        whole.update(f"{name}\0".encode() + _own_digest(file))
     return whole.digest()
+
+
+@cache
+def _own_digest(path: Path) -> bytes:
+    return hashlib.sha256(path.read_bytes()).digest()
 
 
 def _reached(path: Path) -> set[Path]:
