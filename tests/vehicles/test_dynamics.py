@@ -148,3 +148,10 @@ def test_weight_pulls_down_at_g_and_buoyancy_up() -> None:
 def test_water_without_density_or_gravity_is_refused(rho: float, g: float) -> None:
     with pytest.raises(InputError, match="more than 0"):
         compile_body(load_vehicle("paper"), rho, g)
+
+
+def test_a_quaternion_of_no_length_is_no_attitude() -> None:
+    """Runge-Kutta refuses it instead of going on with NaN."""
+    zero, body = np.zeros(6), compile_body(vehicle_named("bluerov2"))
+    with pytest.raises(ZeroDivisionError):
+        step_rk4(body, np.zeros(3), np.zeros(4), zero, zero, np.zeros(3), 0.01)

@@ -36,7 +36,7 @@ def rk4_stages(packed: Array, state: Array, inputs: Array, dt_s: float, k: Array
     normalise(state)
 
 
-@njit
+@njit(error_model="python")  # a quaternion of no length is an error, not NaN
 def normalise(state: Array) -> float:
     """Give the quaternion of a state unit length and return the length that it had."""
     length = np.sqrt(state[3] ** 2 + state[4] ** 2 + state[5] ** 2 + state[6] ** 2)
