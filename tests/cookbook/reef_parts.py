@@ -9,7 +9,7 @@ import numpy as np
 import wakewise as ww
 from wakewise.allocation import least_thrusts
 from wakewise.control import make_tracker, vehicle_layout
-from wakewise.operation.worlds import tank_world
+from wakewise.operation.worlds.makers import tank_world
 from wakewise.targets import Mesh
 from wakewise.vehicles import load_draft
 

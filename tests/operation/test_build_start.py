@@ -10,7 +10,7 @@ from wakewise.errors import InputError
 from wakewise.geometry import quat_conjugate, quat_multiply, rotvec_from_quat
 from wakewise.operation import fly, load_scenario
 from wakewise.operation.surroundings import surroundings_of
-from wakewise.operation.worlds import true_start
+from wakewise.operation.worlds.makers import true_start
 from wakewise.planning import Surroundings, check_start
 
 

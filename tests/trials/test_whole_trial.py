@@ -12,7 +12,7 @@ import pytest
 
 from wakewise.errors import InputError
 from wakewise.operation import Scenario, fly, fly_trial, load_scenario
-from wakewise.operation.worlds import tank_world
+from wakewise.operation.worlds.makers import tank_world
 from wakewise.processes import alone
 from wakewise.reports import write_report
 from wakewise.trials import run_trial

@@ -19,7 +19,7 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.operation import Scenario, fly, load_scenario
-from wakewise.operation.worlds import tank_world
+from wakewise.operation.worlds.makers import tank_world
 from wakewise.tank import Tank
 from wakewise.trials.timing import BenchOptions
 

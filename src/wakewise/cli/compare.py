@@ -17,6 +17,7 @@ from wakewise.cli.options import (
     TargetName,
     TargetSize,
     Vehicle,
+    World,
     default_folder,
     overrides,
 )
@@ -50,6 +51,7 @@ def compare(
     target: TargetName = None,
     target_size: TargetSize = None,
     vehicle: Vehicle = None,
+    world: World = None,
     seed: Seed = None,
     sets: Sets = None,
     json: Json = False,
@@ -65,7 +67,7 @@ def compare(
     names = [name.strip() for name in methods.split(",") if name.strip()]
     if len(names) != len(set(names)) or not names:
         raise InputError(f"--methods: '{methods}', must be one or more different names such as dp,wake-aware")
-    changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size)
+    changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, world=world)
     scenarios = {name: load_scenario(preset, scenario, changes | {"method": name}) for name in names}
     folder = out or default_folder(scenarios[names[0]], "compare")
     result = api.compare(scenarios, folder, Bars())

@@ -30,6 +30,7 @@ from wakewise.cli import (
     vehicle,
     wake,
     warm,
+    world,
 )
 from wakewise.errors import InputError, MissingExtra, WakewiseError
 
@@ -57,6 +58,7 @@ app.add_typer(vehicle.app, name="vehicle")
 app.add_typer(tank.app, name="tank")
 app.add_typer(target.app, name="target")
 app.add_typer(wake.app, name="wake")
+app.add_typer(world.app, name="world")
 
 _INTERRUPTED = 130
 _TERMINATED = 143

@@ -28,6 +28,12 @@ Seed = Annotated[int | None, typer.Option("--seed", help="Seed of every random d
 Vehicle = Annotated[
     str | None, typer.Option("--vehicle", help="Library name or vehicle YAML file.", show_default=False)
 ]
+World = Annotated[
+    str | None,
+    typer.Option(
+        "--world", help="Where it is flown; see `wakewise world list`. lattice is a second judge.", show_default=False
+    ),
+]
 TargetName = Annotated[
     str | None,
     typer.Option("--target", help="branching, brain, plate, or a mesh file.", show_default=False),
@@ -52,6 +58,7 @@ def overrides(
     target: str | None,
     target_size: float | None,
     method: str | None = None,
+    world: str | None = None,
 ) -> dict[str, Any]:
     """Join the short options and --set into dotted fields; --set is read first, so the short options win."""
     from wakewise.operation import parse_overrides
@@ -62,5 +69,6 @@ def overrides(
         "target.kind": target,
         "target.size_m": target_size,
         "method": method,
+        "world": world,
     }
     return parse_overrides(sets or []) | {name: value for name, value in short.items() if value is not None}

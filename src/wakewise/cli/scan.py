@@ -19,6 +19,7 @@ from wakewise.cli.options import (
     TargetName,
     TargetSize,
     Vehicle,
+    World,
     default_folder,
     overrides,
 )
@@ -62,6 +63,7 @@ def scan(
     target: TargetName = None,
     target_size: TargetSize = None,
     vehicle: Vehicle = None,
+    world: World = None,
     seed: Seed = None,
     sets: Sets = None,
     json: Json = False,
@@ -76,7 +78,9 @@ def scan(
     from wakewise.api import trial
     from wakewise.operation import load_scenario
 
-    changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, method=method)
+    changes = overrides(
+        sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, method=method, world=world
+    )
     resolved = load_scenario(preset, scenario, changes)
     folder = out or default_folder(resolved, resolved.method)
     result = trial(resolved, folder, Bars(), print_json if json else partial(_print_figures, resolved))

@@ -21,7 +21,7 @@ from wakewise.files import whole_file
 from wakewise.geometry import matrix_from_quat
 from wakewise.interfaces import no_progress
 from wakewise.operation import Scenario
-from wakewise.operation.worlds import tank_world
+from wakewise.operation.worlds.makers import tank_world
 from wakewise.water import Water
 
 STEP_S = 0.04

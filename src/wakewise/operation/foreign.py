@@ -13,7 +13,7 @@ import numpy as np
 from wakewise.control import MAKERS, make_controller
 from wakewise.interfaces import BodyState, Command, Controller, Goal
 from wakewise.operation.pilots import PILOTS
-from wakewise.operation.worlds import WORLDS
+from wakewise.operation.worlds.makers import WORLDS, flow_name
 from wakewise.plugins import find, offered
 from wakewise.targets import coral_kinds
 from wakewise.wake.models import OWN_MODELS
@@ -60,7 +60,7 @@ def _named(scenario: Scenario) -> dict[str, tuple[str, str, Mapping[str, Any]]]:
     return {
         "controller": ("method", scenario.method, MAKERS),
         "wake": ("wake model", scenario.control.wake.model, dict.fromkeys(OWN_MODELS)),
-        "world": ("world", scenario.world, WORLDS),
+        "world": ("world", flow_name(scenario), WORLDS),
         "pilot": ("pilot", scenario.pilot, PILOTS),
         "target": ("target", scenario.target.kind, dict.fromkeys(coral_kinds())),
         "current": ("current", scenario.tank.current.file or "", {"": None}),

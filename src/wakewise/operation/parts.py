@@ -23,7 +23,7 @@ from wakewise.operation.pilots import make_pilot
 from wakewise.operation.preflight import Preflight, preflight
 from wakewise.operation.seeds import Seeds
 from wakewise.operation.surroundings import surroundings_of, tank_bounds
-from wakewise.operation.worlds import make_world
+from wakewise.operation.worlds.makers import make_world
 from wakewise.planning import Surroundings
 from wakewise.tank.ambient import mean_current_m_s
 from wakewise.targets import Region, Target, delicacy, find_target, sample_region
@@ -64,6 +64,8 @@ class Parts:
     Parameters
     ----------
     scenario : Scenario
+        What it leaves to be drawn is drawn here: `asked` is the scenario as given, `scenario` the one world of it that
+        is flown.
     given : mapping
         Names of parts and what stands in their place; see `replace`.
 
@@ -78,7 +80,8 @@ class Parts:
     """
 
     def __init__(self, scenario: Scenario, given: Mapping[str, Any] | None = None) -> None:
-        self.scenario = scenario
+        self.asked = scenario
+        self.scenario = scenario.drawn()
         self.given: Mapping[str, Any] = MappingProxyType(dict(given or {}))
 
     def replace(self, **given: Any) -> Parts:
@@ -96,7 +99,7 @@ class Parts:
         InputError
             If there is no such part or field.
         """
-        scenario = given.pop("scenario", self.scenario)
+        scenario = given.pop("scenario", self.asked)
         fields = {name: given.pop(name) for name in list(given) if name not in PARTS}
         if fields:
             scenario = scenario.replace(**fields)

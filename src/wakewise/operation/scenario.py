@@ -17,9 +17,11 @@ from wakewise.estimation import FilterSettings
 from wakewise.files import write_text
 from wakewise.imaging import ImagingSettings
 from wakewise.missions import MissionSettings
+from wakewise.operation.draws import Draw, values_of
 from wakewise.operation.pilots import PILOTS
 from wakewise.operation.renamed import became
-from wakewise.operation.worlds import WORLDS
+from wakewise.operation.worlds.library import load_world, world_names
+from wakewise.operation.worlds.makers import WORLDS
 from wakewise.plugins import names
 from wakewise.reconstruction import ReconstructionSettings
 from wakewise.settings import Settings
@@ -31,7 +33,12 @@ from wakewise.yaml_text import YamlError, read_yaml
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
 
-_OWN: dict[str, Mapping[str, Any]] = {"method": MAKERS, "world": WORLDS, "pilot": PILOTS}
+_OWN: dict[str, Mapping[str, Any]] = {
+    "method": MAKERS,
+    "world": {**WORLDS, **dict.fromkeys(world_names())},
+    "flow": WORLDS,
+    "pilot": PILOTS,
+}
 
 PRESETS = ("quick", "standard")
 
@@ -59,7 +66,16 @@ class Scenario(Settings):
     )
     method: str = Field("wake-aware", description="how thrusts are chosen: a method's name, or package.module:make")
     vehicle: str = Field("paper", description="library name or path of a vehicle file")
-    world: str = Field("tank", description="where it is flown: tank, paper (circular), lattice, or package.module:make")
+    world: str = Field(
+        "tank",
+        description="a world's name (`wakewise world list`), a flow's, or package.module:make",
+    )
+    flow: str | None = Field(
+        None, description="what its water is in place of the world's own: tank, paper (circular), lattice, a plug-in"
+    )
+    draws: dict[str, Draw] = Field(
+        default={}, description="fields that the seed draws, by dotted name: two numbers, or in_log, any_of, level"
+    )
     pilot: str = Field("route", description="where goals come from: route, or package.module:make")
     target: TargetSettings = TargetSettings()
     mission: MissionSettings = MissionSettings()
@@ -69,13 +85,13 @@ class Scenario(Settings):
     imaging: ImagingSettings = ImagingSettings()
     reconstruction: ReconstructionSettings = ReconstructionSettings()
 
-    @field_validator("method", "world", "pilot")
+    @field_validator("method", "world", "flow", "pilot")
     @classmethod
-    def _known(cls, value: str, info: ValidationInfo) -> str:
+    def _known(cls, value: str | None, info: ValidationInfo) -> str | None:
         kind = str(info.field_name)
-        if {"method": "controller"}.get(kind, kind) in info.data.get("replaced", {}):
+        if value is None or {"method": "controller"}.get(kind, kind) in info.data.get("replaced", {}):
             return value  # what the part that was given calls itself
-        known = names(kind, _OWN[kind])
+        known = names({"flow": "world"}.get(kind, kind), _OWN[kind])
         if value not in known and ":" not in value:
             close = difflib.get_close_matches(value, known, 1)
             hint = f"did you mean {close[0]}? " if close else ""
@@ -134,10 +150,31 @@ class Scenario(Settings):
             Naming the field, what was found and what is allowed.
         """
         tree = self.model_dump()
+        if "world" in changes and changes["world"] != self.world:
+            _leave(tree, self.world)
+            tree = _laid(tree, _world_layer(changes["world"]))
         for name, value in changes.items():
             new = value.model_dump() if isinstance(value, BaseModel) else value
-            tree = _merged(tree, _with_silt(_nested(name, new)))
+            tree = _laid(tree, _nested(name, new))
         return check_scenario(tree, "scenario")
+
+    def drawn(self) -> Scenario:
+        """The same scenario with what its seed draws in place of its draws: the one world that is flown.
+
+        Raises
+        ------
+        InputError
+            If a draw names no field, or gives what its field does not allow.
+        """
+        if not self.draws:
+            return self
+        tree = self.model_dump()
+        for name, value in values_of(self.draws, self.seed).items():
+            tree = _merged(tree, _with_silt(_nested(name, value)))
+        try:
+            return Scenario.model_validate(tree | {"draws": {}})
+        except ValidationError as fault:
+            raise InputError(f"draws: {describe_fault(fault, Scenario)}") from None
 
     def parts(self) -> Parts:
         """What the scenario's flight is built from, each part made when asked for."""
@@ -148,6 +185,9 @@ class Scenario(Settings):
 
 def load_scenario(preset: str | None, path: Path | None, overrides: dict[str, Any]) -> Scenario:
     """Lay a scenario file over a preset and the overrides over both, then check the whole.
+
+    A world of the library that one of them names lies between the preset and the file: it gives values, and draws,
+    which yield to what file and overrides say of their fields.
 
     A kind of silt (`tank.silt.kind`) sets load and grains: they replace those of the layers below it, where a scenario
     that a trial left behind spells them out, and yield to what its own layer, or one above, says of them.
@@ -179,18 +219,23 @@ def load_scenario(preset: str | None, path: Path | None, overrides: dict[str, An
     changes: dict[str, Any] = {}
     for name, value in overrides.items():
         changes = _merged(changes, _nested(name, value))
+    layers.append(changes)
+    world = next((layer["world"] for layer in reversed(layers) if "world" in layer), None)
+    layers.insert(0 if preset is None else 1, _world_layer(world))
     tree: dict[str, Any] = {}
-    for layer in (*layers, changes):
-        tree = _merged(tree, _with_silt(layer))
+    for layer in layers:
+        tree = _laid(tree, layer)
     return check_scenario(tree, source)
 
 
 def check_scenario(tree: dict[str, Any], source: str) -> Scenario:
     """Turn a tree of plain values into a scenario; every fault becomes one line that names the field."""
     try:
-        return Scenario.model_validate(tree)
+        scenario = Scenario.model_validate(tree)
     except ValidationError as fault:
         raise InputError(f"{source}: {describe_fault(fault, Scenario)}") from None
+    scenario.drawn()  # so that a draw of what is not there is told of now
+    return scenario
 
 
 def describe_fault(fault: ValidationError, model: type[BaseModel]) -> str:
@@ -288,6 +333,45 @@ def _with_silt(layer: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(tank, dict) or not isinstance(silt, dict) or not isinstance(silt.get("kind"), str):
         return layer
     return layer | {"tank": tank | {"silt": SILTS.get(silt["kind"], {}) | silt}}
+
+
+def _world_layer(name: Any) -> dict[str, Any]:
+    """What a world of the library says; nothing for a name that is none."""
+    return load_world(name).layer() if name in world_names() else {}
+
+
+def _leave(tree: dict[str, Any], name: str) -> None:
+    """Take what a world said, and nobody changed since, out of a scenario's tree."""
+    if name not in world_names():
+        return
+    world = load_world(name)
+    for dotted in world.draws:
+        tree["draws"].pop(dotted, None)
+    for dotted, value in world.values.items():
+        *parents, leaf = dotted.split(".")
+        branch = tree
+        for parent in parents:
+            branch = branch.get(parent, {})
+        found = branch.get(leaf)
+        if found == (tuple(value) if isinstance(found, tuple) else value):
+            del branch[leaf]
+
+
+def _laid(tree: dict[str, Any], layer: dict[str, Any]) -> dict[str, Any]:
+    """The layer over the tree; draws of fields that the layer gives are gone."""
+    full = _with_silt(layer)
+    given = _leaves({name: value for name, value in full.items() if name != "draws"})
+    draws = tree.get("draws", {})
+    kept = {name: draw for name, draw in draws.items() if not any(f"{name}.".startswith(f"{g}.") for g in given)}
+    return _merged(tree | ({"draws": kept} if draws else {}), full)
+
+
+def _leaves(tree: dict[str, Any], prefix: str = "") -> list[str]:
+    """Dotted names of what a tree gives values."""
+    found: list[str] = []
+    for key, value in tree.items():
+        found += _leaves(value, f"{prefix}{key}.") if isinstance(value, dict) else [f"{prefix}{key}"]
+    return found
 
 
 def _nested(dotted: str, value: Any) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Worlds by name: where a flight really takes place."""
+"""Makes the world of a flight from its parts: true vehicle, true start, water."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ import numpy as np
 from wakewise.geometry import Pose, quat_from_rotvec, quat_multiply
 from wakewise.interfaces import BodyState, World
 from wakewise.operation.instant_water import InstantWorld, Jets, free_jet_field, lattice_jets, paper_jets
+from wakewise.operation.worlds.library import load_world, world_names
 from wakewise.plugins import find
 from wakewise.tank import TankWorld
 from wakewise.vehicles import Vehicle, perturbed
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
+    from wakewise.operation.scenario import Scenario
 
 START_SPREAD_M, START_SPREAD_RAD = 0.02, 0.03
 """How far the vehicle is from where the mission begins, one sigma per axis."""
@@ -88,4 +90,11 @@ def make_world(parts: Parts) -> World:
     InputError
         If there is no such world.
     """
-    return find("world", parts.scenario.world, WORLDS).maker(parts)
+    return find("world", flow_name(parts.scenario), WORLDS).maker(parts)
+
+
+def flow_name(scenario: Scenario) -> str:
+    """What the water of a scenario is: its own word for it, else that of its world, which may be a flow itself."""
+    if scenario.flow is not None:
+        return scenario.flow
+    return load_world(scenario.world).file.flow if scenario.world in world_names() else scenario.world

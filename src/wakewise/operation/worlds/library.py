@@ -1,0 +1,112 @@
+"""Worlds by name: what the water, the bed, the target and the vehicle's secrets are like where users have the trouble.
+
+Each is a YAML file: why it is flown, and fields of a scenario, each with a value, or a range from which the seed draws,
+and the source of the number. A world lies over a preset and under what the user says.
+"""
+
+from __future__ import annotations
+
+import difflib
+import functools
+from dataclasses import dataclass
+from importlib import resources
+from typing import Any
+
+from pydantic import Field, ValidationError, model_validator
+
+from wakewise.errors import InputError
+from wakewise.operation.draws import Draw
+from wakewise.settings import Settings
+from wakewise.yaml_text import read_yaml
+
+
+class WorldField(Settings):
+    """One field of a world: its value or from where it is drawn, and the source of the number."""
+
+    value: Any = Field(None, description="what the field is")
+    draw: Draw | None = Field(None, description="from where the seed draws it")
+    source: str = Field(..., min_length=3, description="where the number comes from")
+
+    @model_validator(mode="after")
+    def _has_one(self) -> WorldField:
+        if (self.value is None) == (self.draw is None):
+            raise ValueError("gives value and draw or neither, must give one of them")
+        return self
+
+
+class WorldFile(Settings):
+    """What a world's file holds."""
+
+    title: str = Field(..., min_length=3, description="the world in a few words")
+    why: str = Field(..., min_length=20, description="who meets it, and what can be harmed in it")
+    flow: str = Field("tank", description="the water: a name as `flow` of a scenario has it")
+    fields: dict[str, WorldField] = Field(..., min_length=1, description="fields of a scenario by their dotted names")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NamedWorld:
+    """A world of the library."""
+
+    name: str
+    file: WorldFile
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """Values by dotted field."""
+        return {name: field.value for name, field in self.file.fields.items() if field.draw is None}
+
+    @property
+    def draws(self) -> dict[str, Draw]:
+        """Draws by dotted field."""
+        return {name: field.draw for name, field in self.file.fields.items() if field.draw is not None}
+
+    def layer(self) -> dict[str, Any]:
+        """The world as a layer of a scenario: a tree of values, with its draws."""
+        tree: dict[str, Any] = {}
+        for dotted, value in self.values.items():
+            *parents, leaf = dotted.split(".")
+            branch = tree
+            for parent in parents:
+                branch = branch.setdefault(parent, {})
+            branch[leaf] = value
+        return tree | {"draws": {name: draw.model_dump(exclude_none=True) for name, draw in self.draws.items()}}
+
+
+@functools.cache
+def world_names() -> tuple[str, ...]:
+    """Names of the worlds that come with the package, sorted."""
+    folder = resources.files("wakewise.operation.worlds") / "library_data"
+    return tuple(sorted(e.name.removesuffix(".yaml") for e in folder.iterdir() if e.name.endswith(".yaml")))
+
+
+@functools.cache
+def load_world(name: str) -> NamedWorld:
+    """A world of the library.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name, or its file is not one.
+    """
+    if name not in world_names():
+        close = difflib.get_close_matches(name, world_names(), 1)
+        hint = f"did you mean {close[0]}? " if close else ""
+        raise InputError(f"world '{name}': not in the library, {hint}allowed are {', '.join(world_names())}")
+    text = (resources.files("wakewise.operation.worlds") / "library_data" / f"{name}.yaml").read_text("utf-8")
+    return parse_world(name, text)
+
+
+def parse_world(name: str, text: str) -> NamedWorld:
+    """A world from the text of its file.
+
+    Raises
+    ------
+    InputError
+        Naming the field, what was found and what is allowed.
+    """
+    try:
+        return NamedWorld(name=name, file=WorldFile.model_validate(read_yaml(text)))
+    except ValidationError as fault:
+        first = fault.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise InputError(f"world {name}: {where}: {first['msg'].removeprefix('Value error, ')}") from None

@@ -1,0 +1,97 @@
+"""Worlds by name."""
+
+import json
+
+import pytest
+
+from wakewise.cli.main import run
+from wakewise.errors import InputError
+from wakewise.operation import Scenario, load_scenario, read_scenario
+from wakewise.operation.scenario import dump_scenario
+from wakewise.operation.worlds.library import load_world, parse_world, world_names
+from wakewise.operation.worlds.makers import flow_name
+
+
+@pytest.mark.parametrize("name", world_names())
+def test_every_world_is_a_scenario_that_can_begin(name):
+    """Several seeds of it pass what is checked before a flight, with the presets' vehicle and mission."""
+    for seed in (1, 2, 3):
+        parts = Scenario.preset("quick", world=name, seed=seed).parts()
+        assert parts.preflight.clearance_m >= parts.scenario.mission.clearance_m
+        assert parts.world.begin()[1] is not None
+
+
+@pytest.mark.parametrize("name", world_names())
+def test_every_number_of_a_world_has_a_source(name):
+    """A work that can be looked up, the paper, arithmetic on stated figures, or the word estimate with its reason."""
+    for field in load_world(name).file.fields.values():
+        assert len(field.source.split()) >= 3
+
+
+def test_worlds_differ_by_seed_and_not_by_method():
+    """Seeds draw their own worlds; on one seed two methods meet the same."""
+
+    def tanks(seed, method):
+        return Scenario.preset("quick", world="payload", seed=seed, method=method).parts().scenario.tank
+
+    assert tanks(1, "dp") == tanks(1, "wake-aware") != tanks(2, "dp")
+
+
+def test_a_world_lies_over_the_preset_and_under_what_the_user_says(tmp_path):
+    """A file's value ends the world's draw of that field and leaves the others."""
+    path = tmp_path / "mine.yaml"
+    path.write_text("world: payload\ntank: {mismatch: {trim_N: 0.5}}\n")
+    scenario = load_scenario("quick", path, {})
+    assert scenario.tank.mismatch.trim_N == 0.5 and set(scenario.draws) == {"tank.current.velocity_m_s"}
+    assert load_scenario("quick", path, {"world": "still-tank"}).tank.current.velocity_m_s == (0.0, 0.0, 0.0)
+
+
+def test_leaving_a_world_leaves_nothing_of_it_behind():
+    """Another world's values and draws take the place of the first's; what the user said stays."""
+    there = Scenario.preset("quick", world="close", seed=9)
+    assert there.replace(world="payload") == Scenario.preset("quick", world="payload", seed=9)
+    assert there.replace(world="tank") == Scenario.preset("quick", world="tank", seed=9)
+
+
+def test_a_trial_holds_the_world_that_was_flown_in_numbers(tmp_path):
+    """What was drawn is read back as it was, with the world's name and without a draw; so it is through the loader."""
+    flown = Scenario.preset("quick", world="payload", seed=4).parts().scenario
+    path = tmp_path / "scenario.yaml"
+    path.write_text(dump_scenario(flown))
+    assert read_scenario(path) == flown and flown.world == "payload"
+    assert load_scenario(None, path, {}).drawn() == flown
+
+
+def test_the_water_of_a_world_can_be_another():
+    """`flow` takes the place of the world's own water and leaves the rest."""
+    scenario = Scenario.preset("quick", world="payload")
+    assert flow_name(scenario) == "tank" and flow_name(scenario.replace(flow="paper")) == "paper"
+    assert scenario.replace(flow="paper").parts().world.name == "paper"
+    with pytest.raises(InputError, match=r"flow: found 'papr'.*did you mean paper"):
+        scenario.replace(flow="papr")
+
+
+def test_a_world_that_is_none_is_refused():
+    """In one line with what is near, from Python and from the command."""
+    with pytest.raises(InputError, match="world: found 'paylod', did you mean payload"):
+        Scenario.preset("quick", world="paylod")
+    with pytest.raises(InputError, match="world 'paylod': not in the library, did you mean payload"):
+        load_world("paylod")
+    with pytest.raises(InputError, match=r"world w: fields\.a\.source"):
+        parse_world("w", "title: abc\nwhy: nobody knows why it is\nfields: {a: {value: 1}}")
+    with pytest.raises(InputError, match=r"world w: fields\.a: gives value and draw or neither"):
+        parse_world("w", "title: abc\nwhy: nobody knows why it is\nfields: {a: {source: a book}}")
+
+
+def test_the_command_shows_a_world_and_what_a_seed_draws(capsys):
+    """Names, reasons, sources; the drawn numbers are those that are flown."""
+    assert run(["world", "list", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)
+    assert {row["name"] for row in listed["worlds"]} == set(world_names()) and listed["default_world"]
+    assert run(["world", "show", "payload", "--seed", "3", "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)
+    flown = Scenario.preset("quick", world="payload", seed=3).parts().scenario
+    assert shown["fields"]["tank.mismatch.trim_N"]["drawn"] == flown.tank.mismatch.trim_N
+    assert run(["world", "show", "payload"]) == 0
+    assert "-5 to -2" in capsys.readouterr().out
+    assert run(["world", "show", "nowhere"]) == 2
