@@ -10,11 +10,11 @@ from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState
 from wakewise.operation.instant_water import InstantWater, paper_jets
 from wakewise.reports.levers import draw_levers
+from wakewise.studies.flight_store import FlightStore, source_version, store_folder
 from wakewise.studies.gentle import bench as gentle
 from wakewise.studies.gentle.figures import change, flow_figures, reduction_pct
 from wakewise.studies.gentle.flight import FIGURES, Trial, gentle_route, helped_by, scenario_of
 from wakewise.studies.gentle.levers import GENTLE, PARTS, PLAIN, entries, method_trial, together
-from wakewise.studies.gentle.store import FlightStore, source_version, store_folder
 from wakewise.tank import TankSettings
 from wakewise.targets import coral, place_on_bed
 from wakewise.trials import BenchOptions

@@ -21,10 +21,15 @@ BENCHES = {
     "imaging": "one photograph: speed by part, memory, geometry, flat port, features",
     "lattice": "the lattice-Boltzmann solver: cell updates per core beside a plain loop, distance from the twin",
     "tank": "the world of a trial against the clock",
+    "worlds": "what each method leaves of each world in which users have the trouble, models included",
 }
 """Name of each bench and what it measures; the module of that name in this folder holds it, or one of `_STUDIES`."""
 
-_STUDIES = {"gentle": "wakewise.studies.gentle.bench", "operator": "wakewise.studies.operator"}
+_STUDIES = {
+    "gentle": "wakewise.studies.gentle.bench",
+    "operator": "wakewise.studies.operator",
+    "worlds": "wakewise.studies.worlds.bench",
+}
 
 
 def run_bench(name: str, options: BenchOptions) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from wakewise.cli.bench_worlds import show_worlds
 from wakewise.cli.console import Bars, print_json, shown
 from wakewise.cli.options import Json
 
@@ -14,19 +15,23 @@ Name = Annotated[str, typer.Argument(help="Which bench; without a name, all of t
 Data = Annotated[
     Path, typer.Option(help="Folder of reference data that some figures are held against.", envvar="WAKEWISE_DATA")
 ]
-Seeds = Annotated[int, typer.Option(help="gentle: flights per method, seeds 1 to this.", min=1, max=1000)]
+Seeds = Annotated[int, typer.Option(help="gentle, worlds: flights per method, seeds 1 to this.", min=1, max=1000)]
 Methods = Annotated[
-    str, typer.Option(help="gentle: methods, with commas between; all if not given.", show_default=False)
+    str, typer.Option(help="gentle, worlds: methods, with commas between; all if not given.", show_default=False)
+]
+Worlds = Annotated[str, typer.Option(help="worlds: which, with commas between; all if not given.", show_default=False)]
+Models = Annotated[
+    int, typer.Option(help="worlds: seeds for which a whole scan is made and its model judged.", min=0, max=1000)
 ]
 Flows = Annotated[str, typer.Option(help="gentle: parcels (the tank) or paper; both if not given.", show_default=False)]
 Levers = Annotated[
     str, typer.Option(help="gentle: levers, with commas between, or none; all if not given.", show_default=False)
 ]
-Fresh = Annotated[bool, typer.Option("--fresh", help="gentle: fly anew what an earlier run has flown.")]
-Workers = Annotated[int, typer.Option(help="gentle: processes that fly side by side.", min=1, max=64)]
+Fresh = Annotated[bool, typer.Option("--fresh", help="gentle, worlds: fly anew what an earlier run has flown.")]
+Workers = Annotated[int, typer.Option(help="gentle, worlds: processes that fly side by side.", min=1, max=64)]
 Store = Annotated[
     Path | None,
-    typer.Option(help="gentle: folder that keeps flights; the user's cache if not given.", show_default=False),
+    typer.Option(help="gentle, worlds: folder that keeps flights; the user's cache if not given.", show_default=False),
 ]
 Plot = Annotated[
     Path | None,
@@ -41,6 +46,8 @@ def bench(
     methods: Methods = "",
     flows: Flows = "",
     levers: Levers = "",
+    worlds: Worlds = "",
+    models: Models = 1,
     fresh: Fresh = False,
     workers: Workers = 2,
     store: Store = None,
@@ -73,6 +80,8 @@ def bench(
                 methods=_listed(methods),
                 flows=_listed(flows),
                 levers=_listed(levers),
+                worlds=_listed(worlds),
+                models=models,
                 fresh=fresh,
                 workers=workers,
                 store=store,
@@ -91,6 +100,8 @@ def bench(
         typer.echo(f"\n{each}: {BENCHES[each]}")
         if each == "gentle":
             _show_gentle(result)
+        elif each == "worlds":
+            show_worlds(result)
         else:
             _show(result, "  ")
 

@@ -27,6 +27,10 @@ class BenchOptions:
         Flights per method of a bench that flies; seeds 1 to this.
     methods, flows, levers : tuple of str or None
         Which of them such a bench flies; None for all.
+    worlds : tuple of str or None
+        Which worlds such a bench flies in; None for all.
+    models : int
+        Seeds, from 1, for which a bench of worlds also scans and makes a model.
     fresh : bool
         Fly anew what an earlier run has flown.
     workers : int
@@ -41,6 +45,8 @@ class BenchOptions:
     methods: tuple[str, ...] | None = None
     flows: tuple[str, ...] | None = None
     levers: tuple[str, ...] | None = None
+    worlds: tuple[str, ...] | None = None
+    models: int = 1
     fresh: bool = False
     workers: int = 2
     store: Path | None = None
@@ -49,6 +55,8 @@ class BenchOptions:
         for name, value, most in (("seeds", self.seeds, 1000), ("workers", self.workers, 64)):
             if not 1 <= value <= most:
                 raise InputError(f"{name}: {value}, allowed 1 to {most}")
+        if not 0 <= self.models <= 1000:
+            raise InputError(f"models: {self.models}, allowed 0 to 1000")
 
 
 def timed_us(work: Callable[[], Any], repeats: int) -> dict[str, float]:

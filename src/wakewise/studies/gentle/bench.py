@@ -16,22 +16,18 @@ Flights are kept (`flight_store`): a run that was stopped goes on, and a second 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
-from dataclasses import dataclass
-from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
 
-from wakewise.errors import InputError, WakewiseError
-from wakewise.studies.gentle.figures import Row, flow_figures
+from wakewise.errors import InputError
+from wakewise.studies import side_by_side
+from wakewise.studies.flight_store import FlightStore, store_folder
+from wakewise.studies.gentle.figures import flow_figures
 from wakewise.studies.gentle.flight import FIGURES, Trial, World, fly_trial
 from wakewise.studies.gentle.levers import Entry, entries, method_trial
-from wakewise.studies.gentle.store import FlightStore, store_folder
+from wakewise.studies.side_by_side import Failure, Key, Row
 from wakewise.trials.timing import BenchOptions
-from wakewise.warming import warm
 
 METHODS = ("dp", "pseudo-inverse", "unaware", "smooth", "wake-aware")
 WORLDS: tuple[World, ...] = ("parcels", "paper")
@@ -39,17 +35,7 @@ LEVER_SEEDS = {"parcels": 3, "paper": 2}
 """Levers fly the first seeds only. The first three hover abreast, upstream and downstream of the target; the intervals
 of so few pairs are narrower than their 95 %."""
 
-Key = tuple[World, str, int]
-
-
-@dataclass(frozen=True)
-class Failure:
-    """A flight that gave no figures, and why."""
-
-    flow: str
-    name: str
-    seed: int
-    reason: str
+_pool = side_by_side.processes
 
 
 def run(options: BenchOptions) -> dict[str, Any]:
@@ -101,33 +87,7 @@ def planned_trials(methods: tuple[str, ...], tables: dict[World, dict[str, Entry
 def fly_all(trials: dict[Key, Trial], options: BenchOptions) -> tuple[dict[Key, Row], list[Failure], int]:
     """Figures of all flights, those that failed, and how many were known already."""
     store = FlightStore(options.store or store_folder(), options.fresh)
-    rows: dict[Key, Row] = {}
-    for key, trial in trials.items():
-        figures = store.load(trial)
-        if figures is not None:
-            rows[key] = figures
-    kept = len(rows)
-    failures: list[Failure] = []
-    missing = [key for key in trials if key not in rows]
-    options.progress(kept, len(trials), f"{kept} flights known already")
-    if not missing:
-        return rows, failures, kept
-    warm(progress=options.progress)  # else each of the processes would
-    began = time.monotonic()
-    with _pool(options.workers) as pool:
-        waiting: dict[Future[Row], Key] = {pool.submit(fly_trial, trials[key]): key for key in missing}
-        for done, future in enumerate(as_completed(waiting), start=1):
-            key = waiting[future]
-            try:
-                rows[key] = future.result()
-            except (WakewiseError, ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
-                failures.append(Failure(*key, reason=f"{type(error).__name__}: {error}"))
-            else:
-                store.save(trials[key], dict(rows[key]))
-            left_s = (time.monotonic() - began) * (len(missing) - done) / done
-            words = f"{key[0]}: {key[1]}, seed {key[2]}; {left_s / 60.0:.0f} min left"
-            options.progress(kept + done, len(trials), words)
-    return rows, failures, kept
+    return side_by_side.fly_all(trials, fly_trial, store, options, _pool)
 
 
 def why(rows: dict[Key, Row], worlds: tuple[World, ...], methods: tuple[str, ...]) -> dict[str, str]:
@@ -144,16 +104,6 @@ def why(rows: dict[Key, Row], worlds: tuple[World, ...], methods: tuple[str, ...
     for method in (m for m in METHODS if m not in methods):
         reasons[method] = "this method was left out"
     return reasons
-
-
-@contextmanager
-def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Worker processes of their own (no shared random state, no forked threads); what waits is dropped on trouble."""
-    pool = ProcessPoolExecutor(max_workers=workers, mp_context=get_context("spawn"))
-    try:
-        yield pool
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
 
 
 def _known(what: str, wished: tuple[str, ...] | None, allowed: tuple[Any, ...]) -> tuple[Any, ...]:

@@ -105,10 +105,16 @@ def scenario_of(trial: Trial) -> Scenario:
     return check_scenario(told, "gentle bench")
 
 
-def gentle_route(centre_W_m: Any, standoff_m: float, azimuth_rad: float, direction: float = 1.0) -> Route:
+def gentle_route(
+    centre_W_m: Any,
+    standoff_m: float,
+    azimuth_rad: float,
+    direction: float = 1.0,
+    elevations_deg: tuple[float, float] = (HOVER_DEG, ARC_DEG),
+) -> Route:
     """Hover on a higher orbit, sink to a lower one, fly part of it: towards larger azimuths, or less for -1."""
-    high = np.array([azimuth_rad, np.radians(HOVER_DEG), standoff_m])
-    low = np.array([azimuth_rad, np.radians(ARC_DEG), standoff_m])
+    high = np.array([azimuth_rad, np.radians(elevations_deg[0]), standoff_m])
+    low = np.array([azimuth_rad, np.radians(elevations_deg[1]), standoff_m])
     turn = direction * ARC_SPEED_M_S * ARC_S / (standoff_m * np.cos(low[1]))
     end = low + np.array([turn, 0.0, 0.0])
     hover = Leg(

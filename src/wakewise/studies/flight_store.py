@@ -28,6 +28,7 @@ FLIES = (
     "operation",
     "planning",
     "studies/gentle",
+    "studies/worlds",
     "tank",
     "targets",
     "thrusters",
@@ -39,18 +40,22 @@ FLIES = (
 _SOURCES = {".py", ".yaml", ".csv", ".json"}
 
 
-def store_folder() -> Path:
-    """Where flights are kept unless told otherwise: the user's cache folder (XDG base directories)."""
+def store_folder(bench: str = "gentle") -> Path:
+    """Where a bench's flights are kept unless told otherwise: the user's cache folder (XDG base directories)."""
     base = os.environ.get("XDG_CACHE_HOME", "")
-    return (Path(base) if base else Path.home() / ".cache") / "wakewise" / "gentle"
+    return (Path(base) if base else Path.home() / ".cache") / "wakewise" / bench
 
 
-@lru_cache(maxsize=1)
-def source_version() -> str:
-    """Hash of the source that flies."""
-    root = Path(__file__).parents[2]
+PHOTOGRAPHS = (*FLIES, "imaging", "reconstruction", "trials")
+"""Parts of the package that can change a model made from a flight's photographs."""
+
+
+@lru_cache(maxsize=4)
+def source_version(parts: tuple[str, ...] = FLIES) -> str:
+    """Hash of the source that flies, or of these parts of the package."""
+    root = Path(__file__).parents[1]
     digest = hashlib.sha256()
-    for part in FLIES:
+    for part in parts:
         place = root / part
         files = [place] if place.is_file() else sorted(place.rglob("*"))
         for file in (f for f in files if f.suffix in _SOURCES):
@@ -61,14 +66,15 @@ def source_version() -> str:
 
 @dataclass(frozen=True)
 class FlightStore:
-    """Figures of flights by what was flown; `fresh` forgets what is there."""
+    """Figures of flights by what was flown and by the source of `parts`; `fresh` forgets what is there."""
 
     folder: Path
     fresh: bool = False
+    parts: tuple[str, ...] = FLIES
 
     def path(self, trial: Any) -> Path:
         """File of a trial (a dataclass of plain values)."""
-        told = json.dumps({"trial": asdict(trial), "source": source_version()}, sort_keys=True, default=str)
+        told = json.dumps({"trial": asdict(trial), "source": source_version(self.parts)}, sort_keys=True, default=str)
         return self.folder / f"{hashlib.sha256(told.encode()).hexdigest()[:32]}.json"
 
     def load(self, trial: Any) -> dict[str, float | None] | None:

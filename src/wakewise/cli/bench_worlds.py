@@ -1,0 +1,54 @@
+"""Shows what `wakewise bench worlds` found: a table for each world."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import typer
+
+from wakewise.cli.console import print_table, shown
+
+_COLUMNS = (
+    ("target_speed_mean_m_s", "target mm/s", 1e3),
+    ("exposure_speed_mean_m_s", "exposing mm/s", 1e3),
+    ("bed_shear_p95_Pa", "bed Pa", 1.0),
+    ("silt_lifted_g", "lifted g", 1.0),
+    ("ray_optical_depth", "ray depth", 1.0),
+    ("sway_rms_mm", "sway mm", 1.0),
+    ("position_rmse_mm", "position mm", 1.0),
+    ("energy_kJ", "energy kJ", 1.0),
+    ("rmse_mm", "model mm", 1.0),
+    ("completeness_pct", "complete %", 1.0),
+    ("success_pct", "success %", 1.0),
+)
+
+
+def show_worlds(result: dict[str, Any]) -> None:
+    """One table per world, a row per method; last, how much less each moves the target's water than the first."""
+    from rich.table import Table
+
+    for name, world in result["worlds"].items():
+        default = ", of the presets" if name == result["default_world"] else ""
+        flights = max((row["flights"] for row in world["methods"].values()), default=0)
+        table = Table(title=f"{name}{default}: {world['title']}; {flights} seeds", title_justify="left")
+        table.add_column("method")
+        for _, title, _ in _COLUMNS:
+            table.add_column(title, justify="right")
+        first = next(iter(world["methods"]))
+        table.add_column(f"less than {first}", justify="right")
+        for method, row in world["methods"].items():
+            cells = [shown(None if row[key] is None else scale * row[key]) for key, _, scale in _COLUMNS]
+            table.add_row(method, *cells, _less(row["against"].get(first)))
+        print_table(table)
+    typer.echo(f"{result['flights']} flights, {result['models']} models, {result['failed']} failed")
+    for failure in result["failures"]:
+        typer.echo(f"failed: {failure['flow']}, {failure['name']}, seed {failure['seed']}: {failure['reason']}")
+    typer.echo(f"emergent: {result['emergent']}\ntyped in: {result['typed_in']}")
+
+
+def _less(ratios: dict[str, Any] | None) -> str:
+    if ratios is None or ratios["target_speed_less_pct"] is None:
+        return "—"
+    interval = ratios["target_speed_less_interval_pct"]
+    ends = "" if interval is None else f" ({interval[0]:.0f} to {interval[1]:.0f})"
+    return f"{ratios['target_speed_less_pct']:.0f} %{ends}"
