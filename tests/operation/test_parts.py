@@ -85,7 +85,7 @@ def test_a_vehicle_too_large_for_the_route_is_refused_before_it_flies():
         ww.fly(parts.replace(vehicle=large))
 
 
-@pytest.mark.parametrize("world", ["paper", "lattice"])
+@pytest.mark.parametrize("world", ["paper", "lattice-jets"])
 def test_other_worlds_fly_the_same_mission(world):
     """Water that answers at once: by the paper's model (circular) or by the lattice's mean field."""
     flight = ww.fly(QUICK.replace(method="dp", world=world), duration_s=1.0)
@@ -99,7 +99,7 @@ def test_the_lattices_water_is_the_lattices_jet():
     from wakewise.lattice import LatticeFlow
     from wakewise.operation.instant_water import free_jet_field
 
-    plant, witness = QUICK.replace(method="dp", world="lattice").parts().world.begin()
+    plant, witness = QUICK.replace(method="dp", world="lattice-jets").parts().world.begin()
     for _ in range(40):
         plant.step(np.array([3.0, 0, 0, 0, 0, 0, 0, 0]), 0.02)
     true = witness.observe()

@@ -8,7 +8,7 @@ are those of the tank.
   that of `paper-calibrated`: 0.036 of the printed one, which at 1 N is 85 cm/s at 0.1 m and 3.4 cm/s at 0.5 m on the
   axis, the published 60 and 5 cm/s in the geometric mean (the law falls by a factor of 25 over that range, the
   published speeds by 12).
-- `lattice`: each jet is the mean field that the lattice computed for it, several are joined by their momentum (see
+- `lattice-jets`: each jet is the mean field that the lattice computed for it, several are joined by their momentum (see
   `wakewise.lattice.LatticeFlow`). It shares no law with tank or planner, but knows neither bed nor travel time.
 """
 

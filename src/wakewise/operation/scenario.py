@@ -71,7 +71,8 @@ class Scenario(Settings):
         description="a world's name (`wakewise world list`), a flow's, or package.module:make",
     )
     flow: str | None = Field(
-        None, description="what its water is in place of the world's own: tank, paper (circular), lattice, a plug-in"
+        None,
+        description="water in place of the world's own: tank, paper (circular), lattice, lattice-jets, a plug-in",
     )
     draws: dict[str, Draw] = Field(
         default={}, description="fields that the seed draws, by dotted name: two numbers, or in_log, any_of, level"

@@ -11,6 +11,7 @@ import numpy as np
 from wakewise.geometry import Pose, quat_from_rotvec, quat_multiply
 from wakewise.interfaces import BodyState, World
 from wakewise.operation.instant_water import InstantWorld, Jets, free_jet_field, lattice_jets, paper_jets
+from wakewise.operation.lattice_water import LatticeWorld, box_half_size_m
 from wakewise.operation.worlds.library import load_world, world_names
 from wakewise.plugins import find
 from wakewise.tank import TankWorld
@@ -74,10 +75,28 @@ def _instant(name: str, jets: Callable[[float], Jets], parts: Parts) -> InstantW
     )
 
 
+def lattice_world(parts: Parts) -> LatticeWorld:
+    """`lattice`: a large-eddy simulation round the target, with the loop closed."""
+    route = parts.route
+    times_s = np.linspace(0.0, route.duration_s, 200)
+    places = np.array([route.body(float(t), parts.vehicle.X_BC).X_WB.p_m for t in times_s])
+    return LatticeWorld(
+        vehicle=true_vehicle(parts),
+        target=parts.target,
+        settings=parts.scenario.tank,
+        start=true_start(parts),
+        half_size_m=box_half_size_m(places, parts.target.centre_W_m, parts.vehicle),
+        draw=parts.seeds.tank,
+    )
+
+
 WORLDS: dict[str, Callable[[Parts], World]] = {
     "tank": tank_world,
     "paper": partial(_instant, "paper", lambda _: paper_jets()),
-    "lattice": partial(_instant, "lattice", lambda density_kg_m3: lattice_jets(free_jet_field(), density_kg_m3)),
+    "lattice": lattice_world,
+    "lattice-jets": partial(
+        _instant, "lattice-jets", lambda density_kg_m3: lattice_jets(free_jet_field(), density_kg_m3)
+    ),
 }
 """Our own worlds: what makes each from the parts of a flight."""
 
