@@ -11,7 +11,7 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from wakewise.control import ControlSettings, make_controller
+from wakewise.control import ControlSettings, in_pulses, make_controller
 from wakewise.control.settings import told
 from wakewise.errors import InputError
 from wakewise.estimation import ErrorStateFilter
@@ -126,7 +126,8 @@ class Parts:
     @part
     def vehicle(self) -> Vehicle:
         """The vehicle as it is believed to be."""
-        return any_vehicle(self.scenario.vehicle)
+        vehicle = any_vehicle(self.scenario.vehicle)
+        return vehicle.with_ideal_thrusters() if self.scenario.tank.ideal_thrusters else vehicle
 
     @part
     def target(self) -> Target:
@@ -201,8 +202,8 @@ class Parts:
 
     @cached_property
     def flying(self) -> Controller[Any]:
-        """The controller as it is flown: one from outside has a guard round it."""
-        return guarded(self)
+        """The controller as it is flown: one from outside has a guard round it, small thrusts are sent as pulses."""
+        return in_pulses(guarded(self), self.vehicle, self.control.pulse_s)
 
     @cached_property
     def camera(self) -> PinholeCamera | LensCamera:

@@ -207,6 +207,9 @@ class TankSettings(Settings):
     tether: TetherSettings = TetherSettings()
     sensors: SensorSettings = SensorSettings()
     mismatch: MismatchSettings = MismatchSettings()
+    ideal_thrusters: bool = Field(
+        False, description="thrust continuous through zero, whatever least thrust and steps the vehicle's file states"
+    )
     failures: tuple[ThrusterFailure, ...] = Field((), description="thrusters that fail: thruster, at_s, kind, value")
 
     @model_validator(mode="after")

@@ -18,6 +18,8 @@ from wakewise.vehicles.hydrodynamics import (
     require_quadratic_damping,
 )
 from wakewise.vehicles.vehicle import (
+    CurveChoice,
+    LeastThrust,
     Provenance,
     Vehicle,
     readable_null_space,
@@ -26,6 +28,7 @@ from wakewise.vehicles.vehicle import (
     require_inertia,
     require_positive,
     require_size,
+    thrust_steps,
 )
 
 ROUNDING = 1e-3
@@ -80,14 +83,6 @@ class ThrusterDraft:
         return np.concatenate([self.axis_B, np.cross(self.p_BT_m, self.axis_B)])
 
 
-@dataclass(frozen=True, kw_only=True)
-class CurveChoice:
-    """Which thrust table of the package the vehicle's thrusters follow, and at what supply voltage."""
-
-    table: str
-    supply_V: float
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class VehicleDraft:
     """What a file says about a vehicle, in the units and the body frame (FRD) of `Vehicle`.
@@ -109,6 +104,8 @@ class VehicleDraft:
         Allocation matrix as the file states it, turned to FRD.
     curve : CurveChoice or None
         Table of thrust against pulse width, if the file names one.
+    least_thrust : LeastThrust or None
+        Least thrusts, if the file states them.
     X_BC : Pose or None
     provenance : tuple of Provenance
     notes : tuple of str
@@ -141,6 +138,7 @@ class VehicleDraft:
     thrusters: tuple[ThrusterDraft, ...] = ()
     shipped_matrix: Array | None = None
     curve: CurveChoice | None = None
+    least_thrust: LeastThrust | None = None
     X_BC: Pose | None = None
     camera_fov_rad: float | None = None
     provenance: tuple[Provenance, ...] = ()
@@ -169,6 +167,7 @@ class VehicleDraft:
         if self.camera_fov_rad is not None:
             require_fov(self.camera_fov_rad)
         self._check_water()
+        thrust_steps(self.curve, self.least_thrust)
         require_different_names([t.name for t in self.thrusters])
         n = len(self.thrusters)
         if self.shipped_matrix is not None and n and self.shipped_matrix.shape[1] != n:
@@ -204,6 +203,8 @@ class VehicleDraft:
                 )
                 for t in vehicle.thrusters
             ),
+            curve=vehicle.curve,
+            least_thrust=vehicle.least_thrust,
             X_BC=vehicle.X_BC,
             camera_fov_rad=vehicle.camera_fov_rad,
             provenance=vehicle.provenance,
@@ -331,6 +332,8 @@ class VehicleDraft:
             ),
             thrusters=tuple(_whole(t) for t in self.thrusters),
             X_BC=self.X_BC,
+            curve=self.curve,
+            least_thrust=self.least_thrust,
             camera_fov_rad=self.camera_fov_rad,
             provenance=self.provenance,
         )

@@ -126,6 +126,7 @@ def draft_yaml(draft: VehicleDraft) -> str:
 def _groups(draft: VehicleDraft) -> dict[str, dict[str, Any]]:
     matrix, linear, quadratic = draft.added_mass, draft.linear_damping, draft.quadratic_damping
     inertia, shipped, curve, camera = draft.inertia_kg_m2, draft.shipped_matrix, draft.curve, draft.X_BC
+    least = draft.least_thrust
     groups: dict[str, dict[str, Any]] = {
         "body": {"size_m": _numbers(draft.size_m), "mass_kg": draft.mass_kg},
         "inertia": {},
@@ -140,6 +141,7 @@ def _groups(draft: VehicleDraft) -> dict[str, dict[str, Any]]:
         "thruster_disk": {},
         "thruster_lag": {},
         "thruster_curve": {} if curve is None else {"table": curve.table, "supply_V": curve.supply_V},
+        "thruster_least": {} if least is None else {"forward_N": least.forward_N, "reverse_N": least.reverse_N},
         "thruster_layout": {},
         "shipped_matrix": {},
         "camera_mount": {},

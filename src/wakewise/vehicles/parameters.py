@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.vehicles.draft import VehicleDraft
+from wakewise.vehicles.vehicle import thrust_steps
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,6 +71,7 @@ def parameters(draft: VehicleDraft) -> list[Parameter]:
             None if curve is None else f"{curve.table} at {curve.supply_V:g} V",
             "",
         ),
+        *_least(draft, row),
         row(
             "thruster_layout",
             "places and axes of thrusters",
@@ -85,6 +88,15 @@ def parameters(draft: VehicleDraft) -> list[Parameter]:
         ),
     ]
     return [r for r in rows if r.value is not None or r.quantity != "thrust table"]
+
+
+def _least(draft: VehicleDraft, row: Callable[..., Parameter]) -> list[Parameter]:
+    """Least thrusts, by the table or as stated; no row where thrust is taken as continuous."""
+    steps = thrust_steps(draft.curve, draft.least_thrust)
+    if steps is None:
+        return []
+    group = "thruster_least" if draft.curve is None else "thruster_curve"
+    return [row(group, "least thrust: forward, reverse", f"{steps.least_forward_N:g}, {steps.least_reverse_N:g}", "N")]
 
 
 def _scalar(value: float | None) -> str | None:

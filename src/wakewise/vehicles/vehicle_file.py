@@ -12,8 +12,8 @@ from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, matrix_from_quat, quat_from_euler
 from wakewise.settings import Settings
-from wakewise.vehicles.draft import CurveChoice, ThrusterDraft, VehicleDraft
-from wakewise.vehicles.vehicle import Provenance
+from wakewise.vehicles.draft import ThrusterDraft, VehicleDraft
+from wakewise.vehicles.vehicle import CurveChoice, LeastThrust, Provenance
 
 R_BODY_CAMERA = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Axes of a camera (OpenCV) that looks along the body's x axis with its image upright, expressed in B."""
@@ -140,6 +140,13 @@ class ThrusterCurve(Group):
     supply_V: Positive = Field(description="supply voltage at which to read it")
 
 
+class ThrusterLeast(Group):
+    """Thrusts below which the thrusters give none, where no table of theirs says so."""
+
+    forward_N: NotNegative
+    reverse_N: NotNegative = Field(description="positive magnitude")
+
+
 class Mount(Settings):
     """One thruster's place, and its own figures where they differ from the group's."""
 
@@ -201,6 +208,7 @@ class VehicleFile(Settings):
     thruster_disk: ThrusterDisk | None = None
     thruster_lag: ThrusterLag | None = None
     thruster_curve: ThrusterCurve | None = None
+    thruster_least: ThrusterLeast | None = None
     thruster_layout: Layout | None = None
     shipped_matrix: ShippedMatrix | None = None
     camera_mount: CameraMount | None = None
@@ -210,6 +218,7 @@ class VehicleFile(Settings):
         """Turn the file's numbers into a record, None where the file says nothing."""
         groups = [(field, getattr(self, field)) for field in type(self).model_fields]
         body, buoyancy, damping, curve = self.body, self.buoyancy, self.damping, self.thruster_curve
+        least = self.thruster_least
         return VehicleDraft(
             name=name,
             title=self.title,
@@ -227,6 +236,7 @@ class VehicleFile(Settings):
             thrusters=tuple(self._thrusters()),
             shipped_matrix=None if self.shipped_matrix is None else self.shipped_matrix.matrix(),
             curve=None if curve is None else CurveChoice(table=curve.table, supply_V=curve.supply_V),
+            least_thrust=None if least is None else LeastThrust(forward_N=least.forward_N, reverse_N=least.reverse_N),
             X_BC=None if self.camera_mount is None else _pose(self.camera_mount),
             camera_fov_rad=None if self.camera_lens is None else math.radians(self.camera_lens.horizontal_fov_deg),
             provenance=tuple(
