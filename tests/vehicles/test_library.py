@@ -146,6 +146,9 @@ def assert_same(a: VehicleDraft, b: VehicleDraft) -> None:
                 for value in ("max_forward_N", "max_reverse_N", "disk_area_m2", "time_constant_s"):
                     stated = getattr(t, value)
                     assert getattr(s, value) == (None if stated is None else pytest.approx(stated, rel=1e-12))
+        elif field.name == "tilt":
+            stated = None if two is None else pytest.approx((two.low_rad, two.high_rad, two.rate_rad_s), rel=1e-12)
+            assert (None if one is None else (one.low_rad, one.high_rad, one.rate_rad_s)) == stated
         elif field.name == "camera_fov_rad":
             assert one == (None if two is None else pytest.approx(two, rel=1e-12))
         else:

@@ -17,7 +17,7 @@ from wakewise.errors import InputError
 from wakewise.estimation import ErrorStateFilter
 from wakewise.importers import any_vehicle
 from wakewise.interfaces import BodyState, Controller, Estimator, Pilot, WakeModel, World
-from wakewise.missions import Route, TankBounds, plan_route
+from wakewise.missions import CameraAim, Route, TankBounds, aim_of, plan_route
 from wakewise.operation.foreign import described, from_outside, guarded
 from wakewise.operation.pilots import make_pilot
 from wakewise.operation.preflight import Preflight, preflight
@@ -193,7 +193,17 @@ class Parts:
     @part
     def start(self) -> BodyState:
         """Where the mission begins, which is all that the estimator is told."""
-        return self.route.body(0.0, self.vehicle.X_BC)
+        return self.route.body(0.0, self.aim)
+
+    @cached_property
+    def aim(self) -> CameraAim:
+        """What the camera is aimed with; raises InputError where the mission asks for a joint that is not there."""
+        return aim_of(self.vehicle, self.scenario.mission.aim)
+
+    @property
+    def start_tilt_rad(self) -> float:
+        """Angle of the camera's joint when the mission begins."""
+        return self.route.tilt(0.0, self.aim)[0]
 
     @cached_property
     def preflight(self) -> Preflight:

@@ -56,6 +56,7 @@ def tank_world(parts: Parts) -> TankWorld:
         settings=parts.scenario.tank,
         start=true_start(parts),
         draw=parts.seeds.tank,
+        tilt_rad=parts.start_tilt_rad,
     )
 
 
@@ -69,6 +70,7 @@ def _instant(name: str, jets: Callable[[float], Jets], parts: Parts) -> InstantW
         settings=parts.scenario.tank,
         start=true_start(parts),
         draw=lambda: np.random.default_rng([seed, 11]),
+        tilt_rad=parts.start_tilt_rad,
     )
 
 

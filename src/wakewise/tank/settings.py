@@ -144,7 +144,8 @@ class TetherSettings(Settings):
 class SensorSettings(Settings):
     """What the vehicle senses.
 
-    Figures are typical of small vehicles' parts and of a camera-based pose at one metre, not of one product.
+    Figures are typical of small vehicles' parts and of a camera-based pose at one metre, not of one product. Those of
+    the tilt are estimates: a servo's dead band of 1 to 2 us is 0.1 to 0.2 deg, its mount is aligned to some tenths.
     """
 
     pose_rate_hz: float = Field(62.0, gt=0.0, le=500.0, description="rate of the camera-based pose")
@@ -172,6 +173,11 @@ class SensorSettings(Settings):
     )
     depth_rate_hz: float = Field(20.0, gt=0.0, le=500.0, description="rate of the pressure sensor")
     depth_noise_m: float = Field(0.005, ge=0.0, le=1.0, description="its noise, one sigma")
+
+    tilt_bias_rad: float = Field(
+        0.005, ge=0.0, le=0.2, description="constant error of the camera's measured tilt, drawn once, one sigma"
+    )
+    tilt_noise_rad: float = Field(0.002, ge=0.0, le=0.2, description="its noise, one sigma")
 
     @field_validator("pose_outages_s")
     @classmethod

@@ -17,6 +17,7 @@ from wakewise.vehicles.hydrodynamics import (
     require_linear_damping,
     require_quadratic_damping,
 )
+from wakewise.vehicles.tilt import TiltJoint
 from wakewise.vehicles.vehicle import (
     CurveChoice,
     LeastThrust,
@@ -107,6 +108,8 @@ class VehicleDraft:
     least_thrust : LeastThrust or None
         Least thrusts, if the file states them.
     X_BC : Pose or None
+    tilt : TiltJoint or None
+        The camera's joint, if the file states one.
     provenance : tuple of Provenance
     notes : tuple of str
         What was detected, inferred or found odd while reading.
@@ -140,6 +143,7 @@ class VehicleDraft:
     curve: CurveChoice | None = None
     least_thrust: LeastThrust | None = None
     X_BC: Pose | None = None
+    tilt: TiltJoint | None = None
     camera_fov_rad: float | None = None
     provenance: tuple[Provenance, ...] = ()
     notes: tuple[str, ...] = ()
@@ -206,6 +210,7 @@ class VehicleDraft:
             curve=vehicle.curve,
             least_thrust=vehicle.least_thrust,
             X_BC=vehicle.X_BC,
+            tilt=vehicle.tilt,
             camera_fov_rad=vehicle.camera_fov_rad,
             provenance=vehicle.provenance,
         )
@@ -332,6 +337,7 @@ class VehicleDraft:
             ),
             thrusters=tuple(_whole(t) for t in self.thrusters),
             X_BC=self.X_BC,
+            tilt=self.tilt,
             curve=self.curve,
             least_thrust=self.least_thrust,
             camera_fov_rad=self.camera_fov_rad,

@@ -126,7 +126,7 @@ def draft_yaml(draft: VehicleDraft) -> str:
 def _groups(draft: VehicleDraft) -> dict[str, dict[str, Any]]:
     matrix, linear, quadratic = draft.added_mass, draft.linear_damping, draft.quadratic_damping
     inertia, shipped, curve, camera = draft.inertia_kg_m2, draft.shipped_matrix, draft.curve, draft.X_BC
-    least = draft.least_thrust
+    least, joint = draft.least_thrust, draft.tilt
     groups: dict[str, dict[str, Any]] = {
         "body": {"size_m": _numbers(draft.size_m), "mass_kg": draft.mass_kg},
         "inertia": {},
@@ -145,6 +145,7 @@ def _groups(draft: VehicleDraft) -> dict[str, dict[str, Any]]:
         "thruster_layout": {},
         "shipped_matrix": {},
         "camera_mount": {},
+        "camera_tilt": {},
         "camera_lens": {},
     }
     if inertia is not None:
@@ -179,6 +180,12 @@ def _groups(draft: VehicleDraft) -> dict[str, dict[str, Any]]:
     if camera is not None:
         angles = np.rad2deg(euler_from_quat(quat_from_matrix(camera.R @ R_BODY_CAMERA.T)))
         groups["camera_mount"] = {"position_m": _numbers(camera.p_m), "roll_pitch_yaw_deg": _numbers(angles.round(12))}
+    if joint is not None:
+        groups["camera_tilt"] = {
+            "range_deg": [round(math.degrees(angle), 12) for angle in (joint.low_rad, joint.high_rad)],
+            "rate_deg_s": round(math.degrees(joint.rate_rad_s), 12),
+            "pivot_m": _numbers(joint.p_BJ_m),
+        }
     if draft.camera_fov_rad is not None:
         groups["camera_lens"]["horizontal_fov_deg"] = round(math.degrees(draft.camera_fov_rad), 12)
     return groups

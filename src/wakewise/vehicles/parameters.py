@@ -80,6 +80,7 @@ def parameters(draft: VehicleDraft) -> list[Parameter]:
         ),
         row("camera_mount", "camera place", None if camera is None else _vector(camera.p_m), "m"),
         row("camera_mount", "camera looks along", None if camera is None else _vector(camera.R[:, 2].round(6)), ""),
+        *_tilt(draft, row),
         row(
             "camera_lens",
             "horizontal field of view",
@@ -97,6 +98,17 @@ def _least(draft: VehicleDraft, row: Callable[..., Parameter]) -> list[Parameter
         return []
     group = "thruster_least" if draft.curve is None else "thruster_curve"
     return [row(group, "least thrust: forward, reverse", f"{steps.least_forward_N:g}, {steps.least_reverse_N:g}", "N")]
+
+
+def _tilt(draft: VehicleDraft, row: Callable[..., Parameter]) -> list[Parameter]:
+    """Stops and rate of the camera's joint; no row where the camera is fixed."""
+    if draft.tilt is None:
+        return []
+    low, high = (math.degrees(angle) for angle in (draft.tilt.low_rad, draft.tilt.high_rad))
+    return [
+        row("camera_tilt", "camera tilts between", f"{low:g}, {high:g}", "deg"),
+        row("camera_tilt", "camera tilts at", f"{math.degrees(draft.tilt.rate_rad_s):g}", "deg/s"),
+    ]
 
 
 def _scalar(value: float | None) -> str | None:

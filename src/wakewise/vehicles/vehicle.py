@@ -15,6 +15,7 @@ from wakewise.thrusters.curve_library import library_curve
 from wakewise.thrusters.thrust_steps import ThrustSteps
 from wakewise.thrusters.thruster import Thruster
 from wakewise.vehicles.hydrodynamics import Hydrodynamics
+from wakewise.vehicles.tilt import TiltJoint
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +65,8 @@ class Vehicle:
     thrusters : tuple of Thruster
     X_BC : Pose
         Camera mount; the camera frame has OpenCV axes (x right, y down, z forward).
+    tilt : TiltJoint or None
+        What tilts the camera; None where it is fixed.
     camera_fov_rad : float
         Horizontal field of view in water.
     curve : CurveChoice or None
@@ -93,6 +96,7 @@ class Vehicle:
     hydrodynamics: Hydrodynamics
     thrusters: tuple[Thruster, ...]
     X_BC: Pose
+    tilt: TiltJoint | None = None
     camera_fov_rad: float = math.pi / 2
     curve: CurveChoice | None = None
     least_thrust: LeastThrust | None = None
@@ -154,6 +158,10 @@ class Vehicle:
     def thrust_steps(self) -> ThrustSteps | None:
         """What each thruster can hold, the same for all; None where thrust is continuous through zero."""
         return thrust_steps(self.curve, self.least_thrust)
+
+    def X_BC_at(self, tilt_rad: float) -> Pose:  # noqa: N802  (a pose, in monogram notation)
+        """Camera mount at an angle of the tilt joint; the mount itself where the camera is fixed."""
+        return self.X_BC if self.tilt is None else self.tilt.mount(self.X_BC, tilt_rad)
 
     @property
     def least_thrusts_N(self) -> tuple[float, float]:

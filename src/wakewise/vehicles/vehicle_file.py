@@ -13,6 +13,7 @@ from wakewise.errors import InputError
 from wakewise.geometry import Pose, matrix_from_quat, quat_from_euler
 from wakewise.settings import Settings
 from wakewise.vehicles.draft import ThrusterDraft, VehicleDraft
+from wakewise.vehicles.tilt import TiltJoint
 from wakewise.vehicles.vehicle import CurveChoice, LeastThrust, Provenance
 
 R_BODY_CAMERA = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
@@ -186,6 +187,24 @@ class CameraMount(Group):
     roll_pitch_yaw_deg: Three = Field(description="turn of the camera; zeros look along the body's x axis, upright")
 
 
+class CameraTilt(Group):
+    """The joint that tilts the camera about its own right axis; left out where the camera is fixed."""
+
+    range_deg: Annotated[list[float], Field(min_length=2, max_length=2)] = Field(
+        description="lower and upper stop; positive looks up, 0 is as the mount states it"
+    )
+    rate_deg_s: Positive = Field(description="how fast it turns")
+    pivot_m: Three | None = Field(
+        default=None, description="a point of the hinge from the body origin, FRD; left out: the camera's own place"
+    )
+
+    def joint(self) -> TiltJoint:
+        """The joint, in SI units."""
+        low, high = (math.radians(angle) for angle in self.range_deg)
+        rate, pivot = math.radians(self.rate_deg_s), vector(self.pivot_m)
+        return TiltJoint(low_rad=low, high_rad=high, rate_rad_s=rate, p_BJ_m=pivot)
+
+
 class CameraLens(Group):
     """What the camera sees."""
 
@@ -212,6 +231,7 @@ class VehicleFile(Settings):
     thruster_layout: Layout | None = None
     shipped_matrix: ShippedMatrix | None = None
     camera_mount: CameraMount | None = None
+    camera_tilt: CameraTilt | None = None
     camera_lens: CameraLens | None = None
 
     def draft(self, name: str) -> VehicleDraft:
@@ -238,6 +258,7 @@ class VehicleFile(Settings):
             curve=None if curve is None else CurveChoice(table=curve.table, supply_V=curve.supply_V),
             least_thrust=None if least is None else LeastThrust(forward_N=least.forward_N, reverse_N=least.reverse_N),
             X_BC=None if self.camera_mount is None else _pose(self.camera_mount),
+            tilt=None if self.camera_tilt is None else self.camera_tilt.joint(),
             camera_fov_rad=None if self.camera_lens is None else math.radians(self.camera_lens.horizontal_fov_deg),
             provenance=tuple(
                 Provenance(group=field, source=group.source, estimate=group.estimate)
