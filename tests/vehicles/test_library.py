@@ -24,7 +24,7 @@ def shipped(name: str) -> str:
 def test_the_library_holds_the_cited_sets_and_knows_which_can_fly() -> None:
     assert draft_names() == (
         *("bluerov2", "bluerov2-abir", "bluerov2-gazebo", "bluerov2-heavy", "bluerov2-heavy-gazebo"),
-        *("bluerov2-heavy-wu", "orca", "paper", "paper-six-thrusters", "rexrov"),
+        *("bluerov2-heavy-wu", "orca", "paper", "paper-six-thrusters", "paper-tilting", "rexrov"),
     )
     assert vehicle_names() == [name for name in draft_names() if name != "orca"]
     assert vehicle_names(flyable_only=False) == list(draft_names())
@@ -98,6 +98,20 @@ def test_six_of_the_papers_eight_thrusters_are_the_papers_in_all_else() -> None:
     assert np.array_equal(six.hydrodynamics.added_mass, paper.hydrodynamics.added_mass)
 
 
+def test_a_file_may_stand_on_another_of_the_library() -> None:
+    """What it states takes the place of a whole group; all else is its base's."""
+    tilting, paper = load_vehicle("paper-tilting"), load_vehicle("paper")
+    assert paper.tilt is None
+    assert tilting.tilt is not None
+    assert np.array_equal(tilting.allocation_matrix, paper.allocation_matrix)
+    assert tilting.mass_kg == paper.mass_kg
+    assert tilting.source == paper.source
+    assert tilting.title != paper.title
+    for base, words in (("papper", "allowed bluerov2, "), ("paper-tilting", "has a base itself, name 'paper'")):
+        with pytest.raises(InputError, match=f"base: '{base}'.*{words}"):
+            parse_vehicle(f"base: {base}", "x.yaml", "x")
+
+
 def test_rexrov_keeps_the_couplings_of_its_added_mass() -> None:
     water = load_vehicle("rexrov").hydrodynamics
     assert water.added_mass[1, 3] == water.added_mass[3, 1] == 409.44
@@ -146,6 +160,11 @@ def assert_same(a: VehicleDraft, b: VehicleDraft) -> None:
                 for value in ("max_forward_N", "max_reverse_N", "disk_area_m2", "time_constant_s"):
                     stated = getattr(t, value)
                     assert getattr(s, value) == (None if stated is None else pytest.approx(stated, rel=1e-12))
+        elif field.name == "drag_cases":
+            for s, t in zip(one, two, strict=True):
+                assert (s.name, s.source, s.estimate) == (t.name, t.source, t.estimate)
+                assert np.array_equal(s.linear_damping, t.linear_damping)
+                assert np.array_equal(s.quadratic_damping, t.quadratic_damping)
         elif field.name == "tilt":
             stated = None if two is None else pytest.approx((two.low_rad, two.high_rad, two.rate_rad_s), rel=1e-12)
             assert (None if one is None else (one.low_rad, one.high_rad, one.rate_rad_s)) == stated

@@ -13,7 +13,7 @@ from wakewise.interfaces import BodyState, World
 from wakewise.operation.instant_water import InstantWorld, Jets, free_jet_field, lattice_jets, paper_jets
 from wakewise.plugins import find
 from wakewise.tank import TankWorld
-from wakewise.vehicles import Vehicle, perturbed
+from wakewise.vehicles import Vehicle, perturbed, with_drag
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
@@ -30,7 +30,7 @@ def true_vehicle(parts: Parts) -> Vehicle:
     if trim_N is None:
         trim_N = float(rng.uniform(-apart.trim_range_N, apart.trim_range_N))
     return perturbed(
-        parts.vehicle,
+        with_drag(parts.vehicle, apart.drag, parts.seeds.drag()),
         rng,
         mass_pct=apart.mass_pct,
         damping_pct=apart.damping_pct,

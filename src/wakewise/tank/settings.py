@@ -194,6 +194,12 @@ class MismatchSettings(Settings):
     trim_N: float | None = Field(None, ge=-50.0, le=50.0, description="buoyancy beyond the believed one; null draws it")
     trim_range_N: float = Field(1.0, ge=0.0, le=50.0, description="a drawn trim lies between minus and plus this")
     mass_pct: float = Field(5.0, ge=0.0, le=90.0, description="plant's mass differs by up to this")
+    drag: str = Field(
+        "as-believed",
+        min_length=1,
+        description="plant's drag: as-believed, a case of the vehicle's file by name, or drawn for any of them; "
+        "damping_pct comes on top",
+    )
     damping_pct: float = Field(30.0, ge=0.0, le=90.0, description="plant's drag differs by up to this")
     added_mass_pct: float = Field(20.0, ge=0.0, le=90.0, description="plant's added mass differs by up to this")
     thrust_pct: float = Field(5.0, ge=0.0, le=90.0, description="each thruster's gain differs by up to this")

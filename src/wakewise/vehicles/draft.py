@@ -12,6 +12,7 @@ from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.thrusters.thruster import Thruster, mount, require_limit
 from wakewise.vehicles.hydrodynamics import (
+    DragCase,
     Hydrodynamics,
     require_added_mass,
     require_linear_damping,
@@ -110,6 +111,7 @@ class VehicleDraft:
     X_BC : Pose or None
     tilt : TiltJoint or None
         The camera's joint, if the file states one.
+    drag_cases : tuple of DragCase
     provenance : tuple of Provenance
     notes : tuple of str
         What was detected, inferred or found odd while reading.
@@ -142,6 +144,7 @@ class VehicleDraft:
     shipped_matrix: Array | None = None
     curve: CurveChoice | None = None
     least_thrust: LeastThrust | None = None
+    drag_cases: tuple[DragCase, ...] = ()
     X_BC: Pose | None = None
     tilt: TiltJoint | None = None
     camera_fov_rad: float | None = None
@@ -209,6 +212,7 @@ class VehicleDraft:
             ),
             curve=vehicle.curve,
             least_thrust=vehicle.least_thrust,
+            drag_cases=vehicle.drag_cases,
             X_BC=vehicle.X_BC,
             tilt=vehicle.tilt,
             camera_fov_rad=vehicle.camera_fov_rad,
@@ -340,6 +344,7 @@ class VehicleDraft:
             tilt=self.tilt,
             curve=self.curve,
             least_thrust=self.least_thrust,
+            drag_cases=self.drag_cases,
             camera_fov_rad=self.camera_fov_rad,
             provenance=self.provenance,
         )

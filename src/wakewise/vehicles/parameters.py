@@ -10,6 +10,7 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.vehicles.draft import VehicleDraft
+from wakewise.vehicles.hydrodynamics import DragCase
 from wakewise.vehicles.vehicle import thrust_steps
 
 
@@ -60,6 +61,7 @@ def parameters(draft: VehicleDraft) -> list[Parameter]:
             largest = max(np.abs(matrix[:3, 3:]).max(), np.abs(matrix[3:, :3]).max())
             unit = "kg m" if group == "added_mass" else "N s"
             rows.append(row(group, f"{quantity}: coupling of the two", f"up to {largest:g}", unit))
+    rows += [r for case in draft.drag_cases for r in _drag_case(case)]
     rows += [
         row("thruster_limits", "thrust forward", _alike([t.max_forward_N for t in draft.thrusters]), "N"),
         row("thruster_limits", "thrust in reverse", _alike([t.max_reverse_N for t in draft.thrusters]), "N"),
@@ -89,6 +91,17 @@ def parameters(draft: VehicleDraft) -> list[Parameter]:
         ),
     ]
     return [r for r in rows if r.value is not None or r.quantity != "thrust table"]
+
+
+def _drag_case(case: DragCase) -> list[Parameter]:
+    """What another source has for the drag of translation."""
+
+    def row(quantity: str, matrix: Array, unit: str) -> Parameter:
+        value = _matrix(matrix[:3, :3])
+        what = f"drag case {case.name}, {quantity}: surge, sway, heave"
+        return Parameter(quantity=what, value=value, unit=unit, source=case.source, estimate=case.estimate)
+
+    return [row("linear", case.linear_damping, "N s/m"), row("quadratic", case.quadratic_damping, "N s2/m2")]
 
 
 def _least(draft: VehicleDraft, row: Callable[..., Parameter]) -> list[Parameter]:

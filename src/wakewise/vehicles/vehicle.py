@@ -14,7 +14,7 @@ from wakewise.geometry import Pose
 from wakewise.thrusters.curve_library import library_curve
 from wakewise.thrusters.thrust_steps import ThrustSteps
 from wakewise.thrusters.thruster import Thruster
-from wakewise.vehicles.hydrodynamics import Hydrodynamics
+from wakewise.vehicles.hydrodynamics import DragCase, Hydrodynamics
 from wakewise.vehicles.tilt import TiltJoint
 
 
@@ -73,6 +73,8 @@ class Vehicle:
         Table of thrust against pulse width; its least thrust and its steps of a microsecond are the thrusters'.
     least_thrust : LeastThrust or None
         Least thrusts, where no table says so; neither: thrust is continuous through zero.
+    drag_cases : tuple of DragCase
+        Damping as other sources have it, which the true vehicle may have.
     provenance : tuple of Provenance
         Source of each group of numbers.
 
@@ -100,6 +102,7 @@ class Vehicle:
     camera_fov_rad: float = math.pi / 2
     curve: CurveChoice | None = None
     least_thrust: LeastThrust | None = None
+    drag_cases: tuple[DragCase, ...] = ()
     provenance: tuple[Provenance, ...] = ()
 
     def __post_init__(self) -> None:

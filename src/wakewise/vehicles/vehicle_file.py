@@ -13,6 +13,7 @@ from wakewise.errors import InputError
 from wakewise.geometry import Pose, matrix_from_quat, quat_from_euler
 from wakewise.settings import Settings
 from wakewise.vehicles.draft import ThrusterDraft, VehicleDraft
+from wakewise.vehicles.hydrodynamics import DragCase
 from wakewise.vehicles.tilt import TiltJoint
 from wakewise.vehicles.vehicle import CurveChoice, LeastThrust, Provenance
 
@@ -113,6 +114,25 @@ class Damping(Group):
         """Quadratic damping, shape (6, 6), or None where the file states neither half of it."""
         pair = both("quadratic_N_s2_m2", self.quadratic_N_s2_m2, "quadratic_N_m_s2", self.quadratic_N_m_s2)
         return None if pair is None else np.diag([*np.ravel(pair[0]), *np.ravel(pair[1])])
+
+
+class DragCaseGroup(Damping):
+    """Damping as another source has it; what is left out is none."""
+
+    def case(self, name: str) -> DragCase:
+        """The case as a record."""
+        none = np.zeros((6, 6))
+        try:
+            linear, quadratic = self.linear(), self.quadratic()
+            return DragCase(
+                name=name,
+                source=self.source,
+                estimate=self.estimate,
+                linear_damping=none if linear is None else linear,
+                quadratic_damping=none if quadratic is None else quadratic,
+            )
+        except InputError as error:
+            raise InputError(f"drag_cases.{name}: {error}") from error
 
 
 class ThrusterLimits(Group):
@@ -223,6 +243,7 @@ class VehicleFile(Settings):
     buoyancy: Buoyancy | None = None
     added_mass: AddedMass | None = None
     damping: Damping | None = None
+    drag_cases: dict[str, DragCaseGroup] = Field(default={}, description="other sets of damping, by name")
     thruster_limits: ThrusterLimits | None = None
     thruster_disk: ThrusterDisk | None = None
     thruster_lag: ThrusterLag | None = None
@@ -253,6 +274,7 @@ class VehicleFile(Settings):
             added_mass=None if self.added_mass is None else self.added_mass.matrix(),
             linear_damping=None if damping is None else damping.linear(),
             quadratic_damping=None if damping is None else damping.quadratic(),
+            drag_cases=tuple(group.case(name) for name, group in self.drag_cases.items()),
             thrusters=tuple(self._thrusters()),
             shipped_matrix=None if self.shipped_matrix is None else self.shipped_matrix.matrix(),
             curve=None if curve is None else CurveChoice(table=curve.table, supply_V=curve.supply_V),
