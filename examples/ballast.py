@@ -7,7 +7,7 @@ from wakewise.control.trim import ballasted, net_buoyancy_N, trim_advice
 
 parts = ww.Scenario.preset("quick", vehicle=sys.argv[1] if sys.argv[1:] else "paper", method="dp").parts()
 times = parts.route.exposures_s[:: len(parts.route.exposures_s) // 12]
-poses = tuple(parts.route.body(time, parts.vehicle.X_BC).X_WB for time in times)
+poses = tuple(parts.route.body(time, parts.aim).X_WB for time in times)
 advice = trim_advice(
     parts.vehicle, poses, parts.region, parts.wake, unknown_N=parts.scenario.tank.mismatch.trim_range_N
 )

@@ -44,7 +44,7 @@ class BodyState:
 class Measurement:
     """What the sensors said at one instant. A sensor that was silent is None.
 
-    `X_WB` is a camera-based pose, `p_WB_m` a position from optical tracking, shape (3,), `omega_B_rad_s` the gyro and
+    `tilt_rad` is the angle of the camera's joint; `X_WB` is a camera-based pose, `p_WB_m` a position from optical tracking, shape (3,), `omega_B_rad_s` the gyro and
     `force_B_m_s2` the accelerometer (specific force: -g when at rest), both at the body origin, shape (3,), `depth_m`
     the pressure sensor (positive down).
     """
@@ -55,6 +55,7 @@ class Measurement:
     omega_B_rad_s: Array | None = None
     force_B_m_s2: Array | None = None
     depth_m: float | None = None
+    tilt_rad: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -63,12 +64,13 @@ class Goal:
 
     `nu_B` is the wished twist, expressed in the goal's own body frame, shape (6,). `exposure_in_s` is the time until
     the shutter next opens (infinite if it will not, zero while it is open), so that a controller can keep the water
-    still then.
+    still then. `tilt_rad` is the wished angle of the camera's joint, positive upwards, 0 where the camera is fixed.
     """
 
     X_WB: Pose
     nu_B: Array = field(default_factory=lambda: np.zeros(6))
     exposure_in_s: float = float("inf")
+    tilt_rad: float = 0.0
 
     def __post_init__(self) -> None:
         freeze(self, nu_B=(6,))
@@ -174,7 +176,11 @@ class Estimator(Protocol, Generic[S]):
 
 
 class Plant(Protocol):
-    """The vehicle in its water: simulated tank, autopilot or sea."""
+    """The vehicle in its water: simulated tank, autopilot or sea.
+
+    One whose camera has a joint may have a method `aim(tilt_rad)`, which is called before each step with the wished
+    angle, and hands the angle that it measured over with the step's measurements. Without it the camera is fixed.
+    """
 
     def step(self, thrusts_N: Array, dt_s: float) -> tuple[Measurement, ...]:
         """Hold the commanded thrusts for `dt_s` and return what the sensors said meanwhile, oldest first."""
@@ -221,6 +227,7 @@ class Truth:
     thrusts_N: Array
     power_W: float
     collision: bool
+    tilt_rad: float = 0.0
 
 
 class Witness(Protocol):

@@ -57,7 +57,7 @@ def test_the_body_twist_is_the_derivative_of_the_body_pose() -> None:
 
 def test_the_pilot_announces_the_shutter() -> None:
     """Before an exposure the goal says how long; while the shutter is open it says zero; after the last, never."""
-    pilot = RoutePilot(route=ROUTE, X_BC=X_BC, exposure_s=0.01)
+    pilot = RoutePilot(route=ROUTE, aim=X_BC, exposure_s=0.01)
     anything = BodyState(X_WB=Pose(np.zeros(3)))
     first = float(ROUTE.exposures_s[0])
     assert pilot.goal(first - 0.5, anything).exposure_in_s == pytest.approx(0.5)

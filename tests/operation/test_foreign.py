@@ -145,6 +145,7 @@ def test_memory_that_runs_out_is_blamed_on_no_part():
 def test_our_own_are_flown_as_they_are():
     """No guard round a controller of this package: it has its own."""
     own = PARTS.replace(method="dp")
-    assert own.flying is own.controller
-    assert isinstance(PARTS.replace(controller=Foreign(nan)).flying, Guarded)
+    assert own.flying.inner is own.controller
+    assert own.replace(vehicle=own.vehicle.with_ideal_thrusters()).flying.name == own.controller.name
+    assert isinstance(PARTS.replace(controller=Foreign(nan)).flying.inner, Guarded)
     assert described(Foreign(nan)) == "theirs (test_foreign.Foreign)"

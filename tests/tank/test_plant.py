@@ -13,7 +13,8 @@ from wakewise.thrusters import saturate, thruster_lag
 from wakewise.vehicles import compile_body, load_vehicle, perturbed, step_rk4
 from wakewise.water.currents import AmbientSum, SteadyCurrent
 
-VEHICLE = load_vehicle("paper")
+REAL = load_vehicle("paper")
+VEHICLE = REAL.with_ideal_thrusters()
 SIZE_M = (6.0, 5.0, 1.5)
 ROCK = np.array([[0.0, 0.0, 1.4], [0.0, 0.1, 1.5], [0.1, 0.0, 1.5]])
 
@@ -194,3 +195,34 @@ def test_bad_starts_are_refused(p, what):
     """Starting in the floor, a wall, the target or the air is bad input, named in the message."""
     with pytest.raises(InputError, match=what):
         _plant(p=p)
+
+
+@pytest.mark.parametrize("command", [0.39, 0.1, -0.35, -0.01])
+def test_a_command_below_the_least_thrust_turns_no_propeller(command: float) -> None:
+    """The T200 gives nothing below 0.40 N forward and 0.36 N in reverse."""
+    plant = _plant(vehicle=REAL)
+    for _ in range(100):
+        plant.step(np.full(8, command), 0.02)
+    assert not plant.thrusts_N.any()
+    assert not plant.take_impulse_N_s().any()
+
+
+def test_a_command_above_the_least_thrust_gives_the_nearest_pulse() -> None:
+    """Whole microseconds: 1.00 N lies between 1541 and 1542 us."""
+    plant = _plant(vehicle=REAL)
+    for _ in range(200):
+        plant.step(np.full(8, 1.0), 0.02)
+    expected = REAL.thrust_steps.delivered_N(1.0)
+    assert plant.thrusts_N == pytest.approx(np.full(8, expected), rel=1e-6)
+    assert 0.0 < abs(float(expected) - 1.0) < 0.031
+
+
+def test_both_ways_of_stepping_know_the_least_thrust() -> None:
+    """Many steps at once and one after the other give the same thrusts from one command to the next."""
+    whole, single = _plant(vehicle=REAL), _plant(vehicle=REAL)
+    for k, command in enumerate((0.3, 0.45, -0.2, 0.9)):
+        whole.advance(np.full(8, command), 0.1 * (k + 1))
+        for _ in range(20):
+            single.step(np.full(8, command), 0.005)
+        assert whole.thrusts_N == pytest.approx(single.thrusts_N, abs=1e-12)
+    assert whole.thrusts_N.max() > 0.1

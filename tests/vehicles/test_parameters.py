@@ -43,4 +43,4 @@ def test_thrusters_that_differ_are_listed_in_turn() -> None:
 
 def test_a_thrust_table_is_shown_where_there_is_one() -> None:
     assert row(parameters(load_draft("bluerov2-heavy")), "thrust table").value == "t200 at 16 V"
-    assert not any(r.quantity == "thrust table" for r in parameters(load_draft("paper")))
+    assert not any(r.quantity == "thrust table" for r in parameters(load_draft("rexrov")))

@@ -35,7 +35,7 @@ def trim(vehicle: Vehicle = "paper", scenario: ScenarioFile = None, json: Json =
     _ = parts.preflight
     route, body = parts.route, parts.vehicle
     times = route.exposures_s[:: max(1, len(route.exposures_s) // 24)]
-    poses = tuple(route.body(float(t), body.X_BC).X_WB for t in times)
+    poses = tuple(route.body(float(t), parts.aim).X_WB for t in times)
     wake = wake_model(chosen.control.wake.model_copy(update={"floor": True}), chosen.tank.size_m[2])
     settings = chosen.control.model_copy(update={"levers": LeverSettings(bed=True)})
     apart = chosen.tank.mismatch

@@ -7,13 +7,14 @@ Start reading in `methods.py` (which methods there are; `dynamic_positioning.py`
 are the rivals), `wake_aware.py` (the product: model predictive control and the exact allocator behind it) and
 `instant.py` (the tracker and the gentlest thrusts of an instant). `tracker.py` and `stability.py` are the PID and its
 margins, `loop.py` flies it with any allocation, `receding.py` flies a plan, `levers.py` adds the water that counts,
-`spare.py` shares a plan's wrench out anew, `intent.py` turns an operator's stick into goals, `trim.py` advises
+`spare.py` shares a plan's wrench out anew, `pulses.py` sends thrusts that no thruster can hold as pulses, `intent.py` turns an operator's stick into goals, `trim.py` advises
 ballast.
 """
 
 from wakewise.control.levers import LeverSettings
 from wakewise.control.loop import vehicle_layout
 from wakewise.control.methods import MAKERS, METHODS, ControlTask, make_controller
+from wakewise.control.pulses import in_pulses
 from wakewise.control.receding import PlanningController, planning_controller
 from wakewise.control.settings import ControlSettings
 from wakewise.control.stability import Gains, vehicle_axes, wished_gains
@@ -27,6 +28,7 @@ __all__ = [
     "Gains",
     "LeverSettings",
     "PlanningController",
+    "in_pulses",
     "make_controller",
     "make_tracker",
     "planning_controller",

@@ -58,6 +58,13 @@ class ControlSettings(Settings):
         max_length=20,
         description="spheres that plans keep clear of besides tank and target: x, y, z in the world (NED), radius (m)",
     )
+    pulse_s: float | None = Field(
+        default=None,
+        ge=0.0,
+        le=5.0,
+        description="shortest pulse and pause of a thruster that is asked for less than its least thrust (s), "
+        "null for its own lag",
+    )
     plan: PlanSettings = Field(default=PlanSettings(), description="horizon and weights of the methods that plan")
     levers: LeverSettings = Field(
         default=LeverSettings(), description="what `wake-aware` and `instant` use beyond the free jet"

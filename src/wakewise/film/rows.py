@@ -8,6 +8,7 @@ the silt is interpolated in time.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -126,14 +127,14 @@ def cells_of(folder: Path, times_s: Sequence[float]) -> list[Cell]:
     X_WO = vantage(far, parts.target.centre_W_m, flown, 0.5 * float(np.linalg.norm(parts.vehicle.size_m)))
     outside = Outside.build(scene, far, X_WO, hull_of(parts.vehicle), scenario.imaging.lights(), grains)
     speed, turbidity = trial.column("target_speed_mean_m_s"), trial.column("turbidity_per_m")
+    tilt_deg = trial.column("true_tilt_deg")  # none in trials that were flown before cameras had a joint
     out = []
     for k, time_s in enumerate(instants):
         row = motion.row(float(time_s))
         X_WB, silt = Pose(motion.p_W_m[row], motion.q_WB[row]), silt_at(exposures, float(time_s))
         rng = np.random.default_rng([scenario.seed, k])
-        photo = photograph(
-            scene, scenario.imaging.camera(), [X_WB @ parts.vehicle.X_BC], silt, scenario.imaging, rng, grains
-        )
+        X_WC = X_WB @ parts.vehicle.X_BC_at(0.0 if tilt_deg is None else math.radians(float(tilt_deg[row])))
+        photo = photograph(scene, scenario.imaging.camera(), [X_WC], silt, scenario.imaging, rng, grains)
         facts = [] if photo.sharpness is None else [f"sharpness {number(photo.sharpness)}"]
         facts += [] if turbidity is None else [f"silt {number(float(turbidity[row]), 2)} /m"]
         facts += [] if speed is None else [f"water {1e3 * float(speed[row]):.1f} mm/s"]

@@ -1,23 +1,28 @@
 """What to look at, from where, in what order and when: viewpoints, layered orbits, timed routes.
 
 Start reading in `route.py` (legs, shutter, the pilot that follows them) and `orbit.py` (viewpoints on layered
-hemispheres); `clearance.py` refuses what would touch, `settings.py` is what a user may say.
+hemispheres); `aim.py` is what points the camera there (pitch, tilt joint or both), `clearance.py` refuses what would
+touch and tilts that the joint cannot follow, `settings.py` is what a user may say.
 """
 
-from wakewise.missions.clearance import TankBounds, check_clearance
+from wakewise.missions.aim import CameraAim, aim_of
+from wakewise.missions.clearance import TankBounds, check_clearance, check_tilt
 from wakewise.missions.orbit import Orbit, layered_orbits
 from wakewise.missions.route import SETTLING, Leg, Route, RoutePilot, open_route, plan_route
 from wakewise.missions.settings import MissionSettings
 
 __all__ = [
     "SETTLING",
+    "CameraAim",
     "Leg",
     "MissionSettings",
     "Orbit",
     "Route",
     "RoutePilot",
     "TankBounds",
+    "aim_of",
     "check_clearance",
+    "check_tilt",
     "layered_orbits",
     "open_route",
     "plan_route",

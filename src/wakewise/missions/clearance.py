@@ -1,7 +1,8 @@
-"""Whether the vehicle can fly a route without touching floor, walls, surface or target."""
+"""Whether the vehicle can fly a route without touching floor, walls, surface or target, and its camera can follow."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import product
 
@@ -10,6 +11,7 @@ import numpy as np
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
+from wakewise.missions.aim import CameraAim
 from wakewise.missions.route import Route
 
 
@@ -36,15 +38,15 @@ def box_distance(points_B_m: Array, size_m: Array) -> Array:
 
 
 def check_clearance(
-    route: Route, X_BC: Pose, size_m: Array, bounds: TankBounds, target_W_m: Array, clearance_m: float
+    route: Route, aim: CameraAim | Pose, size_m: Array, bounds: TankBounds, target_W_m: Array, clearance_m: float
 ) -> float:
     """Least clearance of the hull along the route, in metres.
 
     Parameters
     ----------
     route : Route
-    X_BC : Pose
-        Camera mount.
+    aim : CameraAim or Pose
+        What the camera is aimed with, or its fixed mount.
     size_m : ndarray, shape (3,)
         Length, width and height of the hull.
     bounds : TankBounds
@@ -62,7 +64,7 @@ def check_clearance(
     near = target_W_m[:: max(1, len(target_W_m) // 4000)]
     least = np.inf
     for time_s in np.arange(route.starts_s[0], route.duration_s, 0.25):
-        X_WB = route.body(float(time_s), X_BC).X_WB
+        X_WB = route.body(float(time_s), aim).X_WB
         hull_W = X_WB.apply(corners)
         gaps = {
             "the floor": bounds.high_W_m[2] - hull_W[:, 2].max(),
@@ -87,3 +89,38 @@ def check_clearance(
             )
         least = min(least, gap)
     return float(least)
+
+
+def check_tilt(route: Route, aim: CameraAim, *, stops_suffice: bool = False) -> None:
+    """Refuse a route that the camera's joint cannot follow; `stops_suffice` asks it to be aimed by tilt alone.
+
+    Raises
+    ------
+    InputError
+        Naming the field of the mission to change, the leg, the tilt or its rate, and what the joint can do.
+    """
+    joint = aim.joint
+    if joint is None:
+        return
+    low, high = math.degrees(joint.low_rad), math.degrees(joint.high_rad)
+    for time_s in np.arange(route.starts_s[0], route.duration_s, 0.25):
+        leg, elevation, rate = _view(route, float(time_s))
+        level = math.degrees(aim.level_tilt(-elevation))
+        if stops_suffice and not low - 1e-6 <= level <= high + 1e-6:
+            raise InputError(
+                f"mission.aim: tilt, on leg '{leg}' the camera would have to tilt to {level:.0f} deg, its stops are at "
+                f"{low:g} and {high:g} deg: take both, which pitches the vehicle for the rest, or other elevations_deg"
+            )
+        if low <= level <= high and rate > joint.rate_rad_s:
+            raise InputError(
+                f"mission.speed_m_s: on leg '{leg}' the camera would have to tilt at {math.degrees(rate):.0f} deg/s, "
+                f"its joint turns at {math.degrees(joint.rate_rad_s):g} deg/s: fly slower, or set mission.aim to pitch"
+            )
+
+
+def _view(route: Route, time_s: float) -> tuple[str, float, float]:
+    """Leg under way, elevation of the camera, and how fast that changes (a magnitude)."""
+    leg = route.legs[i := route.leg_at(time_s)]
+    fraction, rate = leg.progress(time_s - float(route.starts_s[i]))
+    elevation = float((1 - fraction) * leg.start[1] + fraction * leg.end[1])
+    return leg.name, elevation, abs(rate * float(leg.end[1] - leg.start[1]))

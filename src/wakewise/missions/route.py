@@ -10,6 +10,7 @@ from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Goal
+from wakewise.missions.aim import CameraAim
 from wakewise.missions.orbit import Orbit, camera_pose, camera_twist, layered_orbits
 from wakewise.missions.settings import MissionSettings
 
@@ -113,20 +114,36 @@ class Route:
 
     def camera(self, time_s: float) -> tuple[Pose, Array, Array]:
         """Wished camera pose X_WC, its velocity and its angular velocity in W (shape (3,) each)."""
-        leg = self.legs[i := self.leg_at(time_s)]
-        fraction, rate = leg.progress(time_s - float(self.starts_s[i]))
-        az, el, rng = (1 - fraction) * leg.start + fraction * leg.end
-        az_rate, el_rate, rng_rate = rate * (leg.end - leg.start)
-        v_W, omega_W = camera_twist(az, el, rng, az_rate, el_rate, rng_rate)
-        return camera_pose(self.centre_W_m, az, el, rng), v_W, omega_W
+        place, rate = self._on_sphere(time_s)
+        v_W, omega_W = camera_twist(*place, *rate)
+        return camera_pose(self.centre_W_m, *place), v_W, omega_W
 
-    def body(self, time_s: float, X_BC: Pose) -> BodyState:
-        """Wished pose and twist of a body that carries the camera at X_BC."""
+    def tilt(self, time_s: float, aim: CameraAim | Pose) -> tuple[float, float]:
+        """Wished angle of the camera's joint and its rate; zeros where it is not aimed with."""
+        if isinstance(aim, Pose):
+            return 0.0, 0.0
+        (_, elevation, _), (_, elevation_rate, _) = self._on_sphere(time_s)
+        return aim.tilt(-float(elevation), -float(elevation_rate))
+
+    def body(self, time_s: float, aim: CameraAim | Pose) -> BodyState:
+        """Wished pose and twist of a body that aims its camera so, or carries it at a fixed mount X_BC."""
+        if isinstance(aim, Pose):
+            aim = CameraAim(X_BC=aim)
         X_WC, v_WC, omega_W = self.camera(time_s)
+        tilt, tilt_rate = self.tilt(time_s, aim)
+        X_BC = aim.mount(tilt)
         X_WB = X_WC @ X_BC.inverse()
         R_BW = X_WB.R.T
-        omega_B = R_BW @ omega_W
-        return BodyState(X_WB=X_WB, nu_B=np.concatenate([R_BW @ v_WC - np.cross(omega_B, X_BC.p_m), omega_B]))
+        v_BC, omega_BC = aim.carried(tilt, tilt_rate)
+        omega_B = R_BW @ omega_W - omega_BC
+        v_B = R_BW @ v_WC - v_BC - np.cross(omega_B, X_BC.p_m)
+        return BodyState(X_WB=X_WB, nu_B=np.concatenate([v_B, omega_B]))
+
+    def _on_sphere(self, time_s: float) -> tuple[Array, Array]:
+        """Azimuth, elevation and range of the camera, and their rates, shape (3,) each."""
+        leg = self.legs[i := self.leg_at(time_s)]
+        fraction, rate = leg.progress(time_s - float(self.starts_s[i]))
+        return (1 - fraction) * leg.start + fraction * leg.end, rate * (leg.end - leg.start)
 
 
 def plan_route(centre_W_m: Array, settings: MissionSettings) -> Route:
@@ -210,12 +227,12 @@ class RoutePilot:
     """A `Pilot` that follows a route by the clock and announces the shutter."""
 
     route: Route
-    X_BC: Pose
+    aim: CameraAim | Pose
     exposure_s: float
 
     def goal(self, time_s: float, estimate: BodyState) -> Goal:  # noqa: ARG002  (a clock needs no estimate)
         """Wished body pose and twist now, and how long until the shutter opens."""
-        wished = self.route.body(time_s, self.X_BC)
+        wished, (tilt, _) = self.route.body(time_s, self.aim), self.route.tilt(time_s, self.aim)
         k = int(np.searchsorted(self.route.exposures_s + self.exposure_s, time_s))
         wait_s = float("inf") if k == len(self.route.exposures_s) else float(self.route.exposures_s[k]) - time_s
-        return Goal(X_WB=wished.X_WB, nu_B=wished.nu_B, exposure_in_s=max(wait_s, 0.0))
+        return Goal(X_WB=wished.X_WB, nu_B=wished.nu_B, exposure_in_s=max(wait_s, 0.0), tilt_rad=tilt)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -20,6 +20,11 @@ class MissionSettings(Settings):
     )
     views: tuple[Views, ...] = Field(
         (20, 16, 12), min_length=1, max_length=8, description="photographs on each orbit, evenly spread"
+    )
+    aim: Literal["auto", "pitch", "tilt", "both"] = Field(
+        "auto",
+        description="what aims the camera: the vehicle's pitch, the camera's tilt joint, or the joint to its stops and "
+        "pitch for the rest; auto is both where there is a joint, else pitch",
     )
     standoff_m: float = Field(0.5, gt=0.0, le=3.0, description="distance of the camera from the target's centre")
     speed_m_s: float = Field(0.10, ge=1e-3, le=0.5, description="speed of the camera along its path")

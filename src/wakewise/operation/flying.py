@@ -144,6 +144,7 @@ def fly(
     recorder = FlightRecorder(
         route=route,
         X_BC=vehicle.X_BC,
+        joint=vehicle.tilt,
         exposure_s=scenario.imaging.exposure_s,
         instants=scenario.imaging.instants,
         thrusters=thrusters,
@@ -170,6 +171,7 @@ def fly(
             duration_s=route.duration_s if duration_s is None else duration_s,
             dt_s=dt_s,
             record=record,
+            tilt_rad=parts.start_tilt_rad,
             progress=progress,
         )
     except (WakewiseError, MemoryError):  # for memory that ran out no part is to blame

@@ -24,6 +24,7 @@ from wakewise.arrays import Array
 from wakewise.interfaces import BodyState, Measurement, Plant, ScalarGrid, Truth, WakeModel, WaterTruth, Witness
 from wakewise.lattice import LatticeFlow, MeanField, load_mean_field
 from wakewise.tank import Sensors, TankSettings, VehiclePlant, build_ambient
+from wakewise.tank.camera_joint import CameraJoint
 from wakewise.tank.probes import surface_points
 from wakewise.tank.settings import PLANT_STEP_S
 from wakewise.targets import Target
@@ -83,6 +84,8 @@ class InstantWater:
     start : BodyState
     rng : numpy Generator
         Its children serve sensors, probes and ambient water.
+    tilt_rad : float
+        Where the joint of the camera, if it has one, stands at the start.
     """
 
     def __init__(
@@ -93,6 +96,7 @@ class InstantWater:
         settings: TankSettings,
         start: BodyState,
         rng: np.random.Generator,
+        tilt_rad: float = 0.0,
     ) -> None:
         sensor_rng, probe_rng, current_rng = rng.spawn(3)
         self.settings = settings
@@ -105,6 +109,7 @@ class InstantWater:
             target_W_m=target.mesh.vertices_m,
         )
         self._sensors = Sensors(settings.sensors, sensor_rng)
+        self._joint = CameraJoint(vehicle.tilt, tilt_rad, settings.sensors, sensor_rng.spawn(1)[0])
         self._jets = jets
         self._surface_W_m = surface_points(target, _PROBES, probe_rng)
         self._time = 0.0
@@ -123,7 +128,11 @@ class InstantWater:
             self._time = max(stop, self._time)
             if self._sensors.next_due_s() - self._time < _TOLERANCE_S:
                 self._sensors.sample(self._time, self._plant.vector, self._plant.force_B_m_s2)
-        return self._sensors.collect(self._time)
+        return self._sensors.collect(self._time) + self._joint.turn(self._time, dt_s)
+
+    def aim(self, tilt_rad: float) -> None:
+        """Wish an angle of the camera's joint; a fixed camera does not mind."""
+        self._joint.aim(tilt_rad)
 
     def speeds_m_s(self, points_W_m: Array) -> Array:
         """Speed of the jets' water, shape (n,), at points, shape (n, 3)."""
@@ -137,7 +146,13 @@ class InstantWater:
         power = electrical_power_W(
             thrusts, plant.vehicle.disk_areas_m2, water_density_kg_m3=self.settings.density_kg_m3
         )
-        return Truth(state=plant.state, thrusts_N=thrusts, power_W=float(power.sum()), collision=bool(plant.contact))
+        return Truth(
+            state=plant.state,
+            thrusts_N=thrusts,
+            power_W=float(power.sum()),
+            collision=bool(plant.contact),
+            tilt_rad=self._joint.tilt_rad,
+        )
 
     def water(self) -> WaterTruth:
         """Water at the target's surface now."""
@@ -168,10 +183,13 @@ class InstantWorld:
     settings: TankSettings
     start: BodyState
     draw: Callable[[], np.random.Generator]
+    tilt_rad: float = 0.0
 
     def begin(self) -> tuple[Plant, Witness | None]:
         """A fresh world at its start, which is plant and witness in one."""
-        water = InstantWater(self.jets, self.vehicle, self.target, self.settings, self.start, self.draw())
+        water = InstantWater(
+            self.jets, self.vehicle, self.target, self.settings, self.start, self.draw(), self.tilt_rad
+        )
         return water, water
 
 

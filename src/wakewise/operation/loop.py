@@ -33,6 +33,8 @@ class Step:
     command: Command
     truth: Truth | None
     solve_s: float
+    tilt_rad: float = 0.0
+    """Angle of the camera's joint as it was last measured."""
 
 
 Recorder = Callable[[Step], None]
@@ -50,15 +52,17 @@ def run_loop(
     duration_s: float,
     dt_s: float,
     record: Recorder,
+    tilt_rad: float = 0.0,
     progress: Callable[..., None] = no_progress,
 ) -> None:
     """Run the loop for `duration_s` at a fixed step.
 
     At each step the estimate of now, which is all a controller may know, meets the goal of now; the resulting thrusts
-    are held for `dt_s`. `start` is the first guess of the estimator. Solve times are thread CPU.
+    are held for `dt_s`. `start` is the first guess of the estimator, `tilt_rad` the camera's tilt before it is measured.
+    Solve times are thread CPU.
     """
     control_state, filter_state = controller.init(), estimator.init(start)
-    estimate, thrusts = start, np.zeros(thrusters)
+    estimate, thrusts, aim = start, np.zeros(thrusters), getattr(plant, "aim", None)
     steps = round(duration_s / dt_s)
     for k in range(steps):
         now_s = k * dt_s
@@ -67,9 +71,23 @@ def run_loop(
         control_state, command = controller.step(control_state, dt_s, estimate, goal)
         solve_s = time.thread_time() - began
         truth = witness.observe() if witness is not None else None
-        record(Step(time_s=now_s, goal=goal, estimate=estimate, command=command, truth=truth, solve_s=solve_s))
+        record(
+            Step(
+                time_s=now_s,
+                goal=goal,
+                estimate=estimate,
+                command=command,
+                truth=truth,
+                solve_s=solve_s,
+                tilt_rad=tilt_rad,
+            )
+        )
         thrusts = command.thrusts_N
+        if aim is not None:
+            aim(goal.tilt_rad)
         measurements = plant.step(thrusts, dt_s)
+        for measured in measurements:
+            tilt_rad = tilt_rad if measured.tilt_rad is None else measured.tilt_rad
         filter_state, estimate = estimator.step(filter_state, dt_s, measurements, thrusts)
         if k % 25 == 0:
             progress(k, steps, f"{now_s:.0f} of {duration_s:.0f} s flown")

@@ -11,13 +11,13 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from wakewise.control import ControlSettings, make_controller
+from wakewise.control import ControlSettings, in_pulses, make_controller
 from wakewise.control.settings import told
 from wakewise.errors import InputError
 from wakewise.estimation import ErrorStateFilter
 from wakewise.importers import any_vehicle
 from wakewise.interfaces import BodyState, Controller, Estimator, Pilot, WakeModel, World
-from wakewise.missions import Route, TankBounds, plan_route
+from wakewise.missions import CameraAim, Route, TankBounds, aim_of, plan_route
 from wakewise.operation.foreign import described, from_outside, guarded
 from wakewise.operation.pilots import make_pilot
 from wakewise.operation.preflight import Preflight, preflight
@@ -129,7 +129,8 @@ class Parts:
     @part
     def vehicle(self) -> Vehicle:
         """The vehicle as it is believed to be."""
-        return any_vehicle(self.scenario.vehicle)
+        vehicle = any_vehicle(self.scenario.vehicle)
+        return vehicle.with_ideal_thrusters() if self.scenario.tank.ideal_thrusters else vehicle
 
     @part
     def target(self) -> Target:
@@ -195,7 +196,17 @@ class Parts:
     @part
     def start(self) -> BodyState:
         """Where the mission begins, which is all that the estimator is told."""
-        return self.route.body(0.0, self.vehicle.X_BC)
+        return self.route.body(0.0, self.aim)
+
+    @cached_property
+    def aim(self) -> CameraAim:
+        """What the camera is aimed with; raises InputError where the mission asks for a joint that is not there."""
+        return aim_of(self.vehicle, self.scenario.mission.aim)
+
+    @property
+    def start_tilt_rad(self) -> float:
+        """Angle of the camera's joint when the mission begins."""
+        return self.route.tilt(0.0, self.aim)[0]
 
     @cached_property
     def preflight(self) -> Preflight:
@@ -204,8 +215,8 @@ class Parts:
 
     @cached_property
     def flying(self) -> Controller[Any]:
-        """The controller as it is flown: one from outside has a guard round it."""
-        return guarded(self)
+        """The controller as it is flown: one from outside has a guard round it, small thrusts are sent as pulses."""
+        return in_pulses(guarded(self), self.vehicle, self.control.pulse_s)
 
     @cached_property
     def camera(self) -> PinholeCamera | LensCamera:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wakewise.errors import InputError
-from wakewise.missions import check_clearance
+from wakewise.missions import check_clearance, check_tilt
 from wakewise.operation.surroundings import surroundings_of
 from wakewise.planning import check_start, state_of
 from wakewise.tank import Holding, holding, tank_ambient
@@ -32,13 +32,14 @@ def preflight(parts: Parts) -> Preflight:
     Raises
     ------
     InputError
-        An orbit that would touch something, a start from which no plan can be good, a current faster than the vehicle
+        A tilt beyond the camera's stops or faster than its joint, an orbit that would touch something, a start from which no plan can be good, a current faster than the vehicle
         can hold, failures or a cable that do not fit; what and where is named.
     """
     scenario, vehicle, route = parts.scenario, parts.vehicle, parts.route
+    check_tilt(route, parts.aim, stops_suffice=scenario.mission.aim == "tilt")
     clearance_m = check_clearance(
         route,
-        vehicle.X_BC,
+        parts.aim,
         vehicle.size_m,
         parts.bounds,
         parts.target.mesh.vertices_m,
@@ -46,7 +47,7 @@ def preflight(parts: Parts) -> Preflight:
     )
     check_way(parts)
     times_s = np.linspace(0.0, route.duration_s, 400)
-    check_fit(scenario.tank, vehicle, [(float(t), route.body(float(t), vehicle.X_BC).X_WB) for t in times_s])
+    check_fit(scenario.tank, vehicle, [(float(t), route.body(float(t), parts.aim).X_WB) for t in times_s])
     return Preflight(clearance_m=clearance_m, holding=check_current(parts))
 
 
@@ -64,7 +65,7 @@ def check_way(parts: Parts) -> None:
     around = surroundings_of(parts.scenario)
     if parts.scenario.control.obstacles:
         for time_s in np.arange(0.0, parts.route.duration_s, 0.25):
-            state = state_of(parts.route.body(float(time_s), parts.vehicle.X_BC))
+            state = state_of(parts.route.body(float(time_s), parts.aim))
             check_start(parts.vehicle, parts.region, state, around, what=f"mission at {time_s:.0f} s")
 
 
@@ -95,7 +96,7 @@ def check_current(parts: Parts, looks: int = 200) -> Holding | None:
         )
     passing = []
     for time_s in np.linspace(0.0, route.duration_s, looks):
-        wished = route.body(float(time_s), vehicle.X_BC)
+        wished = route.body(float(time_s), parts.aim)
         current = ambient.velocity(wished.X_WB.p_m[None], float(time_s))[0]
         passing.append(current @ wished.X_WB.R - wished.nu_B[:3])
     apart = tank.mismatch

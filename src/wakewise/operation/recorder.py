@@ -20,6 +20,7 @@ from wakewise.geometry import Pose, quat_integrate
 from wakewise.interfaces import BodyState, ScalarGrid, WaterTruth, Witness
 from wakewise.missions import Route
 from wakewise.operation.loop import Step
+from wakewise.vehicles.tilt import TiltJoint
 
 _STATE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "u_m_s", "v_m_s", "w_m_s", "p_rad_s", "q_rad_s", "r_rad_s")
 _WRENCH = ("wrench_X_N", "wrench_Y_N", "wrench_Z_N", "wrench_K_Nm", "wrench_M_Nm", "wrench_N_Nm")
@@ -37,6 +38,7 @@ def step_columns(thrusters: int) -> list[str]:
         "disturbance",
         *_WATER,
         "power_W",
+        *(f"{who}_tilt_deg" for who in ("true", "est", "goal")),
     ]
 
 
@@ -60,6 +62,8 @@ class FlightRecorder:
         Gives the exposures and the names of the legs.
     X_BC : Pose
         Camera mount.
+    joint : TiltJoint or None
+        What tilts the camera; true poses go with its true angle, estimated ones with the measured angle.
     exposure_s : float
         How long the shutter stays open.
     instants : int
@@ -82,6 +86,7 @@ class FlightRecorder:
     witness: Witness | None
     water_every_s: float = 0.1
     exposed: Callable[[int, ExposureRecord], None] | None = None
+    joint: TiltJoint | None = None
     exposures: list[ExposureRecord] = field(default_factory=list)
     _rows: list[Array] = field(default_factory=list)
     _legs: list[str] = field(default_factory=list)
@@ -113,6 +118,7 @@ class FlightRecorder:
             step.command.wrench_B,
             np.array([np.nan if step.command.disturbance is None else step.command.disturbance, *water]),
             np.array([truth.power_W if truth else np.nan]),
+            np.degrees([truth.tilt_rad if truth else np.nan, step.tilt_rad, step.goal.tilt_rad]),
         ]
         self._rows.append(np.concatenate(row))
         self._legs.append(self.route.leg_name(step.time_s))
@@ -126,15 +132,19 @@ class FlightRecorder:
                 ExposureRecord(
                     time_s=float(opens_s[k]),
                     X_WC_true=tuple(
-                        _moved(truth.state, float(opens_s[k]) - step.time_s + after_s) @ self.X_BC
+                        _moved(truth.state, float(opens_s[k]) - step.time_s + after_s) @ self._mount(truth.tilt_rad)
                         for after_s in np.linspace(0.0, self.exposure_s, self.instants)
                     ),
-                    X_WC_est=_moved(step.estimate, float(opens_s[k]) - step.time_s + 0.5 * self.exposure_s) @ self.X_BC,
+                    X_WC_est=_moved(step.estimate, float(opens_s[k]) - step.time_s + 0.5 * self.exposure_s)
+                    @ self._mount(step.tilt_rad),
                     silt=self.witness.silt(),
                 )
             )
             if self.exposed is not None:
                 self.exposed(len(self.exposures) - 1, self.exposures[-1])
+
+    def _mount(self, tilt_rad: float) -> Pose:
+        return self.X_BC if self.joint is None else self.joint.mount(self.X_BC, tilt_rad)
 
     @property
     def duration_s(self) -> float:

@@ -36,5 +36,9 @@ class Seeds:
         """Noise of the photographs."""
         return self._child(4)
 
+    def drag(self) -> np.random.Generator:
+        """Which of its cases the true vehicle's drag is."""
+        return np.random.default_rng([self.seed, 12])
+
     def _child(self, k: int) -> np.random.Generator:
         return np.random.default_rng(self.seed).spawn(5)[k]

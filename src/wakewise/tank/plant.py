@@ -34,6 +34,9 @@ class VehiclePlant:
     that its own jets set in motion acts on it only through `inflow_W_m_s`, if that is given. Floor, walls and target
     stop it; see `Surroundings`.
 
+    Thrusters do what their speed controllers can: a command below the least thrust turns no propeller, one above it is
+    that of the nearest pulse (`Vehicle.thrust_steps`).
+
     Parameters
     ----------
     vehicle : Vehicle
@@ -89,6 +92,8 @@ class VehiclePlant:
         self._arms_B, self._axes_B = np.array(vehicle.thruster_positions_B_m), np.array(vehicle.thruster_axes_B)
         self._force_B_m_s2 = -_GRAVITY_W_M_S2 @ start.X_WB.R
         self._still = ambient.steady and ambient.uniform
+        self._steps = vehicle.thrust_steps
+        self._asked_N, self._turned_N = np.full(n, np.nan), np.zeros(n)
         self._calm = self._still and tether is None and not failures  # so that nothing is asked of between two events
         # Velocity in the world before the last step, that step, and 1 if the hull was surely clear of everything then.
         self._last = np.zeros(5)
@@ -136,7 +141,7 @@ class VehiclePlant:
 
     def advance(self, commands_N: Array, until_s: float, inflow_W_m_s: Array | None = None) -> str:
         """Move on to a time in steps of at most 5 ms; what the hull was stopped by on the way. Arguments as `step`."""
-        commands, touched = np.asarray(commands_N, dtype=np.float64), ""
+        commands, touched = self._steps_of(np.asarray(commands_N, dtype=np.float64)), ""
         while until_s - self._time > _TIME_TOLERANCE_S:
             if self._calm and inflow_W_m_s is None:
                 self._glide(commands, until_s)
@@ -189,12 +194,13 @@ class VehiclePlant:
         Parameters
         ----------
         commands_N : ndarray, shape (n,)
-            Clipped to the limits.
+            Clipped to the limits, and to what the thrusters can hold.
         dt_s : float
         inflow_W_m_s : ndarray, shape (n, 3), or None
             Velocity of the water at the disks without each thruster's own jet; None leaves inflow losses out.
         """
-        wanted = self._failing.wanted(self._time, np.asarray(commands_N, dtype=np.float64), self._motors_N)
+        given = self._steps_of(np.asarray(commands_N, dtype=np.float64))
+        wanted = self._failing.wanted(self._time, given, self._motors_N)
         if inflow_W_m_s is not None:
             motors = thruster_lag(self._motors_N, saturate(wanted, self._lower_N, self._upper_N), self._lags_s, dt_s)
             self._factors = self._inflow_factors(self._gains * 0.5 * (self._motors_N + motors), inflow_W_m_s)
@@ -238,6 +244,14 @@ class VehiclePlant:
         if clear(self._surroundings.packed, self._state, self._R):
             return ""
         return self._surroundings.touches(self._state[:3], self._R)
+
+    def _steps_of(self, commands_N: Array) -> Array:
+        """What the speed controllers make of commands, shape (n,); looked up once for each new command."""
+        if self._steps is None:
+            return commands_N
+        if not np.array_equal(commands_N, self._asked_N):
+            self._asked_N, self._turned_N = commands_N.copy(), self._steps.delivered_N(commands_N)
+        return self._turned_N
 
     def _push_of_water(self, dt_s: float) -> Array:
         """Wrench of water that speeds up at a fixed place: its pressure gradient and the added mass."""

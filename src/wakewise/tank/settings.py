@@ -144,7 +144,8 @@ class TetherSettings(Settings):
 class SensorSettings(Settings):
     """What the vehicle senses.
 
-    Figures are typical of small vehicles' parts and of a camera-based pose at one metre, not of one product.
+    Figures are typical of small vehicles' parts and of a camera-based pose at one metre, not of one product. Those of
+    the tilt are estimates: a servo's dead band of 1 to 2 us is 0.1 to 0.2 deg, its mount is aligned to some tenths.
     """
 
     pose_rate_hz: float = Field(62.0, gt=0.0, le=500.0, description="rate of the camera-based pose")
@@ -173,6 +174,11 @@ class SensorSettings(Settings):
     depth_rate_hz: float = Field(20.0, gt=0.0, le=500.0, description="rate of the pressure sensor")
     depth_noise_m: float = Field(0.005, ge=0.0, le=1.0, description="its noise, one sigma")
 
+    tilt_bias_rad: float = Field(
+        0.005, ge=0.0, le=0.2, description="constant error of the camera's measured tilt, drawn once, one sigma"
+    )
+    tilt_noise_rad: float = Field(0.002, ge=0.0, le=0.2, description="its noise, one sigma")
+
     @field_validator("pose_outages_s")
     @classmethod
     def _spans_run_forwards(cls, spans: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
@@ -188,6 +194,12 @@ class MismatchSettings(Settings):
     trim_N: float | None = Field(None, ge=-50.0, le=50.0, description="buoyancy beyond the believed one; null draws it")
     trim_range_N: float = Field(1.0, ge=0.0, le=50.0, description="a drawn trim lies between minus and plus this")
     mass_pct: float = Field(5.0, ge=0.0, le=90.0, description="plant's mass differs by up to this")
+    drag: str = Field(
+        "as-believed",
+        min_length=1,
+        description="plant's drag: as-believed, a case of the vehicle's file by name, or drawn for any of them; "
+        "damping_pct comes on top",
+    )
     damping_pct: float = Field(30.0, ge=0.0, le=90.0, description="plant's drag differs by up to this")
     added_mass_pct: float = Field(20.0, ge=0.0, le=90.0, description="plant's added mass differs by up to this")
     thrust_pct: float = Field(5.0, ge=0.0, le=90.0, description="each thruster's gain differs by up to this")
@@ -207,6 +219,9 @@ class TankSettings(Settings):
     tether: TetherSettings = TetherSettings()
     sensors: SensorSettings = SensorSettings()
     mismatch: MismatchSettings = MismatchSettings()
+    ideal_thrusters: bool = Field(
+        False, description="thrust continuous through zero, whatever least thrust and steps the vehicle's file states"
+    )
     failures: tuple[ThrusterFailure, ...] = Field((), description="thrusters that fail: thruster, at_s, kind, value")
 
     @model_validator(mode="after")

@@ -11,6 +11,7 @@ from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.interfaces import BodyState, Measurement, ScalarGrid, WaterTruth
 from wakewise.tank.ambient import build_ambient
+from wakewise.tank.camera_joint import CameraJoint
 from wakewise.tank.grains import speed_at_stress_m_s
 from wakewise.tank.lane import Lane
 from wakewise.tank.measuring import TargetProbes
@@ -56,6 +57,8 @@ class Tank:
     start : BodyState
     rng : numpy Generator
         Its children serve water, silt, sensors and probes.
+    tilt_rad : float
+        Where the joint of the camera, if it has one, stands at the start.
 
     Raises
     ------
@@ -65,7 +68,13 @@ class Tank:
     """
 
     def __init__(
-        self, vehicle: Vehicle, target: Target, settings: TankSettings, start: BodyState, rng: np.random.Generator
+        self,
+        vehicle: Vehicle,
+        target: Target,
+        settings: TankSettings,
+        start: BodyState,
+        rng: np.random.Generator,
+        tilt_rad: float = 0.0,
     ) -> None:
         length, width, depth = settings.size_m
         if abs(target.bed_z_m - depth) > 1e-6:
@@ -115,6 +124,7 @@ class Tank:
             laws.threshold_Pa / settings.density_kg_m3, SHEAR_HEIGHT_M, laws.grain_m
         )
         self._sensors = Sensors(settings.sensors, sensor_rng)
+        self._joint = CameraJoint(vehicle.tilt, tilt_rad, settings.sensors, sensor_rng.spawn(1)[0])
         self._probes = TargetProbes(target, probe_rng)
         self._time = 0.0
         self._flow_steps = 0
@@ -201,7 +211,16 @@ class Tank:
             if flow_due - self._time < _TIME_TOLERANCE_S:
                 self._move_water()
         self._touching = self._touching or self._plant.touches()
-        return self._sensors.collect(self._time)
+        return self._sensors.collect(self._time) + self._joint.turn(self._time, dt_s)
+
+    def aim(self, tilt_rad: float) -> None:
+        """Wish an angle of the camera's joint; a fixed camera does not mind."""
+        self._joint.aim(tilt_rad)
+
+    @property
+    def tilt_rad(self) -> float:
+        """True angle of the camera's joint, 0 where it is fixed."""
+        return self._joint.tilt_rad
 
     def excess_velocity(self, points_W_m: Array) -> Array:
         """Velocity of the water less that of the same water without thrusters, shape (n, 3)."""
@@ -218,7 +237,7 @@ class Tank:
     def measure(self) -> WaterTruth:
         """Speeds and turbidity at the target now; the water moves in steps, so it is computed once for each."""
         if self._measured is None:
-            X_WC = self._plant.state.X_WB @ self._plant.vehicle.X_BC
+            X_WC = self._plant.state.X_WB @ self._plant.vehicle.X_BC_at(self.tilt_rad)
             grid, density = self._silt_grid(), self.settings.density_kg_m3
             self._measured = self._probes.measure(self.water, self.silt.laws, grid, X_WC.p_m, density)
         return self._measured

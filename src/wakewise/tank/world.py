@@ -23,7 +23,13 @@ class TankWitness:
     def observe(self) -> Truth:
         """Vehicle, thrusters and collisions now."""
         tank = self.tank
-        return Truth(state=tank.state, thrusts_N=tank.thrusts_N, power_W=tank.power_W, collision=tank.collision)
+        return Truth(
+            state=tank.state,
+            thrusts_N=tank.thrusts_N,
+            power_W=tank.power_W,
+            collision=tank.collision,
+            tilt_rad=tank.tilt_rad,
+        )
 
     def water(self) -> WaterTruth:
         """Water at the target now."""
@@ -48,6 +54,8 @@ class TankWorld:
         Where the vehicle really is when the flight begins.
     draw : callable
         Gives the generator of all draws, a fresh one of the same seed at each call.
+    tilt_rad : float
+        Where the camera's joint stands when the flight begins.
     """
 
     vehicle: Vehicle
@@ -56,10 +64,11 @@ class TankWorld:
     start: BodyState
     draw: Callable[[], np.random.Generator]
     name: str = "tank"
+    tilt_rad: float = 0.0
 
     def tank(self) -> Tank:
         """A fresh tank at its start, with all that it knows."""
-        return Tank(self.vehicle, self.target, self.settings, self.start, self.draw())
+        return Tank(self.vehicle, self.target, self.settings, self.start, self.draw(), self.tilt_rad)
 
     def begin(self) -> tuple[Plant, Witness | None]:
         """A fresh tank at its start, as plant and witness."""

@@ -7,7 +7,7 @@ per cited source; `vehicle_file.py` and `draft.py` read them). `dynamics.py` has
 (`fossen.py` the readable matrices, `kernels.py`, `runge_kutta.py`, `semi_implicit.py` the compiled steps,
 `jacobians.py` their derivatives, `batch.py` many vehicles at once), `check.py` and `mixing.py` rank, null space and
 wrong signs in shipped matrices, `describe.py` and `parameters.py` all of it in words, `perturbation.py` the vehicle
-that the tank flies. Thrusters are a room below, files of other projects the room `importers`.
+that the tank flies, `drag.py` its drag as other sources have it, `tilt.py` the joint of its camera. Thrusters are a room below, files of other projects the room `importers`.
 """
 
 from wakewise.vehicles.batch import pack_bodies, step_batch
@@ -20,6 +20,7 @@ from wakewise.vehicles.check import (
     null_space_names,
 )
 from wakewise.vehicles.describe import check_report, describe, summary_line
+from wakewise.vehicles.drag import drag_coefficients, with_drag
 from wakewise.vehicles.draft import ThrusterDraft, VehicleDraft
 from wakewise.vehicles.dynamics import (
     RigidBody,
@@ -31,7 +32,7 @@ from wakewise.vehicles.dynamics import (
     step_rk4,
     step_semi_implicit,
 )
-from wakewise.vehicles.hydrodynamics import Hydrodynamics
+from wakewise.vehicles.hydrodynamics import DragCase, Hydrodynamics
 from wakewise.vehicles.jacobians import acceleration_jacobians, step_rk4_jacobians, step_semi_implicit_jacobians
 from wakewise.vehicles.library import draft_names, draft_yaml, load_draft, load_vehicle, vehicle_names
 from wakewise.vehicles.mixing import (
@@ -43,15 +44,18 @@ from wakewise.vehicles.mixing import (
 )
 from wakewise.vehicles.parameters import Parameter, parameters
 from wakewise.vehicles.perturbation import perturbed
+from wakewise.vehicles.tilt import TiltJoint
 from wakewise.vehicles.vehicle import Vehicle
 
 __all__ = [
     "ARDUSUB_VECTORED",
     "ARDUSUB_VECTORED_6DOF",
+    "DragCase",
     "Hydrodynamics",
     "Parameter",
     "RigidBody",
     "ThrusterDraft",
+    "TiltJoint",
     "Vehicle",
     "VehicleDraft",
     "acceleration",
@@ -66,6 +70,7 @@ __all__ = [
     "coriolis_wrench",
     "damping_wrench",
     "describe",
+    "drag_coefficients",
     "draft_names",
     "draft_yaml",
     "failure_rank",
@@ -85,4 +90,5 @@ __all__ = [
     "step_semi_implicit_jacobians",
     "summary_line",
     "vehicle_names",
+    "with_drag",
 ]

@@ -12,12 +12,16 @@ from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.thrusters.thruster import Thruster, mount, require_limit
 from wakewise.vehicles.hydrodynamics import (
+    DragCase,
     Hydrodynamics,
     require_added_mass,
     require_linear_damping,
     require_quadratic_damping,
 )
+from wakewise.vehicles.tilt import TiltJoint
 from wakewise.vehicles.vehicle import (
+    CurveChoice,
+    LeastThrust,
     Provenance,
     Vehicle,
     readable_null_space,
@@ -26,6 +30,7 @@ from wakewise.vehicles.vehicle import (
     require_inertia,
     require_positive,
     require_size,
+    thrust_steps,
 )
 
 ROUNDING = 1e-3
@@ -80,14 +85,6 @@ class ThrusterDraft:
         return np.concatenate([self.axis_B, np.cross(self.p_BT_m, self.axis_B)])
 
 
-@dataclass(frozen=True, kw_only=True)
-class CurveChoice:
-    """Which thrust table of the package the vehicle's thrusters follow, and at what supply voltage."""
-
-    table: str
-    supply_V: float
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class VehicleDraft:
     """What a file says about a vehicle, in the units and the body frame (FRD) of `Vehicle`.
@@ -109,7 +106,12 @@ class VehicleDraft:
         Allocation matrix as the file states it, turned to FRD.
     curve : CurveChoice or None
         Table of thrust against pulse width, if the file names one.
+    least_thrust : LeastThrust or None
+        Least thrusts, if the file states them.
     X_BC : Pose or None
+    tilt : TiltJoint or None
+        The camera's joint, if the file states one.
+    drag_cases : tuple of DragCase
     provenance : tuple of Provenance
     notes : tuple of str
         What was detected, inferred or found odd while reading.
@@ -141,7 +143,10 @@ class VehicleDraft:
     thrusters: tuple[ThrusterDraft, ...] = ()
     shipped_matrix: Array | None = None
     curve: CurveChoice | None = None
+    least_thrust: LeastThrust | None = None
+    drag_cases: tuple[DragCase, ...] = ()
     X_BC: Pose | None = None
+    tilt: TiltJoint | None = None
     camera_fov_rad: float | None = None
     provenance: tuple[Provenance, ...] = ()
     notes: tuple[str, ...] = ()
@@ -169,6 +174,7 @@ class VehicleDraft:
         if self.camera_fov_rad is not None:
             require_fov(self.camera_fov_rad)
         self._check_water()
+        thrust_steps(self.curve, self.least_thrust)
         require_different_names([t.name for t in self.thrusters])
         n = len(self.thrusters)
         if self.shipped_matrix is not None and n and self.shipped_matrix.shape[1] != n:
@@ -204,7 +210,11 @@ class VehicleDraft:
                 )
                 for t in vehicle.thrusters
             ),
+            curve=vehicle.curve,
+            least_thrust=vehicle.least_thrust,
+            drag_cases=vehicle.drag_cases,
             X_BC=vehicle.X_BC,
+            tilt=vehicle.tilt,
             camera_fov_rad=vehicle.camera_fov_rad,
             provenance=vehicle.provenance,
         )
@@ -331,6 +341,10 @@ class VehicleDraft:
             ),
             thrusters=tuple(_whole(t) for t in self.thrusters),
             X_BC=self.X_BC,
+            tilt=self.tilt,
+            curve=self.curve,
+            least_thrust=self.least_thrust,
+            drag_cases=self.drag_cases,
             camera_fov_rad=self.camera_fov_rad,
             provenance=self.provenance,
         )

@@ -1,4 +1,4 @@
-"""What the water adds to a moving body: added mass and damping."""
+"""What the water adds to a moving body: added mass and damping, and other sets of damping that it may have."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ import numpy as np
 
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
+
+AS_BELIEVED, DRAWN = "as-believed", "drawn"
+"""What a true vehicle's drag is called besides its cases by name: the believed set, and one of all that a seed draws."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -54,6 +57,37 @@ class Hydrodynamics:
             linear_damping=np.diag(linear_damping),
             quadratic_damping=np.diag(quadratic_damping),
         )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DragCase:
+    """Another set of damping for a vehicle.
+
+    Parameters
+    ----------
+    name, source : str
+    estimate : bool
+    linear_damping, quadratic_damping : ndarray, shape (6, 6)
+        As in `Hydrodynamics`.
+
+    Raises
+    ------
+    InputError
+        If the name is one that means something else, or a matrix could feed energy to the vehicle.
+    """
+
+    name: str
+    source: str
+    estimate: bool
+    linear_damping: Array
+    quadratic_damping: Array
+
+    def __post_init__(self) -> None:
+        if self.name in (AS_BELIEVED, DRAWN):
+            raise InputError(f"drag_cases: {self.name} is not a name for a case, choose another")
+        freeze(self, linear_damping=(6, 6), quadratic_damping=(6, 6))
+        require_linear_damping(self.linear_damping)
+        require_quadratic_damping(self.quadratic_damping)
 
 
 def require_added_mass(matrix: Array) -> None:

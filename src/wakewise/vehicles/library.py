@@ -16,6 +16,7 @@ from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.geometry import euler_from_quat, quat_from_matrix
 from wakewise.vehicles.draft import ThrusterDraft, VehicleDraft
+from wakewise.vehicles.hydrodynamics import DragCase
 from wakewise.vehicles.vehicle import Vehicle
 from wakewise.vehicles.vehicle_file import R_BODY_CAMERA, VehicleFile
 from wakewise.yaml_text import YamlError, read_yaml
@@ -93,12 +94,27 @@ def parse_vehicle(text: str, where: str, name: str) -> VehicleDraft:
         raise InputError(f"vehicle file {where}: not valid YAML ({error})") from error
     if not isinstance(value, dict):
         raise InputError(f"vehicle file {where}: holds {type(value).__name__}, must be a mapping of groups")
+    value = _on_its_base(value, where)
     try:
         return VehicleFile.model_validate(value).draft(name)
     except ValidationError as error:
         raise InputError(f"vehicle file {where}: {_first_problem(error)}") from error
     except InputError as error:
         raise InputError(f"vehicle file {where}: {error}") from error
+
+
+def _on_its_base(value: dict[str, Any], where: str) -> dict[str, Any]:
+    """A file's groups, and those of the library's vehicle that it names as its `base` where it has none itself."""
+    if "base" not in value:
+        return value
+    own = {group: fields for group, fields in value.items() if group != "base"}
+    base = value["base"]
+    if base not in draft_names():
+        raise InputError(f"vehicle file {where}: base: {base!r}, allowed {', '.join(draft_names())}")
+    under = read_yaml((resources.files("wakewise.vehicles") / "library_data" / f"{base}.yaml").read_text("utf-8"))
+    if "base" in under:
+        raise InputError(f"vehicle file {where}: base: {base!r} has a base itself, name {under['base']!r}")
+    return {**under, **own}
 
 
 def draft_yaml(draft: VehicleDraft) -> str:
@@ -119,6 +135,8 @@ def draft_yaml(draft: VehicleDraft) -> str:
         if origin is not None and origin.estimate:
             head["estimate"] = True
         value[group] = head | stated
+        if group == "damping" and draft.drag_cases:
+            value["drag_cases"] = {case.name: _drag_case(case) for case in draft.drag_cases}
     text = yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=116)
     return "# Body frame FRD: x forward, y right, z down. Every field's name ends in its unit.\n" + text
 
@@ -126,6 +144,7 @@ def draft_yaml(draft: VehicleDraft) -> str:
 def _groups(draft: VehicleDraft) -> dict[str, dict[str, Any]]:
     matrix, linear, quadratic = draft.added_mass, draft.linear_damping, draft.quadratic_damping
     inertia, shipped, curve, camera = draft.inertia_kg_m2, draft.shipped_matrix, draft.curve, draft.X_BC
+    least, joint = draft.least_thrust, draft.tilt
     groups: dict[str, dict[str, Any]] = {
         "body": {"size_m": _numbers(draft.size_m), "mass_kg": draft.mass_kg},
         "inertia": {},
@@ -140,9 +159,11 @@ def _groups(draft: VehicleDraft) -> dict[str, dict[str, Any]]:
         "thruster_disk": {},
         "thruster_lag": {},
         "thruster_curve": {} if curve is None else {"table": curve.table, "supply_V": curve.supply_V},
+        "thruster_least": {} if least is None else {"forward_N": least.forward_N, "reverse_N": least.reverse_N},
         "thruster_layout": {},
         "shipped_matrix": {},
         "camera_mount": {},
+        "camera_tilt": {},
         "camera_lens": {},
     }
     if inertia is not None:
@@ -155,19 +176,7 @@ def _groups(draft: VehicleDraft) -> dict[str, dict[str, Any]]:
             "rotation_kg_m2": _block(matrix[3:, 3:]),
             "coupling_kg_m": _coupling(matrix[:3, 3:]),
         }
-    if linear is not None:
-        groups["damping"] |= {
-            "linear_N_s_m": _block(linear[:3, :3]),
-            "linear_N_m_s": _block(linear[3:, 3:]),
-            "linear_force_by_turning_N_s": _coupling(linear[:3, 3:]),
-            "linear_moment_by_moving_N_s": _coupling(linear[3:, :3]),
-        }
-    if quadratic is not None:
-        diagonal = np.diag(quadratic)
-        groups["damping"] |= {
-            "quadratic_N_s2_m2": _numbers(diagonal[:3]),
-            "quadratic_N_m_s2": _numbers(diagonal[3:]),
-        }
+    groups["damping"] |= _damping(linear, quadratic)
     if draft.thrusters:
         shared, mounts = _shared([_mount(t) for t in draft.thrusters])
         groups |= shared
@@ -177,9 +186,39 @@ def _groups(draft: VehicleDraft) -> dict[str, dict[str, Any]]:
     if camera is not None:
         angles = np.rad2deg(euler_from_quat(quat_from_matrix(camera.R @ R_BODY_CAMERA.T)))
         groups["camera_mount"] = {"position_m": _numbers(camera.p_m), "roll_pitch_yaw_deg": _numbers(angles.round(12))}
+    if joint is not None:
+        groups["camera_tilt"] = {
+            "range_deg": [round(math.degrees(angle), 12) for angle in (joint.low_rad, joint.high_rad)],
+            "rate_deg_s": round(math.degrees(joint.rate_rad_s), 12),
+            "pivot_m": _numbers(joint.p_BJ_m),
+        }
     if draft.camera_fov_rad is not None:
         groups["camera_lens"]["horizontal_fov_deg"] = round(math.degrees(draft.camera_fov_rad), 12)
     return groups
+
+
+def _damping(linear: Array | None, quadratic: Array | None) -> dict[str, Any]:
+    fields: dict[str, Any] = {}
+    if linear is not None:
+        fields |= {
+            "linear_N_s_m": _block(linear[:3, :3]),
+            "linear_N_m_s": _block(linear[3:, 3:]),
+            "linear_force_by_turning_N_s": _coupling(linear[:3, 3:]),
+            "linear_moment_by_moving_N_s": _coupling(linear[3:, :3]),
+        }
+    if quadratic is not None:
+        diagonal = np.diag(quadratic)
+        fields |= {
+            "quadratic_N_s2_m2": _numbers(diagonal[:3]),
+            "quadratic_N_m_s2": _numbers(diagonal[3:]),
+        }
+    return fields
+
+
+def _drag_case(case: DragCase) -> dict[str, Any]:
+    head: dict[str, Any] = {"source": case.source} | ({"estimate": True} if case.estimate else {})
+    stated = _damping(case.linear_damping, case.quadratic_damping)
+    return head | {name: field for name, field in stated.items() if field is not None}
 
 
 def _shared(mounts: list[dict[str, Any]]) -> tuple[dict[str, dict[str, Any]], list[dict[str, Any]]]:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.vehicles.draft import VehicleDraft
+from wakewise.vehicles.hydrodynamics import DragCase
+from wakewise.vehicles.vehicle import thrust_steps
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +61,7 @@ def parameters(draft: VehicleDraft) -> list[Parameter]:
             largest = max(np.abs(matrix[:3, 3:]).max(), np.abs(matrix[3:, :3]).max())
             unit = "kg m" if group == "added_mass" else "N s"
             rows.append(row(group, f"{quantity}: coupling of the two", f"up to {largest:g}", unit))
+    rows += [r for case in draft.drag_cases for r in _drag_case(case)]
     rows += [
         row("thruster_limits", "thrust forward", _alike([t.max_forward_N for t in draft.thrusters]), "N"),
         row("thruster_limits", "thrust in reverse", _alike([t.max_reverse_N for t in draft.thrusters]), "N"),
@@ -69,6 +73,7 @@ def parameters(draft: VehicleDraft) -> list[Parameter]:
             None if curve is None else f"{curve.table} at {curve.supply_V:g} V",
             "",
         ),
+        *_least(draft, row),
         row(
             "thruster_layout",
             "places and axes of thrusters",
@@ -77,6 +82,7 @@ def parameters(draft: VehicleDraft) -> list[Parameter]:
         ),
         row("camera_mount", "camera place", None if camera is None else _vector(camera.p_m), "m"),
         row("camera_mount", "camera looks along", None if camera is None else _vector(camera.R[:, 2].round(6)), ""),
+        *_tilt(draft, row),
         row(
             "camera_lens",
             "horizontal field of view",
@@ -85,6 +91,37 @@ def parameters(draft: VehicleDraft) -> list[Parameter]:
         ),
     ]
     return [r for r in rows if r.value is not None or r.quantity != "thrust table"]
+
+
+def _drag_case(case: DragCase) -> list[Parameter]:
+    """What another source has for the drag of translation."""
+
+    def row(quantity: str, matrix: Array, unit: str) -> Parameter:
+        value = _matrix(matrix[:3, :3])
+        what = f"drag case {case.name}, {quantity}: surge, sway, heave"
+        return Parameter(quantity=what, value=value, unit=unit, source=case.source, estimate=case.estimate)
+
+    return [row("linear", case.linear_damping, "N s/m"), row("quadratic", case.quadratic_damping, "N s2/m2")]
+
+
+def _least(draft: VehicleDraft, row: Callable[..., Parameter]) -> list[Parameter]:
+    """Least thrusts, by the table or as stated; no row where thrust is taken as continuous."""
+    steps = thrust_steps(draft.curve, draft.least_thrust)
+    if steps is None:
+        return []
+    group = "thruster_least" if draft.curve is None else "thruster_curve"
+    return [row(group, "least thrust: forward, reverse", f"{steps.least_forward_N:g}, {steps.least_reverse_N:g}", "N")]
+
+
+def _tilt(draft: VehicleDraft, row: Callable[..., Parameter]) -> list[Parameter]:
+    """Stops and rate of the camera's joint; no row where the camera is fixed."""
+    if draft.tilt is None:
+        return []
+    low, high = (math.degrees(angle) for angle in (draft.tilt.low_rad, draft.tilt.high_rad))
+    return [
+        row("camera_tilt", "camera tilts between", f"{low:g}, {high:g}", "deg"),
+        row("camera_tilt", "camera tilts at", f"{math.degrees(draft.tilt.rate_rad_s):g}", "deg/s"),
+    ]
 
 
 def _scalar(value: float | None) -> str | None:

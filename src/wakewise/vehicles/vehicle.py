@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,8 +11,11 @@ import numpy as np
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
+from wakewise.thrusters.curve_library import library_curve
+from wakewise.thrusters.thrust_steps import ThrustSteps
 from wakewise.thrusters.thruster import Thruster
-from wakewise.vehicles.hydrodynamics import Hydrodynamics
+from wakewise.vehicles.hydrodynamics import DragCase, Hydrodynamics
+from wakewise.vehicles.tilt import TiltJoint
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,6 +25,22 @@ class Provenance:
     group: str
     source: str
     estimate: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class CurveChoice:
+    """Which thrust table of the package the vehicle's thrusters follow, and at what supply voltage."""
+
+    table: str
+    supply_V: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeastThrust:
+    """Thrusts below which a vehicle's thrusters give none, as magnitudes, where no table says so."""
+
+    forward_N: float
+    reverse_N: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,8 +65,16 @@ class Vehicle:
     thrusters : tuple of Thruster
     X_BC : Pose
         Camera mount; the camera frame has OpenCV axes (x right, y down, z forward).
+    tilt : TiltJoint or None
+        What tilts the camera; None where it is fixed.
     camera_fov_rad : float
         Horizontal field of view in water.
+    curve : CurveChoice or None
+        Table of thrust against pulse width; its least thrust and its steps of a microsecond are the thrusters'.
+    least_thrust : LeastThrust or None
+        Least thrusts, where no table says so; neither: thrust is continuous through zero.
+    drag_cases : tuple of DragCase
+        Damping as other sources have it, which the true vehicle may have.
     provenance : tuple of Provenance
         Source of each group of numbers.
 
@@ -55,7 +82,7 @@ class Vehicle:
     ------
     InputError
         If a number is not finite, mass or volume is not positive, the inertia is not symmetric positive definite, or
-        there are no thrusters or two of one name.
+        there are no thrusters or two of one name, or there is no such table or voltage.
     """
 
     name: str
@@ -71,7 +98,11 @@ class Vehicle:
     hydrodynamics: Hydrodynamics
     thrusters: tuple[Thruster, ...]
     X_BC: Pose
+    tilt: TiltJoint | None = None
     camera_fov_rad: float = math.pi / 2
+    curve: CurveChoice | None = None
+    least_thrust: LeastThrust | None = None
+    drag_cases: tuple[DragCase, ...] = ()
     provenance: tuple[Provenance, ...] = ()
 
     def __post_init__(self) -> None:
@@ -84,6 +115,7 @@ class Vehicle:
         if not self.thrusters:
             raise InputError("thrusters: none, there must be at least one")
         require_different_names([t.name for t in self.thrusters])
+        _ = self.thrust_steps
 
     @cached_property
     def allocation_matrix(self) -> Array:
@@ -126,9 +158,43 @@ class Vehicle:
         return _read_only(np.array([t.disk_area_m2 for t in self.thrusters]))
 
     @cached_property
+    def thrust_steps(self) -> ThrustSteps | None:
+        """What each thruster can hold, the same for all; None where thrust is continuous through zero."""
+        return thrust_steps(self.curve, self.least_thrust)
+
+    def X_BC_at(self, tilt_rad: float) -> Pose:  # noqa: N802  (a pose, in monogram notation)
+        """Camera mount at an angle of the tilt joint; the mount itself where the camera is fixed."""
+        return self.X_BC if self.tilt is None else self.tilt.mount(self.X_BC, tilt_rad)
+
+    @property
+    def least_thrusts_N(self) -> tuple[float, float]:
+        """Smallest thrusts that can be held, forward and reverse, as magnitudes; zeros where there is no gap."""
+        steps = self.thrust_steps
+        return (0.0, 0.0) if steps is None else (steps.least_forward_N, steps.least_reverse_N)
+
+    def with_ideal_thrusters(self) -> Vehicle:
+        """The same vehicle with thrust that is continuous through zero."""
+        return replace(self, curve=None, least_thrust=None)
+
+    @cached_property
     def null_space(self) -> Array:
         """Thrusts that make no wrench, as orthonormal columns, shape (n, k); see `readable_null_space`."""
         return _read_only(readable_null_space(self.allocation_matrix))
+
+
+def thrust_steps(curve: CurveChoice | None, least: LeastThrust | None) -> ThrustSteps | None:
+    """What thrusters can hold by their table, else by their stated least thrusts; None where neither is known.
+
+    Raises
+    ------
+    InputError
+        If there is no such table, it does not hold the voltage, or a least thrust is negative.
+    """
+    if curve is not None:
+        return ThrustSteps.of_curve(library_curve(curve.table), curve.supply_V)
+    if least is not None:
+        return ThrustSteps(least_forward_N=least.forward_N, least_reverse_N=least.reverse_N)
+    return None
 
 
 def require_positive(field: str, value: float) -> None:

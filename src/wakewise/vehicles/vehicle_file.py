@@ -12,8 +12,10 @@ from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, matrix_from_quat, quat_from_euler
 from wakewise.settings import Settings
-from wakewise.vehicles.draft import CurveChoice, ThrusterDraft, VehicleDraft
-from wakewise.vehicles.vehicle import Provenance
+from wakewise.vehicles.draft import ThrusterDraft, VehicleDraft
+from wakewise.vehicles.hydrodynamics import DragCase
+from wakewise.vehicles.tilt import TiltJoint
+from wakewise.vehicles.vehicle import CurveChoice, LeastThrust, Provenance
 
 R_BODY_CAMERA = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Axes of a camera (OpenCV) that looks along the body's x axis with its image upright, expressed in B."""
@@ -114,6 +116,25 @@ class Damping(Group):
         return None if pair is None else np.diag([*np.ravel(pair[0]), *np.ravel(pair[1])])
 
 
+class DragCaseGroup(Damping):
+    """Damping as another source has it; what is left out is none."""
+
+    def case(self, name: str) -> DragCase:
+        """The case as a record."""
+        none = np.zeros((6, 6))
+        try:
+            linear, quadratic = self.linear(), self.quadratic()
+            return DragCase(
+                name=name,
+                source=self.source,
+                estimate=self.estimate,
+                linear_damping=none if linear is None else linear,
+                quadratic_damping=none if quadratic is None else quadratic,
+            )
+        except InputError as error:
+            raise InputError(f"drag_cases.{name}: {error}") from error
+
+
 class ThrusterLimits(Group):
     """What the thrusters of the vehicle can do, unless a mount says otherwise."""
 
@@ -138,6 +159,13 @@ class ThrusterCurve(Group):
 
     table: Text = Field(description="name of a table that comes with the package")
     supply_V: Positive = Field(description="supply voltage at which to read it")
+
+
+class ThrusterLeast(Group):
+    """Thrusts below which the thrusters give none, where no table of theirs says so."""
+
+    forward_N: NotNegative
+    reverse_N: NotNegative = Field(description="positive magnitude")
 
 
 class Mount(Settings):
@@ -179,6 +207,24 @@ class CameraMount(Group):
     roll_pitch_yaw_deg: Three = Field(description="turn of the camera; zeros look along the body's x axis, upright")
 
 
+class CameraTilt(Group):
+    """The joint that tilts the camera about its own right axis; left out where the camera is fixed."""
+
+    range_deg: Annotated[list[float], Field(min_length=2, max_length=2)] = Field(
+        description="lower and upper stop; positive looks up, 0 is as the mount states it"
+    )
+    rate_deg_s: Positive = Field(description="how fast it turns")
+    pivot_m: Three | None = Field(
+        default=None, description="a point of the hinge from the body origin, FRD; left out: the camera's own place"
+    )
+
+    def joint(self) -> TiltJoint:
+        """The joint, in SI units."""
+        low, high = (math.radians(angle) for angle in self.range_deg)
+        rate, pivot = math.radians(self.rate_deg_s), vector(self.pivot_m)
+        return TiltJoint(low_rad=low, high_rad=high, rate_rad_s=rate, p_BJ_m=pivot)
+
+
 class CameraLens(Group):
     """What the camera sees."""
 
@@ -197,19 +243,23 @@ class VehicleFile(Settings):
     buoyancy: Buoyancy | None = None
     added_mass: AddedMass | None = None
     damping: Damping | None = None
+    drag_cases: dict[str, DragCaseGroup] = Field(default={}, description="other sets of damping, by name")
     thruster_limits: ThrusterLimits | None = None
     thruster_disk: ThrusterDisk | None = None
     thruster_lag: ThrusterLag | None = None
     thruster_curve: ThrusterCurve | None = None
+    thruster_least: ThrusterLeast | None = None
     thruster_layout: Layout | None = None
     shipped_matrix: ShippedMatrix | None = None
     camera_mount: CameraMount | None = None
+    camera_tilt: CameraTilt | None = None
     camera_lens: CameraLens | None = None
 
     def draft(self, name: str) -> VehicleDraft:
         """Turn the file's numbers into a record, None where the file says nothing."""
         groups = [(field, getattr(self, field)) for field in type(self).model_fields]
         body, buoyancy, damping, curve = self.body, self.buoyancy, self.damping, self.thruster_curve
+        least = self.thruster_least
         return VehicleDraft(
             name=name,
             title=self.title,
@@ -224,10 +274,13 @@ class VehicleFile(Settings):
             added_mass=None if self.added_mass is None else self.added_mass.matrix(),
             linear_damping=None if damping is None else damping.linear(),
             quadratic_damping=None if damping is None else damping.quadratic(),
+            drag_cases=tuple(group.case(name) for name, group in self.drag_cases.items()),
             thrusters=tuple(self._thrusters()),
             shipped_matrix=None if self.shipped_matrix is None else self.shipped_matrix.matrix(),
             curve=None if curve is None else CurveChoice(table=curve.table, supply_V=curve.supply_V),
+            least_thrust=None if least is None else LeastThrust(forward_N=least.forward_N, reverse_N=least.reverse_N),
             X_BC=None if self.camera_mount is None else _pose(self.camera_mount),
+            tilt=None if self.camera_tilt is None else self.camera_tilt.joint(),
             camera_fov_rad=None if self.camera_lens is None else math.radians(self.camera_lens.horizontal_fov_deg),
             provenance=tuple(
                 Provenance(group=field, source=group.source, estimate=group.estimate)

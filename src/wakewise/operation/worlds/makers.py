@@ -15,7 +15,7 @@ from wakewise.operation.lattice_water import LatticeWorld, box_half_size_m
 from wakewise.operation.worlds.library import load_world, world_names
 from wakewise.plugins import find
 from wakewise.tank import TankWorld
-from wakewise.vehicles import Vehicle, perturbed
+from wakewise.vehicles import Vehicle, perturbed, with_drag
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
@@ -33,7 +33,7 @@ def true_vehicle(parts: Parts) -> Vehicle:
     if trim_N is None:
         trim_N = float(rng.uniform(-apart.trim_range_N, apart.trim_range_N))
     return perturbed(
-        parts.vehicle,
+        with_drag(parts.vehicle, apart.drag, parts.seeds.drag()),
         rng,
         mass_pct=apart.mass_pct,
         damping_pct=apart.damping_pct,
@@ -59,6 +59,7 @@ def tank_world(parts: Parts) -> TankWorld:
         settings=parts.scenario.tank,
         start=true_start(parts),
         draw=parts.seeds.tank,
+        tilt_rad=parts.start_tilt_rad,
     )
 
 
@@ -72,6 +73,7 @@ def _instant(name: str, jets: Callable[[float], Jets], parts: Parts) -> InstantW
         settings=parts.scenario.tank,
         start=true_start(parts),
         draw=lambda: np.random.default_rng([seed, 11]),
+        tilt_rad=parts.start_tilt_rad,
     )
 
 

@@ -19,7 +19,7 @@ from wakewise.operation import Parts, fly
 from wakewise.operation.scenario import Scenario, check_scenario
 from wakewise.operation.seeds import Seeds
 from wakewise.targets import find_target, sample_region
-from wakewise.vehicles import load_vehicle
+from wakewise.vehicles import Vehicle, load_vehicle
 from wakewise.wake import WakeSettings, WakeView, disturbance, wake_model
 
 World = Literal["parcels", "paper"]
@@ -175,13 +175,15 @@ def helped_by(current_m_s: tuple[float, float, float], azimuth_rad: float) -> fl
     return 1.0 if east * np.cos(azimuth_rad) - north * np.sin(azimuth_rad) >= 0.0 else -1.0
 
 
-def camera_rmse_mm(frame: pl.DataFrame, X_BC: Pose) -> float:
+def camera_rmse_mm(frame: pl.DataFrame, vehicle: Vehicle) -> float:
     """Root mean square distance of the true camera from the wished one, in mm."""
     places = {}
     for who in ("true", "goal"):
         p = frame.select(f"{who}_x_m", f"{who}_y_m", f"{who}_z_m").to_numpy()
         q = frame.select(f"{who}_qw", f"{who}_qx", f"{who}_qy", f"{who}_qz").to_numpy()
-        places[who] = p + matrix_from_quat(q) @ X_BC.p_m
+        tilts = np.radians(frame[f"{who}_tilt_deg"].to_numpy())
+        mounts = np.array([vehicle.X_BC_at(float(tilt)).p_m for tilt in tilts])
+        places[who] = p + np.einsum("nij,nj->ni", matrix_from_quat(q), mounts)
     return 1e3 * float(np.sqrt(np.mean(np.sum((places["true"] - places["goal"]) ** 2, axis=1))))
 
 
@@ -207,6 +209,6 @@ def fly_trial(trial: Trial) -> dict[str, float | None]:
     for leg in ("hover", "orbit"):
         speed = frame.filter(pl.col("leg") == leg)["target_speed_mean_m_s"].mean()
         out[f"{leg}_speed_mean_m_s"] = float(speed)  # type: ignore[arg-type]
-    out["camera_rmse_mm"] = camera_rmse_mm(frame, parts.vehicle.X_BC)
+    out["camera_rmse_mm"] = camera_rmse_mm(frame, parts.vehicle)
     out["cpu_s"] = time.process_time() - began
     return out
