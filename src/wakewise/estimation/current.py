@@ -1,10 +1,11 @@
 """The current, from the force that holds the vehicle in it: how fast water must run past to pull as the load does.
 
-At rest a current shows itself as a force that the model does not explain, and so do trim and a cable. Trim pulls straight
-up or down, so the level part of the force is the current's if no cable is out: its drag, by the vehicle's own nominal
-drag, is turned round for a level current. Nothing is said of a current that rises or sinks, which trim cannot be told
-from. A level pull that is no drag, such as a cable's, is taken for a current; a taut cable of 0.3 N looks like 3 cm/s.
-How sure it is follows from the covariance of the force, in which the thrusters' gains are, and from the spread of drag.
+At rest a current shows itself as a force that the model does not explain, and so do trim and a cable. Trim pulls
+straight up or down, so the level part of the force is the current's if no cable is out: its drag, by the vehicle's own
+nominal drag, is turned round for a level current. Nothing is said of a current that rises or sinks, which trim cannot
+be told from. A level pull that is no drag, such as a cable's, is taken for a current: 0.3 N look like some 4 cm/s on a
+small vehicle. How sure it is follows from the covariance of the force, in which the thrusters' gains are, and from the
+spread of drag.
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ def preflight(parts: Parts) -> Preflight:
         vehicle.X_BC,
         vehicle.size_m,
         parts.bounds,
-        parts.target.mesh.vertices_m,
+        parts.found_target.mesh.vertices_m,
         scenario.mission.clearance_m,
     )
     check_way(parts)

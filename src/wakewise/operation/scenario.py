@@ -19,6 +19,7 @@ from wakewise.imaging import ImagingSettings
 from wakewise.missions import MissionSettings
 from wakewise.operation.pilots import PILOTS
 from wakewise.operation.renamed import became
+from wakewise.operation.survey import SurveySettings
 from wakewise.operation.worlds import WORLDS
 from wakewise.plugins import names
 from wakewise.reconstruction import ReconstructionSettings
@@ -62,6 +63,7 @@ class Scenario(Settings):
     world: str = Field("tank", description="where it is flown: tank, paper (circular), lattice, or package.module:make")
     pilot: str = Field("route", description="where goals come from: route, or package.module:make")
     target: TargetSettings = TargetSettings()
+    survey: SurveySettings = SurveySettings()
     mission: MissionSettings = MissionSettings()
     control: ControlSettings = ControlSettings()
     estimation: FilterSettings = FilterSettings()

@@ -148,11 +148,11 @@ class SensorSettings(Settings):
 
     Figures are typical of small vehicles' parts and of a camera-based pose at one metre, not of one product.
 
-    **Errors that last** do not average out; where a span is given, each flight draws its own value, evenly. The camera's
-    map, calibration and refraction put its poses off by millimetres that change as the view does: 3 to 5 mm per axis,
-    lasting 10 to 60 s, with as much of the optical tracking, leave 4 to 5 mm after fusion, as the paper's vehicle has
-    (5.2 mm); 0.1 to 0.2 deg goes with that at a metre. The sizes are estimates; that such errors are there, and depend
-    on where the marks are seen from, is measured (Z. Xu et al., J. Mar. Sci. Eng. 9 (2021) 1432, doi
+    **Errors that last** do not average out; where a span is given, each flight draws its own value, evenly. The
+    camera's map, calibration and refraction put its poses off by millimetres that change as the view does: 3 to 5 mm
+    per axis, lasting 10 to 60 s, with as much of the optical tracking, leave about 5 mm after fusion, as the paper's
+    vehicle has (5.2 mm); 0.1 to 0.2 deg goes with that at a metre. The sizes are estimates; that such errors are there,
+    and depend on where the marks are seen from, is measured (Z. Xu et al., J. Mar. Sci. Eng. 9 (2021) 1432, doi
     10.3390/jmse9121432). A camera without hardware trigger is stamped late by part of a frame and of its way to the
     host: 5 to 20 ms (an estimate; why, and that it is usual: M. Li, A. I. Mourikis, Int. J. Robot. Res. 33 (2014) 947,
     doi 10.1177/0278364913515286). A pressure sensor of the MS5837-30BA class is right to +-50 mbar, half a metre of
@@ -169,7 +169,9 @@ class SensorSettings(Settings):
     pose_outages_s: tuple[tuple[float, float], ...] = Field(
         (), description="spans of time (from, to) in which there is no pose at all"
     )
-    pose_slow_m: Span = Field((0.003, 0.005), description="its position's lasting error, from and to, one sigma per axis")
+    pose_slow_m: Span = Field(
+        (0.003, 0.005), description="its position's lasting error, from and to, one sigma per axis"
+    )
     pose_slow_rad: Span = Field((0.0015, 0.0035), description="its attitude's lasting error, likewise")
     pose_slow_s: Span = Field((10.0, 60.0), description="how long the lasting errors of pose and tracking last")
     pose_stamp_late_s: Span = Field((0.005, 0.02), description="by how much its time stamp is later than the picture")
