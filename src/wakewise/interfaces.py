@@ -26,18 +26,22 @@ class BodyState:
     `nu_B` is the twist of B relative to the world (not to the water), linear then angular, expressed in B, shape (6,).
     Of an estimate: `load_B`, shape (6,), is the wrench in B that the vehicle's model does not explain (trim, current,
     tether), and `covariance`, shape (12, 12), that of the errors of position in W, of attitude (rotation vector in B)
-    and of `nu_B`; None where nobody computed it.
+    and of `nu_B`; `current_W_m_s`, shape (3,), is the water's own motion, and `current_covariance`, shape (3, 3), how
+    sure that is. Each is None where nobody computed it or it is not known yet.
     """
 
     X_WB: Pose
     nu_B: Array = field(default_factory=lambda: np.zeros(6))
     load_B: Array = field(default_factory=lambda: np.zeros(6))
     covariance: Array | None = None
+    current_W_m_s: Array | None = None
+    current_covariance: Array | None = None
 
     def __post_init__(self) -> None:
         freeze(self, nu_B=(6,), load_B=(6,))
-        if self.covariance is not None:
-            freeze(self, covariance=(12, 12))
+        for name, shape in (("covariance", (12, 12)), ("current_W_m_s", (3,)), ("current_covariance", (3, 3))):
+            if getattr(self, name) is not None:
+                freeze(self, **{name: shape})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -7,11 +7,12 @@ from typing import Any
 
 from wakewise.allocation.allocate import Allocation, Weights, gentle_allocation, least_thrusts
 from wakewise.arrays import Array
-from wakewise.control.levers import watched
+from wakewise.control.levers import with_bed_points
 from wakewise.control.loop import TrackingController, vehicle_layout
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
 from wakewise.control.spare import meeting_view
 from wakewise.control.tracker import make_tracker
+from wakewise.control.watch import Watch
 from wakewise.interfaces import Controller, WakeModel
 from wakewise.planning import Surroundings
 from wakewise.targets import Region
@@ -57,7 +58,7 @@ def instant(
 ) -> Controller[Any]:
     """`instant`: the tracker, and the gentlest thrusts for its wrench, one instant at a time."""
     levers = settings.levers
-    controller = instant_allocator(vehicle, watched(region, levers, bed_of(wake)), wake, settings)
-    if not levers.meet:
-        return controller
-    return replace(controller, view=meeting_view(controller.view, vehicle_layout(vehicle)))
+    seen = with_bed_points(region, levers, bed_of(wake))
+    controller = instant_allocator(vehicle, seen, wake, settings)
+    view = meeting_view(controller.view, vehicle_layout(vehicle)) if levers.meet else controller.view
+    return replace(controller, view=view, watch=Watch(region=seen, view=view, levers=levers))

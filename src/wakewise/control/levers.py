@@ -2,8 +2,8 @@
 
 Water near the target is stirred in more ways than a free jet's: jets that strike the bed run along it to the target's
 foot, jets that meet join, and what leaves a thruster now may arrive much later, carried by the current. The levers tell
-a controller of this. None of them knows the simulated world's truth but for the mean current, which a crew measures
-before the flight.
+a controller of this. None of them knows the simulated world's truth: the current is the estimator's, or what a user
+states.
 """
 
 from __future__ import annotations
@@ -52,10 +52,11 @@ class LeverSettings(Settings):
     meet: bool = Field(
         default=True, description="count what jets become that meet: they join and run on between them; needs spare"
     )
-    drift: bool = Field(default=True, description="also keep the water still that the current will bring to the target")
+    drift: bool = Field(
+        default=True, description="also keep the water still that the current will bring to the target; needs spare"
+    )
     drift_m_s: Velocity | None = Field(
-        default=None,
-        description="that current, north, east, down; null: as measured before the flight, the tank's mean current",
+        default=None, description="that current, north, east, down, if it is stated; null: as the estimator finds it"
     )
 
 
@@ -90,8 +91,8 @@ def with_bed_points(region: Region, levers: LeverSettings, bed_z_m: float | None
     return _joined(region, ring, np.full(BED_POINTS, share), reach)
 
 
-def with_drift(region: Region, levers: LeverSettings) -> Region:
-    """The region and, if the lever is on, the water that the current will bring to the target within `DRIFT_S`.
+def with_drift(region: Region, current_W_m_s: Array) -> Region:
+    """The region and the water that a current, shape (3,), will bring to the target within `DRIFT_S`.
 
     A weak jet that passes the target at a third of a metre is carried on to it by a current of 3 cm/s in ten seconds,
     by when its water has slowed but not stopped. The water at the target in t seconds is now upstream by t times the
@@ -100,11 +101,11 @@ def with_drift(region: Region, levers: LeverSettings) -> Region:
     at 15 s with 3 cm/s, its sides with about two thirds of that). Their weight falls with the
     square of the speed of a patch of water that a jet has left, (1 + t)^(-3/2) with t in s: the front of a jet's
     remains goes as t^(1/4) when momentum is kept, their speed as t^(-3/4).
-    Without a current, or if nobody has told of one, the region stays as it is.
+    Without a current the region stays as it is.
     """
-    if not levers.drift or levers.drift_m_s is None or not any(levers.drift_m_s):
+    current = np.asarray(current_W_m_s, dtype=np.float64)
+    if not current.any():
         return region
-    current = np.array(levers.drift_m_s, dtype=np.float64)
     near = _surface(region)
     steps = np.arange(1, DRIFT_POINTS + 1)
     ages_s = DRIFT_S * ((0.5 + steps * KRONECKER[0]) % 1.0)
@@ -116,11 +117,6 @@ def with_drift(region: Region, levers: LeverSettings) -> Region:
     upstream = region.points_W_m[chosen] + ages_s[:, None] * (DRIFT_SPREAD_M_S * aside - current)
     weights *= DRIFT_WEIGHT * float(region.weights.sum()) / float(weights.sum())
     return _joined(region, upstream, weights, ages_s * float(np.linalg.norm(current)))
-
-
-def watched(region: Region, levers: LeverSettings, bed_z_m: float | None = None) -> Region:
-    """The region with what the levers add to it."""
-    return with_bed_points(with_drift(region, levers), levers, bed_z_m)
 
 
 def _surface(region: Region) -> IntArray:

@@ -10,6 +10,7 @@ import numpy as np
 from wakewise.allocation import Allocation, Layout, compile_layout
 from wakewise.arrays import Array, freeze
 from wakewise.control.tracker import Tracker, TrackerState
+from wakewise.control.watch import Seen, Watch
 from wakewise.interfaces import BodyState, Command, Goal
 from wakewise.vehicles import Vehicle
 from wakewise.wake.view import WakeView
@@ -34,12 +35,14 @@ FULL = 1.0 - 1e-9
 class ControllerState:
     """What a controller remembers between steps.
 
-    The tracker's integral, the thrusts last asked for, shape (n,), and the share of the last wrench that they made.
+    The tracker's integral, the thrusts last asked for, shape (n,), the share of the last wrench that they made, and
+    what was watched then.
     """
 
     tracker: TrackerState
     thrusts_N: Array
     share: float = 1.0
+    seen: Seen | None = None
 
     def __post_init__(self) -> None:
         freeze(self, thrusts_N=(None,))
@@ -50,12 +53,15 @@ class TrackingController:
     """A tracker and a way to allocate; implements `wakewise.interfaces.Controller`.
 
     An estimate or goal that is not finite gives the last thrusts, fading with `HOLD_S`, and says so in `fallback`.
+    Where there is a `watch`, the estimate's current adds points to those of the view; the Gram matrix that is allocated
+    by is divided by the growth of their total weight, so that it stays a mean.
     """
 
     name: str
     tracker: Tracker
     view: WakeView
     allocate: Allocate
+    watch: Watch | None = None
 
     def init(self) -> ControllerState:
         """State before the first step."""
@@ -72,14 +78,19 @@ class TrackingController:
         tracker_state, wrench = self.tracker.wrench(state.tracker, dt_s, estimate, goal, saturated=state.share < FULL)
         if not np.isfinite(wrench.sum()):
             return self._hold(state, dt_s, "wrench not finite: holding the last thrusts, fading")
-        gram = self.view.gram(estimate.X_WB)
+        seen = None if self.watch is None else self.watch.at(state.seen, estimate)
+        view = self.view if seen is None else seen.view
+        growth = 1.0 if seen is None else view.total_weight / self.view.total_weight
+        gram = view.gram(estimate.X_WB) / growth
         usable = bool(np.isfinite(gram).all())
         fallback = None if usable else "wake model not finite: least thrusts"
         found = self.allocate(wrench, gram if usable else None, state.thrusts_N)
         if found.scale < FULL and fallback is None:
             fallback = f"thrusters saturated: {100.0 * found.scale:.0f} % of the wrench"
-        command = Command(thrusts_N=found.thrusts_N, wrench_B=wrench, disturbance=found.disturbance, fallback=fallback)
-        return ControllerState(tracker=tracker_state, thrusts_N=found.thrusts_N, share=found.scale), command
+        D = None if found.disturbance is None else growth * found.disturbance
+        command = Command(thrusts_N=found.thrusts_N, wrench_B=wrench, disturbance=D, fallback=fallback)
+        after = ControllerState(tracker=tracker_state, thrusts_N=found.thrusts_N, share=found.scale, seen=seen)
+        return after, command
 
     def _hold(self, state: ControllerState, dt_s: float, why: str) -> tuple[ControllerState, Command]:
         thrusts = state.thrusts_N * np.exp(-dt_s / HOLD_S)

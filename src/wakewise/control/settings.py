@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from wakewise.control.levers import LeverSettings, Velocity
+from wakewise.control.levers import LeverSettings
 from wakewise.planning.problem import DISTURBANCE_WEIGHT, EFFORT_WEIGHT, PlanSettings
 from wakewise.settings import Settings
 from wakewise.wake import WakeSettings
@@ -69,11 +69,3 @@ class ControlSettings(Settings):
     levers: LeverSettings = Field(
         default=LeverSettings(), description="what `wake-aware` and `instant` use beyond the free jet"
     )
-
-
-def told(settings: ControlSettings, current_m_s: Velocity) -> ControlSettings:
-    """The settings with the current that was measured before the flight, unless they name another."""
-    levers = settings.levers
-    if levers.drift_m_s is not None:
-        return settings
-    return settings.model_copy(update={"levers": levers.model_copy(update={"drift_m_s": current_m_s})})

@@ -22,6 +22,7 @@ from wakewise.allocation.allocate import Allocation, Layout, Weights, gentle_all
 from wakewise.arrays import Array, IntArray
 from wakewise.control.loop import vehicle_layout
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
+from wakewise.control.watch import Seen, Watch
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Command, Controller, Goal, WakeModel
 from wakewise.targets import Region
@@ -142,13 +143,17 @@ def meeting_view(view: WakeView, layout: Layout) -> MeetingView:
 
 @dataclass(frozen=True, eq=False)
 class SpareState:
-    """The other controller's state, the thrusts last told, shape (n,), and when they were last shared out (freely)."""
+    """The other controller's state, the thrusts last told, shape (n,), and when they were last shared out (freely).
+
+    `seen` is what was watched then.
+    """
 
     inner: Any
     thrusts_N: Array
     age_s: float = np.inf
     disturbance: float | None = None
     free_age_s: float = np.inf
+    seen: Seen | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -161,12 +166,15 @@ class Respared:
     The price on change keeps shares near to the last ones, and for good where another minimum lies apart (the load on
     one diagonal pair of verticals or the other). So every `FREE_EVERY_S` they are sought without it, and taken where
     that is better by more than `WORTH`. A step on which the other fell back is flown as it is.
+
+    `weights` are over the view's own points; where a current adds points (`watch`), the disturbance's is divided by
+    the sum of all.
     """
 
     name: str
     inner: Controller[Any]
     layout: Layout
-    view: WakeView
+    watch: Watch
     weights: Weights
 
     def init(self) -> SpareState:
@@ -177,27 +185,30 @@ class Respared:
         """Decide the thrusts for the next `dt_s` seconds."""
         inner, command = self.inner.step(state.inner, dt_s, estimate, goal)
         if command.fallback is not None:
-            return SpareState(inner=inner, thrusts_N=command.thrusts_N), command
+            return SpareState(inner=inner, thrusts_N=command.thrusts_N, seen=state.seen), command
         if state.age_s + 1e-6 < EVERY_S:
             missing = command.wrench_B - self.layout.B @ state.thrusts_N
             thrusts = state.thrusts_N + self.layout.inverse @ missing
             if np.all((thrusts >= self.layout.lower_N) & (thrusts <= self.layout.upper_N)):
-                held = SpareState(
-                    self._told(inner, thrusts, dt_s), thrusts, state.age_s + dt_s, state.disturbance, state.free_age_s
-                )
+                told = self._told(inner, thrusts, dt_s)
+                held = replace(state, inner=told, thrusts_N=thrusts, age_s=state.age_s + dt_s)
                 return held, replace(command, thrusts_N=thrusts, disturbance=state.disturbance)
-        G = self.view.gram(estimate.X_WB)
+        seen = self.watch.at(state.seen, estimate)
+        G = seen.view.gram(estimate.X_WB)
         if not np.isfinite(G).all():
             words = "wake model not finite: thrusts of the plan"
             return SpareState(inner=inner, thrusts_N=command.thrusts_N), replace(command, fallback=words)
-        found = gentle_allocation(self.layout, command.wrench_B, G, self.weights, state.thrusts_N)
+        share = self.watch.view.total_weight / seen.view.total_weight
+        weights = replace(self.weights, disturbance=share * self.weights.disturbance)
+        found = gentle_allocation(self.layout, command.wrench_B, G, weights, state.thrusts_N)
         free_age_s = state.free_age_s + EVERY_S
         if free_age_s + 1e-6 >= FREE_EVERY_S:
-            anew = gentle_allocation(self.layout, command.wrench_B, G, replace(self.weights, previous=0.0))
+            anew = gentle_allocation(self.layout, command.wrench_B, G, replace(weights, previous=0.0))
             free_age_s = 0.0
-            if self._cost(anew) < (1.0 - WORTH) * self._cost(found):
+            if _cost(anew, weights) < (1.0 - WORTH) * _cost(found, weights):
                 found = anew
-        new = SpareState(self._told(inner, found.thrusts_N, dt_s), found.thrusts_N, dt_s, found.disturbance, free_age_s)
+        told = self._told(inner, found.thrusts_N, dt_s)
+        new = SpareState(told, found.thrusts_N, dt_s, found.disturbance, free_age_s, seen)
         return new, replace(command, thrusts_N=found.thrusts_N, disturbance=found.disturbance)
 
     def _told(self, inner: Any, thrusts_N: Array, dt_s: float) -> Any:
@@ -205,10 +216,11 @@ class Respared:
         tell = getattr(self.inner, "told", None)
         return inner if tell is None else tell(inner, thrusts_N, dt_s)
 
-    def _cost(self, found: Allocation) -> float:
-        """Cost of shares without the price on change."""
-        D = 0.0 if found.disturbance is None else found.disturbance
-        return self.weights.disturbance * D + self.weights.effort * float(found.thrusts_N @ found.thrusts_N)
+
+def _cost(found: Allocation, weights: Weights) -> float:
+    """Cost of shares without the price on change."""
+    D = 0.0 if found.disturbance is None else found.disturbance
+    return weights.disturbance * D + weights.effort * float(found.thrusts_N @ found.thrusts_N)
 
 
 def respared(
@@ -216,7 +228,8 @@ def respared(
 ) -> Respared:
     """A planning controller whose wrenches are shared out anew, with the same weights.
 
-    Arguments as for `make_controller`; `region` with what the levers add, `wake` with the floor if it is to count.
+    Arguments as for `make_controller`; `region` with what the levers add but for drift, `wake` with the floor if it is
+    to count.
     """
     layout = vehicle_layout(vehicle)
     view = WakeView.of(vehicle, region, wake, settings.superposition)
@@ -224,7 +237,9 @@ def respared(
         name=controller.name,
         inner=controller,
         layout=layout,
-        view=meeting_view(view, layout) if settings.levers.meet else view,
+        watch=Watch(
+            region=region, view=meeting_view(view, layout) if settings.levers.meet else view, levers=settings.levers
+        ),
         weights=Weights(
             disturbance=settings.w_disturbance / view.total_weight,
             effort=settings.w_effort,

@@ -21,7 +21,7 @@ import numpy as np
 
 from wakewise.allocation.allocate import Weights, gentle_allocation
 from wakewise.arrays import Array
-from wakewise.control.levers import watched
+from wakewise.control.levers import with_bed_points
 from wakewise.control.loop import vehicle_layout
 from wakewise.control.settings import ControlSettings
 from wakewise.errors import InputError
@@ -155,7 +155,7 @@ def trim_advice(
         raise InputError("trim: no poses, a mission must hold at least one")
     if not (np.isfinite(unknown_N) and unknown_N >= 0.0):
         raise InputError(f"trim: unknown_N {unknown_N:g}, must be finite and not negative")
-    view = WakeView.of(vehicle, watched(region, chosen.levers), wake, chosen.superposition)
+    view = WakeView.of(vehicle, with_bed_points(region, chosen.levers), wake, chosen.superposition)
     grams = [view.gram(X_WB) for X_WB in poses]
     weights = Weights(disturbance=chosen.w_disturbance / view.total_weight, effort=chosen.w_effort)
     own = net_buoyancy_N(vehicle)

@@ -1,15 +1,16 @@
 """`wake-aware`: model predictive control of the target's water, with the exact allocator behind it.
 
-The planner weighs the disturbance of the region over its horizon; the levers add the water that counts beside the
-target's own, and share each plan's wrench out anew. `linear` is the same with the belief in a linear wake model, an
-ablation.
+The planner weighs the disturbance of the region over its horizon; the levers share each plan's wrench out anew, and
+count water beside the target's own, such as what the current will bring there. That only moves spare thrusts: a plan
+that is told of it leaves its path for water that nobody photographs. `linear` is the same with the belief in a linear
+wake model, an ablation.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from wakewise.control.levers import watched
+from wakewise.control.levers import with_bed_points
 from wakewise.control.receding import planning_controller
 from wakewise.control.settings import ControlSettings
 from wakewise.control.spare import respared
@@ -51,7 +52,7 @@ def _planned(
     around: Surroundings | None,
 ) -> Controller[Any]:
     levers = settings.levers
-    seen = watched(region, levers, bed_of(wake))
+    seen = with_bed_points(region, levers, bed_of(wake))
     believed = free_jet(wake) if levers.spare else wake
     controller = planning_controller(vehicle, seen, believed, settings, name=name, surroundings=around)
     return respared(controller, vehicle, seen, wake, settings) if levers.spare else controller

@@ -10,8 +10,8 @@ tether, the current at rest, see `resting`) and the inertial unit's biases. Whil
 apart and need not be; when the camera is lost and the vehicle sets off, they carry it away from its estimate, and the
 covariance knows it.
 
-**A camera's slow error** (calibration, map, refraction), if its spread is stated, is a state, too: it does not average
-out, and the covariance then says so.
+**Slow errors of the sensors** (a camera's calibration, map and refraction, the tracking's own, the pressure sensor's
+zero), if their spread is stated, are states, too: they do not average out, and the covariance then says so.
 
 **Late measurements** are taken in the order in which they were made. The filter lives `settle_s` behind the present,
 where nothing is missing any more; for the answer of each step a copy of it runs on to now with what has arrived so
@@ -22,6 +22,8 @@ surprised by a wave, a tether or a thruster that fails: its innovations then lea
 mean, in units of what chance allows, is the surprise (after R. K. Mehra, Approaches to adaptive filtering, IEEE Trans.
 Autom. Control 17 (1972) 693, doi 10.1109/TAC.1972.1100100): above 1 the model's noise grows, below it shrinks back to
 the settings.
+
+**The current** is told from the level part of the load at rest (`current`), once that is known.
 
 **Wrong measurements** (chance below `gate` by the filter's own covariance) are left out and counted; after
 `gate_patience` poses in a row the filter gives in: it takes itself to know as little as at the start.
@@ -35,7 +37,18 @@ import numpy as np
 from scipy.special import chdtri
 
 from wakewise.arrays import Array, freeze
-from wakewise.estimation.kernels import GAINS, GYRO, correct, felt, predict, turn_between, turned_by, unexplained
+from wakewise.estimation.current import told_current
+from wakewise.estimation.kernels import (
+    CURRENT,
+    FORCE,
+    GYRO,
+    correct,
+    felt,
+    predict,
+    turn_between,
+    turned_by,
+    unexplained,
+)
 from wakewise.estimation.settings import FilterSettings, Priors
 from wakewise.geometry import Pose, matrix_from_quat
 from wakewise.interfaces import BodyState, Measurement
@@ -143,14 +156,19 @@ class ErrorStateFilter:
             s.accelerometer_bias_std_m_s2,
         )
         n = self._B.shape[1]
-        slow = (s.pose_slow_std_m, s.pose_slow_std_rad)
-        self._camera = GAINS + n if any(slow) else None
-        """Where the camera's slow error begins among the errors, if there is one."""
         lasting = np.repeat([s.current_std_m_s, s.drag_std, s.inertia_std, s.gain_std], [3, 6, 6, n])
         lasts_s = np.full(len(lasting), s.lasting_s)
-        if self._camera is not None:
-            lasting = np.concatenate([lasting, np.repeat(slow, 3)])
-            lasts_s = np.concatenate([lasts_s, np.full(6, s.pose_slow_s)])
+        self._slow: dict[str, int] = {}
+        """Where the slow errors of the sensors that have one begin among the errors."""
+        for sensor, spreads, time_s in (
+            ("camera", np.repeat([s.pose_slow_std_m, s.pose_slow_std_rad], 3), s.slow_s),
+            ("tracking", np.full(3, s.tracking_slow_std_m), s.slow_s),
+            ("depth", np.array([s.depth_bias_std_m]), s.lasting_s),
+        ):
+            if spreads.any():
+                self._slow[sensor] = CURRENT + len(lasting)
+                lasting = np.concatenate([lasting, spreads])
+                lasts_s = np.concatenate([lasts_s, np.full(len(spreads), time_s)])
         self._lasting, self._lasts_s = lasting, lasts_s
         self._start_covariance = np.diag(np.square(np.concatenate([np.repeat(spread, 3), lasting])))
         self._errors = len(self._start_covariance)
@@ -211,7 +229,17 @@ class ErrorStateFilter:
         self._advance(walk, now_s)
         mean = walk.mean
         load_B = unexplained(self._packed, self._B, mean, walk.thrusts_N, walk.rest_q)
-        return BodyState(X_WB=Pose(mean[:3], mean[3:7]), nu_B=mean[7:13], load_B=load_B, covariance=walk.P[:12, :12])
+        force_W_N, around = mean[13:16], walk.P[FORCE : FORCE + 3, FORCE : FORCE + 3]
+        water = told_current(self._packed, walk.rest_q, force_W_N, around, self.priors.drag_std)
+        current, spread = (None, None) if water is None else water
+        return BodyState(
+            X_WB=Pose(mean[:3], mean[3:7]),
+            nu_B=mean[7:13],
+            load_B=load_B,
+            covariance=walk.P[:12, :12],
+            current_W_m_s=current,
+            current_covariance=spread,
+        )
 
     def _advance(self, walk: _Walk, until_s: float) -> None:
         """Move on to a time, command by command."""
@@ -242,11 +270,13 @@ class ErrorStateFilter:
         if measured.p_WB_m is not None and np.isfinite(measured.p_WB_m).all():
             H = np.zeros((3, self._errors))
             H[:, :3] = np.eye(3)
-            self._correct(walk, H, measured.p_WB_m - walk.mean[:3], np.full(3, s.tracking_std_m))
+            residual = measured.p_WB_m - walk.mean[:3] - self._slow_part(walk, "tracking", H, 3)
+            self._correct(walk, H, residual, np.full(3, s.tracking_std_m))
         if measured.depth_m is not None and np.isfinite(measured.depth_m):
             H = np.zeros((1, self._errors))
             H[0, 2] = 1.0
-            self._correct(walk, H, np.array([measured.depth_m - walk.mean[2]]), np.array([s.depth_std_m]))
+            residual = measured.depth_m - walk.mean[2:3] - self._slow_part(walk, "depth", H, 1)
+            self._correct(walk, H, residual, np.array([s.depth_std_m]))
         if measured.omega_B_rad_s is not None and np.isfinite(measured.omega_B_rad_s).all():
             H = np.zeros((3, self._errors))
             H[:, 9:12] = H[:, GYRO : GYRO + 3] = np.eye(3)
@@ -259,14 +289,20 @@ class ErrorStateFilter:
         """Jacobian (6, E), residual (6,) and noise (6,) of a camera pose, its slow error included."""
         H, residual, q = np.zeros((6, self._errors)), np.empty(6), walk.mean[3:7]
         H[:, :6] = np.eye(6)
-        residual[:3] = seen.p_m - walk.mean[:3]
-        if self._camera is not None:
-            k = self._camera
-            H[:, k:] = np.eye(6)
-            residual[:3] -= walk.mean[k + 1 : k + 4]
-            q = turned_by(q, walk.mean[k + 4 : k + 7])
+        slow = self._slow_part(walk, "camera", H, 6)
+        residual[:3] = seen.p_m - walk.mean[:3] - slow[:3]
+        if slow.any():
+            q = turned_by(q, slow[3:])
         residual[3:] = turn_between(q, seen.q)
         return H, residual, np.repeat([self.settings.position_std_m, self.settings.attitude_std_rad], 3)
+
+    def _slow_part(self, walk: _Walk, sensor: str, H: Array, size: int) -> Array:
+        """A sensor's slow error as believed, shape (size,), and its columns in H."""
+        k = self._slow.get(sensor)
+        if k is None:
+            return np.zeros(size)
+        H[:, k : k + size] = np.eye(size)
+        return walk.mean[k + 1 : k + 1 + size]
 
     @staticmethod
     def _heed(walk: _Walk, innovation: Array) -> None:

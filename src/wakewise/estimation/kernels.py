@@ -1,11 +1,12 @@
 """Compiled steps of the error-state filter; see `error_state` for what they mean.
 
-`mean`, shape (41 + n [+ 6],) for n thrusters: position in W (0:3), quaternion q_WB (3:7), twist in B (7:13),
+`mean`, shape (40 + n [+ up to 10],) for n thrusters: position in W (0:3), quaternion q_WB (3:7), twist in B (7:13),
 unmodelled force in W (13:16) and moment in B (16:19), what the current does at rest included (`resting`), gyro bias
 (19:22), accelerometer bias (22:25), current in W (25:28); then by how much of itself the truth differs from the nominal
 in drag (28:34) and inertia (34:40) per degree of freedom and in each thruster's gain (40:40 + n); last, if asked for,
-the camera's slow error: shift in W, turn in B. `P` is the covariance of the error, which has one entry less: position
-in W (0:3), turn, a rotation vector in B (3:6), then as in `mean`, each place one lower.
+the sensors' slow errors: the camera's shift in W and turn in B, the tracking's shift in W, the depth's bias. `P` is the
+covariance of the error, which has one entry less: position in W (0:3), turn, a rotation vector in B (3:6), then as in
+`mean`, each place one lower.
 """
 
 from __future__ import annotations

@@ -57,12 +57,13 @@ class Calibration:
         row[2] = fy
         return np.asarray(pixels_of(row, np.ascontiguousarray(points_C_m - self.X_CM.p_m)))
 
-    def cameras_txt(self) -> str:
-        """Text of a COLMAP cameras.txt."""
+    def cameras_txt(self, note: str | None = None) -> str:
+        """Text of a COLMAP cameras.txt, with a note in place of how good the model is."""
+        good = f"Differs from the rays of the photographs by {self.rms_px:.3g} px rms, {self.max_px:.3g} px at most"
         numbers = " ".join(f"{value:.10g}" for value in self.params)
         return (
             "# CAMERA_ID MODEL WIDTH HEIGHT fx fy cx cy k1 k2 p1 p2\n"
-            f"# Differs from the rays of the photographs by {self.rms_px:.3g} px rms, {self.max_px:.3g} px at most\n"
+            f"# {note or good}\n"
             f"# Projection centre {1000.0 * self.ahead_m:.3f} mm before the lens's pupil\n"
             f"1 OPENCV {self.width} {self.height} {numbers}\n"
         )

@@ -11,8 +11,7 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from wakewise.control import ControlSettings, in_pulses, make_controller
-from wakewise.control.settings import told
+from wakewise.control import in_pulses, make_controller
 from wakewise.errors import InputError
 from wakewise.estimation import ErrorStateFilter
 from wakewise.importers import any_vehicle
@@ -23,9 +22,9 @@ from wakewise.operation.pilots import make_pilot
 from wakewise.operation.preflight import Preflight, preflight
 from wakewise.operation.seeds import Seeds
 from wakewise.operation.surroundings import surroundings_of, tank_bounds
+from wakewise.operation.survey import found_target
 from wakewise.operation.worlds.makers import make_world
 from wakewise.planning import Surroundings
-from wakewise.tank.ambient import mean_current_m_s
 from wakewise.targets import Region, Target, delicacy, find_target, sample_region
 from wakewise.vehicles import Vehicle
 from wakewise.wake import wake_model
@@ -134,32 +133,33 @@ class Parts:
 
     @part
     def target(self) -> Target:
-        """What is looked at, standing on the bed."""
+        """What is looked at, standing on the bed, where it truly is."""
         settings = self.scenario.target
         return find_target(settings.kind, self.scenario.tank.size_m[2], settings.seed, settings.size_m)
 
+    @cached_property
+    def found_target(self) -> Target:
+        """The target where mission, controller and reconstruction take it to be (see `operation.survey`)."""
+        place_rng, _ = self.seeds.survey()
+        return found_target(self.target, self.scenario.survey, place_rng)
+
     @part
     def region(self) -> Region:
-        """Points that stand for the water round the target."""
+        """Points that stand for the water round the target, where it is taken to be."""
         settings = self.scenario.target
         gain = settings.delicate_gain
-        marks = delicacy(self.target.mesh) if gain > 0.0 else None
-        return sample_region(self.target, settings.points, self.seeds.region(), marks, gain)
+        marks = delicacy(self.found_target.mesh) if gain > 0.0 else None
+        return sample_region(self.found_target, settings.points, self.seeds.region(), marks, gain)
 
     @part
     def route(self) -> Route:
         """Where the camera is wished to be, when, and when the shutter opens."""
-        return plan_route(self.target.centre_W_m, self.scenario.mission)
+        return plan_route(self.found_target.centre_W_m, self.scenario.mission)
 
     @part
     def pilot(self) -> Pilot:
         """Where goals come from: by default the route, by the clock."""
         return make_pilot(self)
-
-    @cached_property
-    def control(self) -> ControlSettings:
-        """What the controllers are told: the scenario's settings with the current as measured before the flight."""
-        return told(self.scenario.control, mean_current_m_s(self.scenario.tank, self.route.duration_s))
 
     @part
     def wake(self) -> WakeModel:
@@ -169,13 +169,18 @@ class Parts:
     @part
     def surroundings(self) -> Surroundings:
         """What a planner keeps clear of."""
-        return surroundings_of(self.scenario, self.target)
+        return surroundings_of(self.scenario, self.found_target)
 
     @part
     def controller(self) -> Controller[Any]:
         """From an estimate and a goal to thrusts."""
         return make_controller(
-            self.scenario.method, self.vehicle, self.region, self.wake, self.control, self.surroundings
+            self.scenario.method,
+            self.vehicle,
+            self.region,
+            self.wake,
+            self.scenario.control,
+            self.surroundings,
         )
 
     @part
@@ -216,7 +221,7 @@ class Parts:
     @cached_property
     def flying(self) -> Controller[Any]:
         """The controller as it is flown: one from outside has a guard round it, small thrusts are sent as pulses."""
-        return in_pulses(guarded(self), self.vehicle, self.control.pulse_s)
+        return in_pulses(guarded(self), self.vehicle, self.scenario.control.pulse_s)
 
     @cached_property
     def camera(self) -> PinholeCamera | LensCamera:

@@ -21,6 +21,7 @@ from wakewise.interfaces import no_progress
 from wakewise.operation.parts import Parts
 from wakewise.operation.recorder import ExposureRecord, read_exposures
 from wakewise.operation.scenario import Scenario
+from wakewise.operation.survey import known_calibration
 
 IMAGE_COLUMNS = (
     "name",
@@ -34,12 +35,14 @@ IMAGE_COLUMNS = (
 def photograph_flight(parts: Parts, folder: Path, progress: Callable[..., None] = no_progress) -> None:
     """Render the photographs that are not there yet; images.csv, written last, says that all are.
 
-    cameras.txt (COLMAP) and camera.json hold the camera model; the poses of images.csv are those of its projection
-    centre, which lies off the lens's pupil where a flat port bends the rays.
+    camera.json holds the camera model, cameras.txt (COLMAP) what the crew takes it for; the poses of images.csv are
+    those of its projection centre, which lies off the lens's pupil where a flat port bends the rays.
     """
     exposures = read_exposures(folder / "exposures.npz")
     calibration = calibrate(parts.camera)
     calibration.write(folder)
+    known = known_calibration(calibration, parts.scenario.survey, parts.seeds.survey()[1])
+    write_text(folder / "cameras.txt", known.cameras_txt("As the crew knows it; the true one is in camera.json"))
     rows = []
     for k, exposure in enumerate(exposures):
         name = photo_name(parts.route.exposure_names[k], parts.scenario)

@@ -42,7 +42,7 @@ def preflight(parts: Parts) -> Preflight:
         parts.aim,
         vehicle.size_m,
         parts.bounds,
-        parts.target.mesh.vertices_m,
+        parts.found_target.mesh.vertices_m,
         scenario.mission.clearance_m,
     )
     check_way(parts)

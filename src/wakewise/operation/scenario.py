@@ -20,6 +20,7 @@ from wakewise.missions import MissionSettings
 from wakewise.operation.draws import Draw, values_of
 from wakewise.operation.pilots import PILOTS
 from wakewise.operation.renamed import became
+from wakewise.operation.survey import SurveySettings
 from wakewise.operation.worlds.library import load_world, world_names
 from wakewise.operation.worlds.makers import WORLDS
 from wakewise.plugins import names
@@ -79,6 +80,7 @@ class Scenario(Settings):
     )
     pilot: str = Field("route", description="where goals come from: route, or package.module:make")
     target: TargetSettings = TargetSettings()
+    survey: SurveySettings = SurveySettings()
     mission: MissionSettings = MissionSettings()
     control: ControlSettings = ControlSettings()
     estimation: FilterSettings = FilterSettings()

@@ -40,5 +40,10 @@ class Seeds:
         """Which of its cases the true vehicle's drag is."""
         return np.random.default_rng([self.seed, 12])
 
+    def survey(self) -> tuple[np.random.Generator, np.random.Generator]:
+        """What the crew takes the target's place, and its camera, for."""
+        place, camera = self._child(5).spawn(2)
+        return place, camera
+
     def _child(self, k: int) -> np.random.Generator:
-        return np.random.default_rng(self.seed).spawn(5)[k]
+        return np.random.default_rng(self.seed).spawn(6)[k]

@@ -60,19 +60,6 @@ def build_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSu
     return AmbientSum(parts=tuple(parts))
 
 
-def mean_current_m_s(settings: TankSettings, duration_s: float) -> tuple[float, float, float]:
-    """Mean current of a flight from its start, north, east and down: what a crew measures before it.
-
-    A series is looked at four times a second, for as long as it lasts. Waves, pump and turbulence do not count.
-    """
-    if settings.current.file is None:
-        return settings.current.velocity_m_s
-    series = _current(settings)
-    times = np.arange(0.0, min(duration_s, float(getattr(series, "end_s", math.inf))), 0.25)
-    north, east, down = np.mean([series.velocity(np.zeros((1, 3)), float(t))[0] for t in times], axis=0)
-    return float(north), float(east), float(down)
-
-
 def _current(settings: TankSettings) -> Current:
     """What the settings name in place of a steady current: a series' file, or a current from outside."""
     named = settings.current.file or ""

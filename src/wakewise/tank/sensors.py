@@ -1,6 +1,16 @@
 """Sensors of the simulated vehicle: camera-based pose, optical tracking, inertial unit and pressure, on one clock.
 
-Rates, noise, bias, latency, and poses that fail in turbid water. A camera sees its marks by their contrast, which over
+Rates, noise, latency, errors that last, poses that are far off and poses that fail in turbid water.
+
+What lasts for a while is a stationary first-order Gauss-Markov process per axis (`lasting`), the usual model of a
+sensor's slow error (P. S. Maybeck, Stochastic Models, Estimation, and Control 1, Academic Press 1979, section 4.11).
+Inertial biases walk as those of two sport cameras and of a stereo rig that were carried under water do, by their
+calibrations: 1e-4 and 1.7e-5 rad/s, 6 to 9e-4 and 3e-4 m/s2 per root second (calibration files of SVIn2, S. Rahman,
+A. Quattrini Li, I. Rekleitis, arXiv:1810.03200). Poses that are far off come from marks that are taken for others or
+seen nearly face on, where a flat one has two poses (G. Schweighofer, A. Pinz, IEEE TPAMI 28 (2006) 2024, doi
+10.1109/TPAMI.2006.252); their sizes are estimates.
+
+A camera sees its marks by their contrast, which over
 a path d in water of beam attenuation c falls as exp(-c d) (S. Q. Duntley, Light in the sea, J. Opt. Soc. Am. 53 (1963)
 214, doi 10.1364/JOSA.53.000214); poses begin to fail where less than `LEAST_CONTRAST` of it is left and are lost for
 good at half of that.
@@ -17,8 +27,13 @@ from wakewise.arrays import Array
 from wakewise.compiled import njit
 from wakewise.geometry import Pose
 from wakewise.interfaces import Measurement
-from wakewise.tank.settings import SensorSettings
+from wakewise.tank.lasting import Lasting
+from wakewise.tank.settings import SensorSettings, Span
 
+OUTLIER_M, OUTLIER_RAD = 0.1, 0.2
+"""How far off a pose is that is far off, one sigma per axis."""
+GYRO_WALK_RAD_S, FORCE_WALK_M_S2 = 5e-5, 5e-4
+"""Random walk of the inertial unit's biases in a second, one sigma per axis."""
 LEAST_CONTRAST = 0.1  # an assumption: detectors of printed marks work down to a contrast of some percent to a fifth
 _TICK_TOLERANCE_S = 1e-9  # a sample due at the end of a step belongs to that step
 
@@ -33,8 +48,9 @@ class Sensors:
 
     def __init__(self, settings: SensorSettings, rng: np.random.Generator) -> None:
         self._settings = settings
-        self._pose_rng, imu_rng, self._depth_rng, self._tracking_rng = rng.spawn(4)
+        self._pose_rng, imu_rng, self._depth_rng, self._tracking_rng, lasting_rng = rng.spawn(5)
         self._gyro_rng, self._force_rng = imu_rng.spawn(2)
+        self._draw_lasting(settings, lasting_rng)
         self._gyro_bias_B = self._gyro_rng.normal(0.0, settings.gyro_bias_rad_s, 3)
         self._force_bias_B = self._force_rng.normal(0.0, settings.accelerometer_bias_m_s2, 3)
         self._samplers = (self._pose, self._imu, self._depth, self._tracking)
@@ -48,6 +64,20 @@ class Sensors:
         self._next_s = self._soonest_s()
         self._under_way: list[tuple[float, int, Measurement]] = []
         self._count = 0
+
+    def _draw_lasting(self, s: SensorSettings, rng: np.random.Generator) -> None:
+        """Draw what stays for the flight; every error has a stream of its own."""
+        place, turn, track, when, far, walk, depth = rng.spawn(7)
+
+        def drawn(span: Span, stream: np.random.Generator) -> float:
+            return float(stream.uniform(*span))
+
+        self._place_off = Lasting(drawn(s.pose_slow_m, place), drawn(s.pose_slow_s, place), place)
+        self._turn_off = Lasting(drawn(s.pose_slow_rad, turn), drawn(s.pose_slow_s, turn), turn)
+        self._track_off = Lasting(drawn(s.tracking_slow_m, track), drawn(s.pose_slow_s, track), track)
+        self._stamp_late_s = drawn(s.pose_stamp_late_s, when)
+        self._far_rng, self._walk_rng = far, walk
+        self._depth_bias_m = float(depth.normal(0.0, s.depth_bias_m))
 
     def next_due_s(self) -> float:
         """When the next sample is to be taken; the first ones one period after the start."""
@@ -84,21 +114,31 @@ class Sensors:
             return
         if any(begin <= time_s < end for begin, end in s.pose_outages_s):
             return
-        seen = Pose(state[:3] + shift, _turned(state[3:7], turn))
-        self._send(time_s + s.pose_latency_s, Measurement(time_s=time_s, X_WB=seen))
+        shift, turn = shift + self._place_off.at(time_s), turn + self._turn_off.at(time_s)
+        if self._far_rng.uniform() < s.pose_outliers:
+            shift = shift + self._far_rng.normal(0.0, OUTLIER_M, 3)
+            turn = turn + self._far_rng.normal(0.0, OUTLIER_RAD, 3)
+        seen, arrives_s = Pose(state[:3] + shift, _turned(state[3:7], turn)), time_s + s.pose_latency_s
+        # Nothing is stamped later than it arrives.
+        self._send(arrives_s, Measurement(time_s=min(time_s + self._stamp_late_s, arrives_s), X_WB=seen))
 
     def _imu(self, time_s: float, state: Array, force_B_m_s2: Array, _turbidity: float) -> None:
         s = self._settings
+        step = math.sqrt(1.0 / s.imu_rate_hz)
+        self._gyro_bias_B = self._gyro_bias_B + self._walk_rng.normal(0.0, GYRO_WALK_RAD_S * step, 3)
+        self._force_bias_B = self._force_bias_B + self._walk_rng.normal(0.0, FORCE_WALK_M_S2 * step, 3)
         omega = state[10:] + self._gyro_bias_B + self._gyro_rng.normal(0.0, s.gyro_noise_rad_s, 3)
         force = force_B_m_s2 + self._force_bias_B + self._force_rng.normal(0.0, s.accelerometer_noise_m_s2, 3)
         self._send(time_s, Measurement(time_s=time_s, omega_B_rad_s=omega, force_B_m_s2=force))
 
     def _depth(self, time_s: float, state: Array, _force: Array, _turbidity: float) -> None:
-        depth = float(state[2] + self._depth_rng.normal(0.0, self._settings.depth_noise_m))
+        noise_m = self._depth_rng.normal(0.0, self._settings.depth_noise_m)
+        depth = float(state[2] + self._depth_bias_m + noise_m)
         self._send(time_s, Measurement(time_s=time_s, depth_m=depth))
 
     def _tracking(self, time_s: float, state: Array, _force: Array, _turbidity: float) -> None:
-        place = state[:3] + self._tracking_rng.normal(0.0, self._settings.tracking_noise_m, 3)
+        noise = self._tracking_rng.normal(0.0, self._settings.tracking_noise_m, 3)
+        place = state[:3] + self._track_off.at(time_s) + noise
         self._send(time_s + self._settings.tracking_latency_s, Measurement(time_s=time_s, p_WB_m=place))
 
     def collect(self, time_s: float) -> tuple[Measurement, ...]:

@@ -21,7 +21,7 @@ paper's weights.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -77,6 +77,10 @@ class Region:
     def __post_init__(self) -> None:
         n = len(self.points_W_m)
         freeze(self, points_W_m=(n, 3), weights=(n,), distance_m=(n,))
+
+    def moved(self, shift_W_m: Array) -> Region:
+        """The same points about a target elsewhere, by a shift of shape (3,)."""
+        return replace(self, points_W_m=self.points_W_m + shift_W_m)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

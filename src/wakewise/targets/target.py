@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,6 +37,13 @@ class Target:
 
     def __post_init__(self) -> None:
         freeze(self, centre_W_m=(3,))
+
+    def moved(self, shift_W_m: Array) -> Target:
+        """The same shape elsewhere, by a shift of shape (3,), on the same bed."""
+        if not np.any(shift_W_m):
+            return self
+        mesh = Mesh(self.mesh.vertices_m + shift_W_m, self.mesh.faces)
+        return replace(self, mesh=mesh, centre_W_m=self.centre_W_m + shift_W_m)
 
 
 def place_on_bed(name: str, mesh_up: Mesh, bed_z_m: float, xy_m: Sequence[float] | Array = (0.0, 0.0)) -> Target:

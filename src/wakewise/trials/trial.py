@@ -221,7 +221,8 @@ def write_plan(parts: Parts, folder: Path) -> None:
 def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None]) -> None:
     """Reconstruct from the photographs and the vehicle's own estimates; model.json says how it went.
 
-    Nothing true goes in: pairs, scale and place come from the estimated camera poses, the region from the plan. A model
+    Nothing true goes in: pairs, scale and place come from the estimated camera poses, the region from where the target
+    was taken to be, the lens from the crew's calibration. A model
     that does not come about is a result too, so its reason is kept instead of its figures. That the disk is full is no
     result.
 
@@ -242,7 +243,7 @@ def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None])
             lens=read_lens(folder),
             reference_positions=dict(zip(names, centres, strict=True)),
             reference_rotations=dict(zip(names, rotations, strict=True)),
-            region=(parts.target.centre_W_m, REGION_SHARE * parts.target.radius_m),
+            region=(parts.found_target.centre_W_m, REGION_SHARE * parts.found_target.radius_m),
             progress=progress,
         )
         summary: dict[str, Any] = model.summary()

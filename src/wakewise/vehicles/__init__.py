@@ -20,8 +20,8 @@ from wakewise.vehicles.check import (
     null_space_names,
 )
 from wakewise.vehicles.describe import check_report, describe, summary_line
-from wakewise.vehicles.drag import drag_coefficients, with_drag
 from wakewise.vehicles.draft import ThrusterDraft, VehicleDraft
+from wakewise.vehicles.drag import drag_coefficients, with_drag
 from wakewise.vehicles.dynamics import (
     RigidBody,
     acceleration,
@@ -70,9 +70,9 @@ __all__ = [
     "coriolis_wrench",
     "damping_wrench",
     "describe",
-    "drag_coefficients",
     "draft_names",
     "draft_yaml",
+    "drag_coefficients",
     "failure_rank",
     "failures",
     "load_draft",

@@ -81,7 +81,7 @@ def lattice_world(parts: Parts) -> LatticeWorld:
     """`lattice`: a large-eddy simulation round the target, with the loop closed."""
     route = parts.route
     times_s = np.linspace(0.0, route.duration_s, 200)
-    places = np.array([route.body(float(t), parts.vehicle.X_BC).X_WB.p_m for t in times_s])
+    places = np.array([route.body(float(t), parts.aim).X_WB.p_m for t in times_s])
     return LatticeWorld(
         vehicle=true_vehicle(parts),
         target=parts.target,

@@ -18,7 +18,7 @@ from wakewise.missions.route import rest_to_rest
 from wakewise.operation import Parts, fly
 from wakewise.operation.scenario import Scenario, check_scenario
 from wakewise.operation.seeds import Seeds
-from wakewise.targets import find_target, sample_region
+from wakewise.targets import Region, find_target, sample_region
 from wakewise.vehicles import Vehicle, load_vehicle
 from wakewise.wake import WakeSettings, WakeView, disturbance, wake_model
 
@@ -148,19 +148,19 @@ def gentle_route(
 
 @lru_cache(maxsize=2)
 def paper_place(bed_z_m: float) -> tuple[Any, Any]:
-    """Target and region; the same for all seeds, since the region is the controller's own choice of points."""
+    """Target and the region about it; the same for all seeds, but for where each takes the target to be."""
     scenario = Scenario()
     target = find_target(scenario.target.kind, bed_z_m)
     return target, sample_region(target, scenario.target.points, Seeds(0).region())
 
 
-def true_disturbance(frame: pl.DataFrame, parts: Parts, world: World, rate_hz: float) -> float:
-    """Mean of D in (m/s)^2 of the true thrusts at the true poses, by the model believed in that world.
+def true_disturbance(frame: pl.DataFrame, parts: Parts, region: Region, world: World, rate_hz: float) -> float:
+    """Mean of D in (m/s)^2 of the true thrusts at the true poses about the true target, by the model believed there.
 
     The same yardstick for all methods, whatever each of them weighs itself; looked at five times a second.
     """
     wake = wake_model(WakeSettings(**WAKE_OF[world]))
-    view = WakeView.of(parts.vehicle, parts.region, wake)
+    view = WakeView.of(parts.vehicle, region, wake)
     rows = frame.gather_every(round(0.2 * rate_hz))
     places = rows.select("true_x_m", "true_y_m", "true_z_m").to_numpy()
     turns = rows.select("true_qw", "true_qx", "true_qy", "true_qz").to_numpy()
@@ -196,16 +196,18 @@ def fly_trial(trial: Trial) -> dict[str, float | None]:
     azimuth = float(np.random.default_rng([trial.seed, 7]).uniform(-np.pi, np.pi))
     direction = helped_by(scenario.tank.current.velocity_m_s, azimuth) if trial.with_current else 1.0
     parts = scenario.parts().replace(
-        vehicle=ballasted(load_vehicle(scenario.vehicle), trial.float_N, trial.shift_mm),
-        target=target,
-        region=region,
-        route=gentle_route(target.centre_W_m, trial.standoff_m, azimuth, direction),
+        vehicle=ballasted(load_vehicle(scenario.vehicle), trial.float_N, trial.shift_mm), target=target
+    )
+    found = parts.found_target.centre_W_m
+    parts = parts.replace(
+        region=region.moved(found - target.centre_W_m),
+        route=gentle_route(found, trial.standoff_m, azimuth, direction),
     )
     # The arc passes the target at the mission's own standoff, which the mission's check has seen.
     frame = fly(parts, checked=False, water_every_s=WATER_EVERY_S).steps.filter(pl.col("leg") != SETTLING)
     figures: dict[str, Any] = flight_figures(frame)
     out = {key: figures.get(key) for key in FIGURES}
-    out["disturbance"] = true_disturbance(frame, parts, trial.world, scenario.control.rate_hz)
+    out["disturbance"] = true_disturbance(frame, parts, region, trial.world, scenario.control.rate_hz)
     for leg in ("hover", "orbit"):
         speed = frame.filter(pl.col("leg") == leg)["target_speed_mean_m_s"].mean()
         out[f"{leg}_speed_mean_m_s"] = float(speed)  # type: ignore[arg-type]

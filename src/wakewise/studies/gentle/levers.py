@@ -20,7 +20,7 @@ CONE: Settings = {"wake.model": "paper-calibrated", "wake.edge_width_deg": 3.0}
 """Belief in the paper's cone, much wider than a jet: it stands for where a jet's water may go later."""
 
 PARTS: dict[str, Settings] = {
-    "drift": {"levers.drift": True},
+    "drift": {"levers.drift": True, "levers.spare": True},
     "jets that meet": {"levers.spare": True, "levers.meet": True},
     "floor": {"wake.floor": True, "levers.spare": True},
     "bed points": {"wake.floor": True, "levers.bed": True, "levers.spare": True},

@@ -1,0 +1,59 @@
+"""The water that a method watches now: the region, and what the current, as the estimator finds it, brings to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wakewise.arrays import Array, freeze
+from wakewise.control.levers import LeverSettings, with_drift
+from wakewise.interfaces import BodyState
+from wakewise.targets import Region
+from wakewise.wake.view import WakeView
+
+MOVED_M_S = 0.004
+"""Change of the current at which its points are placed anew: over `DRIFT_S` it is a decimetre, a jet's width there."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Seen:
+    """What is watched for a current, shape (3,)."""
+
+    current_W_m_s: Array
+    view: WakeView
+
+    def __post_init__(self) -> None:
+        freeze(self, current_W_m_s=(3,))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Watch:
+    """A region with what the levers add to it but for drift, the view of it, and the levers."""
+
+    region: Region
+    view: WakeView
+    levers: LeverSettings
+
+    def at(self, seen: Seen | None, estimate: BodyState) -> Seen:
+        """What to watch now: the same as before while the current is about the same.
+
+        The current is the one stated in the levers, else the estimate's; before that is known there is none.
+        """
+        current = self.current_W_m_s(estimate)
+        if seen is not None and float(np.abs(current - seen.current_W_m_s).max()) <= MOVED_M_S:
+            return seen
+        region = with_drift(self.region, current)
+        if region is self.region:
+            return Seen(current_W_m_s=current, view=self.view)
+        view = replace(self.view, points_W_m=region.points_W_m, weights=region.weights)
+        return Seen(current_W_m_s=current, view=view)
+
+    def current_W_m_s(self, estimate: BodyState) -> Array:
+        """Current that is reckoned with, shape (3,); zero where drift does not count or nothing is known."""
+        levers, found = self.levers, estimate.current_W_m_s
+        if not levers.drift:
+            return np.zeros(3)
+        if levers.drift_m_s is not None:
+            return np.array(levers.drift_m_s, dtype=np.float64)
+        return np.zeros(3) if found is None or not np.isfinite(found).all() else found

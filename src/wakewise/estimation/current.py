@@ -1,0 +1,107 @@
+"""The current, from the force that holds the vehicle in it: how fast water must run past to pull as the load does.
+
+At rest a current shows itself as a force that the model does not explain, and so do trim and a cable. Trim pulls
+straight up or down, so the level part of the force is the current's if no cable is out: its drag, by the vehicle's own
+nominal drag, is turned round for a level current. Nothing is said of a current that rises or sinks, which trim cannot
+be told from. A level pull that is no drag, such as a cable's, is taken for a current: 0.3 N look like some 4 cm/s on a
+small vehicle. How sure it is follows from the covariance of the force, in which the thrusters' gains are, and from the
+spread of drag.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wakewise.arrays import Array
+from wakewise.compiled import njit
+from wakewise.estimation.resting import turn
+from wakewise.vehicles.kernels import damping
+
+KNOWN_M_S = 0.02
+"""A current is told once it is known to this, one sigma per axis: half of what runs in a still tank or a calm bay."""
+_START_M_S = 0.1
+_STEP_M_S = 1e-4
+_CLOSE_M_S = 1e-6
+_ROUNDS = 30
+
+
+@njit
+def level_drag(packed: Array, q: Array, north_m_s: float, east_m_s: float) -> tuple[float, float]:
+    """North and east of the force on a vehicle at rest, attitude q, in a level current."""
+    c_B = turn(q, np.array([north_m_s, east_m_s, 0.0]), -1.0)
+    drag = damping(packed, (c_B[0], c_B[1], c_B[2], 0.0, 0.0, 0.0))
+    force = turn(q, np.array([drag[0], drag[1], drag[2]]), 1.0)
+    return force[0], force[1]
+
+
+@njit
+def current_of_force(packed: Array, q: Array, north_N: float, east_N: float) -> Array:
+    """Level current whose drag on a vehicle at rest is a level force, and that drag's slope.
+
+    Newton's method; drag grows ever faster with speed, so it cannot run away.
+
+    Parameters
+    ----------
+    packed : ndarray
+        The vehicle's numbers (see `wakewise.vehicles.kernels`).
+    q : ndarray, shape (4,)
+        Attitude q_WB at rest.
+    north_N, east_N : float
+
+    Returns
+    -------
+    ndarray, shape (6,)
+        North and east in m/s, then d force / d current row by row in N s/m; all NaN where none was found.
+    """
+    size = np.sqrt(north_N**2 + east_N**2)
+    c = np.zeros(2)
+    if size > 0.0:
+        c[0], c[1] = _START_M_S * north_N / size, _START_M_S * east_N / size
+    h = _STEP_M_S
+    answer = np.full(6, np.nan)
+    for _ in range(_ROUNDS):
+        f0, f1 = level_drag(packed, q, c[0], c[1])
+        a0, a1 = level_drag(packed, q, c[0] + h, c[1])
+        b0, b1 = level_drag(packed, q, c[0], c[1] + h)
+        j00, j10, j01, j11 = (a0 - f0) / h, (a1 - f1) / h, (b0 - f0) / h, (b1 - f1) / h
+        det = j00 * j11 - j01 * j10
+        if not det > 1e-12:
+            return answer
+        r0, r1 = north_N - f0, east_N - f1
+        d0, d1 = (j11 * r0 - j01 * r1) / det, (j00 * r1 - j10 * r0) / det
+        c[0] += d0
+        c[1] += d1
+        if d0**2 + d1**2 < _CLOSE_M_S**2:
+            answer[0], answer[1] = c[0], c[1]
+            answer[2], answer[3], answer[4], answer[5] = j00, j01, j10, j11
+            return answer
+    return answer
+
+
+def told_current(
+    packed: Array, rest_q: Array, force_W_N: Array, force_covariance: Array, drag_std: float
+) -> tuple[Array, Array] | None:
+    """Level current and its covariance, shapes (3,) and (3, 3), or None while it is not known to `KNOWN_M_S`.
+
+    Parameters
+    ----------
+    packed : ndarray
+        The nominal vehicle's numbers.
+    rest_q : ndarray, shape (4,)
+        Attitude that the force is told for.
+    force_W_N, force_covariance : ndarray, shape (3,) and (3, 3)
+        Force at rest that the model does not explain, and how sure that is.
+    drag_std : float
+        Relative error of the drag.
+    """
+    found = current_of_force(packed, rest_q, float(force_W_N[0]), float(force_W_N[1]))
+    if not np.isfinite(found).all():
+        return None
+    level, slope = found[:2], np.linalg.inv(found[2:].reshape(2, 2))
+    spread = slope @ force_covariance[:2, :2] @ slope.T
+    if not 0.5 * float(np.trace(spread)) <= KNOWN_M_S**2:
+        return None
+    current, covariance = np.zeros(3), np.zeros((3, 3))
+    current[:2] = level
+    covariance[:2, :2] = spread + drag_std**2 * np.outer(level, level)
+    return current, covariance
