@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from wakewise.control import ControlSettings, make_controller
-from wakewise.control.settings import told
+from wakewise.control.settings import flown_by, told
 from wakewise.errors import InputError
 from wakewise.estimation import ErrorStateFilter
 from wakewise.importers import any_vehicle
@@ -154,8 +154,9 @@ class Parts:
 
     @cached_property
     def control(self) -> ControlSettings:
-        """What the controllers are told: the scenario's settings with the current as measured before the flight."""
-        return told(self.scenario.control, mean_current_m_s(self.scenario.tank, self.route.duration_s))
+        """What the controllers are told: the scenario's settings, the current measured before the flight, who flies."""
+        settings = flown_by(self.scenario.control, int(self.seeds.person().integers(2**32)))
+        return told(settings, mean_current_m_s(self.scenario.tank, self.route.duration_s))
 
     @part
     def wake(self) -> WakeModel:

@@ -36,5 +36,9 @@ class Seeds:
         """Noise of the photographs."""
         return self._child(4)
 
+    def person(self) -> np.random.Generator:
+        """Who flies by hand."""
+        return self._child(5)
+
     def _child(self, k: int) -> np.random.Generator:
-        return np.random.default_rng(self.seed).spawn(5)[k]
+        return np.random.default_rng(self.seed).spawn(6)[k]
