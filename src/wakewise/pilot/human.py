@@ -28,7 +28,7 @@ NEUROMUSCULAR_S = 0.1
 LOOK_S = 2.0
 """An axis unseen for this long is as pressing as one that is off by what is let be; estimate."""
 MOST_PRESSING = 3.0
-"""An axis that is off by this many times what is let be is as pressing as can be, so that none is forgotten; estimate."""
+"""An axis off by so many times what is let be is as pressing as can be, so that none is forgotten; estimate."""
 MEMORY_S = 4.0
 """Time over which the size of what is seen is averaged, for its noise; estimate."""
 THUMB_S = 0.25
