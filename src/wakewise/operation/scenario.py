@@ -16,6 +16,7 @@ from wakewise.errors import InputError
 from wakewise.estimation import FilterSettings
 from wakewise.files import write_text
 from wakewise.imaging import ImagingSettings
+from wakewise.imaging.settings import CAMERAS
 from wakewise.missions import MissionSettings
 from wakewise.operation.pilots import PILOTS
 from wakewise.operation.renamed import became
@@ -136,7 +137,7 @@ class Scenario(Settings):
         tree = self.model_dump()
         for name, value in changes.items():
             new = value.model_dump() if isinstance(value, BaseModel) else value
-            tree = _merged(tree, _with_silt(_nested(name, new)))
+            tree = _merged(tree, _with_camera(_with_silt(_nested(name, new))))
         return check_scenario(tree, "scenario")
 
     def parts(self) -> Parts:
@@ -149,8 +150,9 @@ class Scenario(Settings):
 def load_scenario(preset: str | None, path: Path | None, overrides: dict[str, Any]) -> Scenario:
     """Lay a scenario file over a preset and the overrides over both, then check the whole.
 
-    A kind of silt (`tank.silt.kind`) sets load and grains: they replace those of the layers below it, where a scenario
-    that a trial left behind spells them out, and yield to what its own layer, or one above, says of them.
+    A kind of silt (`tank.silt.kind`) sets load and grains, one of camera (`imaging.kind`) its fields: they replace
+    those of the layers below it, where a scenario that a trial left behind spells them out, and yield to what its own
+    layer, or one above, says of them.
 
     Parameters
     ----------
@@ -181,7 +183,7 @@ def load_scenario(preset: str | None, path: Path | None, overrides: dict[str, An
         changes = _merged(changes, _nested(name, value))
     tree: dict[str, Any] = {}
     for layer in (*layers, changes):
-        tree = _merged(tree, _with_silt(layer))
+        tree = _merged(tree, _with_camera(_with_silt(layer)))
     return check_scenario(tree, source)
 
 
@@ -288,6 +290,16 @@ def _with_silt(layer: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(tank, dict) or not isinstance(silt, dict) or not isinstance(silt.get("kind"), str):
         return layer
     return layer | {"tank": tank | {"silt": SILTS.get(silt["kind"], {}) | silt}}
+
+
+def _with_camera(layer: dict[str, Any]) -> dict[str, Any]:
+    """The same for its kind of camera; `still` takes back what another kind had set."""
+    imaging = layer.get("imaging")
+    if not isinstance(imaging, dict) or not isinstance(imaging.get("kind"), str):
+        return layer
+    fields, own = ImagingSettings.model_fields, {name for kind in CAMERAS.values() for name in kind}
+    usual = {name: fields[name].default for name in own}
+    return layer | {"imaging": usual | CAMERAS.get(imaging["kind"], {}) | imaging}
 
 
 def _nested(dotted: str, value: Any) -> dict[str, Any]:
