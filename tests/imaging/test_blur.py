@@ -6,7 +6,7 @@ from imaging_helpers import box_scene, coral_scene, view
 
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_from_rotvec
-from wakewise.imaging import LensCamera, Lights, PinholeCamera, motion_blur, motion_px, pose_at, render
+from wakewise.imaging import LensCamera, Lights, PinholeCamera, Shutter, motion_blur, motion_px, pose_at, render
 
 LIGHTS = Lights(lamp=0.0, lamps_C_m=np.zeros((0, 3)))
 CAMERA = PinholeCamera(400, 300, 2 * np.arctan(200 / 480))  # the middle of a photograph 960 px wide at 90 deg
@@ -131,3 +131,67 @@ def test_pose_at_ends_and_between():
     assert np.allclose(quarter.q, quat_from_rotvec([0, 0, 0.05]), atol=1e-9)
     with pytest.raises(InputError, match="exposure"):
         pose_at([], 0.5)
+
+
+def by_rows(scene, poses, shutter, frames, rows):
+    """Truth of a rolling shutter: each band of rows is cut from renders at the poses of its own time."""
+    truth = np.empty((CAMERA.height, CAMERA.width, 3))
+    for top in range(0, CAMERA.height, rows):
+        instants = [shutter.fraction((top + 0.5 * rows) / CAMERA.height, (k + 0.5) / frames) for k in range(frames)]
+        seen = [render(scene, CAMERA, pose_at(poses, at), LIGHTS).radiance[top : top + rows] for at in instants]
+        truth[top : top + rows] = np.mean(seen, axis=0)
+    return truth
+
+
+@pytest.mark.parametrize(
+    ("shift", "turn", "shutter", "frames"),
+    [
+        ((0.008, 0.0, 0.0), (0, 0, 0), Shutter(open=0.01, rolling=0.99), 1),
+        ((0.0, 0.008, 0.008), (0.004, 0.016, 0.02), Shutter(open=0.4, rolling=0.6), 6),
+    ],
+    ids=["skew alone", "skew and blur"],
+)
+def test_a_rolling_shutter_agrees_with_true_renders_of_its_rows(shift, turn, shutter, frames):
+    """Rows warped to their own time are as they were rendered there, within a fifth of the error of one instant."""
+    scene, target = coral_scene()
+    poses = moving(view(40, centre=target.centre_W_m), shift, turn)
+    truth = by_rows(scene, poses, shutter, frames, rows=20)
+    middle = render(scene, CAMERA, pose_at(poses, 0.5), LIGHTS)
+    rolled = motion_blur(middle.radiance, middle.depth_m, CAMERA, poses, shutter)
+    # The middle of each band is where truth and rows are of the same instant.
+    inner = np.array([y for y in range(12, 288) if y % 20 in (9, 10)])
+    columns = np.s_[12:-12]
+    sharp_error = np.sqrt(np.mean((middle.radiance[inner, columns] - truth[inner, columns]) ** 2))
+    roll_error = np.sqrt(np.mean((rolled[inner, columns] - truth[inner, columns]) ** 2))
+    assert roll_error < 0.2 * sharp_error, (roll_error, sharp_error)
+
+
+def test_a_sideways_step_skews_the_picture():
+    """A post under a rolling shutter leans by the motion between its rows; the middle row stays where it was."""
+    image = np.zeros((300, 400, 3), np.float32)
+    image[:, 180:220] = 1.0
+    depth = np.full((300, 400), 0.5, np.float32)
+    poses = moving(view(), (0.01, 0.0, 0.0), (0, 0, 0))
+    rolled = motion_blur(image, depth, CAMERA, poses, Shutter(open=1e-3, rolling=0.999))[..., 0]
+    place = rolled @ (np.arange(400) + 0.5) / rolled.sum(axis=1)
+    lean = np.polyfit(np.arange(300) + 0.5 - 150.0, place - 200.0, 1)
+    motion = CAMERA.focal_px * 0.01 / 0.5
+    assert lean[0] * 300.0 == pytest.approx(-0.999 * motion, rel=0.01)
+    assert lean[1] == pytest.approx(0.0, abs=0.05)
+
+
+def test_a_rolling_shutter_of_no_readout_is_a_global_one():
+    """Open for all of the time and rolling not at all, rows give what whole frames give."""
+    scene, target = coral_scene()
+    poses = moving(view(40, centre=target.centre_W_m), (0.006, 0.0, 0.0), (0, 0, 0.01))
+    middle = render(scene, CAMERA, pose_at(poses, 0.5), LIGHTS)
+    whole = motion_blur(middle.radiance, middle.depth_m, CAMERA, poses)
+    rows = motion_blur(middle.radiance, middle.depth_m, CAMERA, poses, Shutter(open=1.0, rolling=1e-9))
+    assert np.sqrt(np.mean((rows - whole) ** 2)) < 0.02 * float(np.std(middle.radiance))
+
+
+def test_a_shutter_cannot_be_open_for_longer_than_there_are_poses():
+    """Shares that are zero or add up to more than all are refused."""
+    for wrong in ({"open": 0.0}, {"open": 0.7, "rolling": 0.4}, {"rolling": -0.1}):
+        with pytest.raises(InputError, match="shutter"):
+            Shutter(**wrong)

@@ -28,6 +28,10 @@ from wakewise.imaging.optics import water_types
         ("port_air_m", -0.01),
         ("photo_format", "gif"),
         ("jpeg_quality", 0),
+        ("kind", "polaroid"),
+        ("readout_s", -0.01),
+        ("exposure_most_s", 0.0),
+        ("amplification_most", 0.5),
     ],
 )
 def test_bad_values_are_refused(field, value):
@@ -56,3 +60,23 @@ def test_settings_choose_the_lens():
     assert behind.fov_rad == pytest.approx(math.radians(75))
     with pytest.raises(InputError, match="flat port"):
         ImagingSettings(fov_deg=100.0, port_air_m=0.02).camera()
+
+
+def test_a_kind_of_camera_fills_in_what_is_not_given():
+    """`rov-video` rolls, exposes automatically and compresses; what is given beside it stands."""
+    plain, own = ImagingSettings(kind="rov-video"), ImagingSettings(kind="rov-video", readout_s=0.0, fov_deg=70.0)
+    assert (plain.readout_s, plain.auto_exposure, plain.photo_format, plain.fov_deg) == (0.032, True, "jpeg", 80.0)
+    assert (own.readout_s, own.fov_deg, own.auto_exposure) == (0.0, 70.0, True)
+    assert ImagingSettings(kind="still") == ImagingSettings()
+
+
+def test_rows_see_within_the_window():
+    """Exposure and readout fill the window of a fixed exposure; a shorter one that was chosen lies in its middle."""
+    rolling = ImagingSettings(exposure_s=0.01, readout_s=0.03)
+    assert rolling.window_s == pytest.approx(0.04)
+    shutter = rolling.shutter()
+    assert (shutter.open, shutter.rolling) == pytest.approx((0.25, 0.75))
+    assert (shutter.fraction(0.0, 0.0), shutter.fraction(1.0, 1.0)) == pytest.approx((0.0, 1.0))
+    auto = ImagingSettings(kind="rov-video").shutter(0.01)
+    assert auto.fraction(0.5, 0.5) == 0.5 and 0.0 < auto.fraction(0.0, 0.0) < auto.fraction(0.0, 1.0)
+    assert ImagingSettings().window_s == ImagingSettings().exposure_s and ImagingSettings().shutter().rolling == 0.0

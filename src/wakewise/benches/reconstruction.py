@@ -63,7 +63,7 @@ def model_coral(scenario: Scenario, folder: Path, options: BenchOptions) -> dict
     """Photograph a scenario's target from its planned orbits, then model and judge it in a process of its own."""
     target = scenario.parts().target
     rng = np.random.default_rng(scenario.seed)
-    views = planned_views(target, scenario.mission, scenario.imaging.exposure_s, rng)
+    views = planned_views(target, scenario.mission, scenario.imaging.window_s, rng)
     write_photos(folder, views, None, scenario.imaging, target, seed=scenario.seed, progress=options.progress)
     alone = scenario.reconstruction.model_copy(update={"mapper": "incremental", "mesh": False})
     found, before = (_in_a_process(scenario, folder, settings) for settings in (scenario.reconstruction, alone))

@@ -1,6 +1,7 @@
 """Methods by name: what each cares for, and how one is made, ours or one from outside.
 
 - `dp`: dynamic positioning, a PID with the least thrusts.
+- `manual`: a person at two sticks, with the autopilot that such vehicles have (see `wakewise.pilot`).
 - `pseudo-inverse`: the motion of `wake-aware`, wrench for wrench, made with the least thrusts (an ablation).
 - `unaware`: the planner without a disturbance term.
 - `smooth`: the same with a price on change of thrust.
@@ -17,6 +18,7 @@ from typing import Any, cast
 
 from wakewise.control.dynamic_positioning import dynamic_positioning
 from wakewise.control.instant import instant
+from wakewise.control.manual import manual
 from wakewise.control.pseudo_inverse import planned_pseudo_inverse
 from wakewise.control.settings import ControlSettings
 from wakewise.control.unaware import smooth, unaware
@@ -56,6 +58,7 @@ Maker = Callable[[Vehicle, Region, WakeModel, ControlSettings, Surroundings | No
 
 MAKERS: dict[str, Maker] = {
     "dp": dynamic_positioning,
+    "manual": manual,
     "pseudo-inverse": planned_pseudo_inverse,
     "unaware": unaware,
     "smooth": smooth,

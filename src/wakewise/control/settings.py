@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import Field
 
 from wakewise.control.levers import LeverSettings
+from wakewise.pilot.settings import PersonSettings
 from wakewise.planning.problem import DISTURBANCE_WEIGHT, EFFORT_WEIGHT, PlanSettings
 from wakewise.settings import Settings
 from wakewise.wake import WakeSettings
@@ -69,3 +70,12 @@ class ControlSettings(Settings):
     levers: LeverSettings = Field(
         default=LeverSettings(), description="what `wake-aware` and `instant` use beyond the free jet"
     )
+    person: PersonSettings = Field(default=PersonSettings(), description="who flies `manual`, and the pilot `human`")
+
+
+def flown_by(settings: ControlSettings, seed: int) -> ControlSettings:
+    """The settings with the seed of the person who flies, unless they name another."""
+    person = settings.person
+    if person.seed is not None:
+        return settings
+    return settings.model_copy(update={"person": person.model_copy(update={"seed": seed})})

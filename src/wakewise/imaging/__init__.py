@@ -7,7 +7,8 @@ poses, the true silt and a seed.
 Start reading in `photograph.py` (one photograph, step by step) and `scene.py` (what stands there). `camera.py`,
 `lens.py` and `camera_model.py` are the camera, also behind a flat port; `renderer.py`, `shading.py`, `texture.py`,
 `lighting.py`, `panels.py` and `daylight.py` the picture without water, `bed_view.py`, `height_field.py` and
-`nearby.py` what makes it fast; `optics.py` and `particles.py` the water, `blur.py` and `sensor.py` the exposure.
+`nearby.py` what makes it fast; `optics.py` and `particles.py` the water, `metering.py`, `blur.py` and `sensor.py` the
+exposure.
 """
 
 from typing import TYPE_CHECKING
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING
 from wakewise.doors import lazy_door
 
 if TYPE_CHECKING:
-    from wakewise.imaging.blur import motion_blur, motion_px, pose_at
+    from wakewise.imaging.blur import Shutter, motion_blur, motion_px, pose_at
     from wakewise.imaging.camera import Camera, FlatPort, LensCamera, PinholeCamera
     from wakewise.imaging.camera_model import Calibration, calibrate
     from wakewise.imaging.optics import SiltOptics, WaterOptics, haze_between, through_water, water_optics, water_types
@@ -37,6 +38,7 @@ __all__ = [
     "PinholeCamera",
     "Render",
     "Scene",
+    "Shutter",
     "SiltOptics",
     "WaterOptics",
     "calibrate",

@@ -3,12 +3,15 @@
 Every pixel's depth is known, so the motion field is exact for what the middle view sees: a frame taken at another
 instant is the middle frame moved by it. The photograph is the mean of such frames. Strips that only the other frames
 see, behind an edge or outside of the image, are filled with the nearest thing seen.
+
+A rolling shutter opens row by row, the top row first: each row is the mean of frames over its own time.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -53,7 +56,35 @@ def motion_px(camera: Camera, poses: Sequence[Pose], depth_m: float) -> float:
     return float(np.nanmax(path, initial=0.0))
 
 
-def motion_blur(image: Image, depth_m: Image, camera: Camera, poses: Sequence[Pose]) -> Image:
+@dataclass(frozen=True, kw_only=True)
+class Shutter:
+    """When rows see, as shares of the time that the poses span: one row for `open`, the rows begin over `rolling`.
+
+    A global shutter is open for all of it. What the two leave lies half before and half after, so that the row in the
+    middle is always exposed about the middle.
+    """
+
+    open: float = 1.0
+    rolling: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (self.open > 0.0 and self.rolling >= 0.0 and self.open + self.rolling <= 1.0 + 1e-9):
+            raise InputError(
+                f"shutter: open {self.open:g}, rolling {self.rolling:g}, must be more than 0 and at least 0, together 1"
+            )
+
+    def fraction(self, row: float, within: float) -> float:
+        """Share of the time that has passed when `within` of the exposure of a row is, `row` from 0, top, to 1."""
+        return 0.5 + self.rolling * (row - 0.5) + self.open * (within - 0.5)
+
+
+GLOBAL = Shutter()
+"""All rows at once, over all of the time."""
+
+
+def motion_blur(
+    image: Image, depth_m: Image, camera: Camera, poses: Sequence[Pose], shutter: Shutter = GLOBAL
+) -> Image:
     """Average the frames of an exposure, each warped from the one at its middle.
 
     Parameters
@@ -64,7 +95,9 @@ def motion_blur(image: Image, depth_m: Image, camera: Camera, poses: Sequence[Po
         Depth along the optical axis, infinite where nothing is seen.
     camera : Camera
     poses : sequence of Pose
-        X_WC evenly spaced over the exposure, the first and last at its ends.
+        X_WC evenly spaced over the exposure and the readout, the first and last at its ends.
+    shutter : Shutter
+        Which part of that time each row sees.
 
     Returns
     -------
@@ -76,6 +109,8 @@ def motion_blur(image: Image, depth_m: Image, camera: Camera, poses: Sequence[Po
     motion = motion_px(camera, poses, min(near, 1e3))
     if motion < STILL_PX:
         return image
+    if shutter != GLOBAL:
+        return _by_rows(image, depth_m, camera, poses, shutter, motion)
     # An odd number, so that the middle frame is the view itself.
     frames = int(np.clip(2 * math.ceil(0.5 * (motion / STEP_PX - 1.0)) + 1, 3, MOST_FRAMES))
     middle = pose_at(poses, 0.5)
@@ -91,6 +126,34 @@ def motion_blur(image: Image, depth_m: Image, camera: Camera, poses: Sequence[Po
     in_threads(
         lambda first: _average(first, min(first + BAND_ROWS, h), out, planes, depth_m, turns, shifts, lens), bands
     )
+    return out
+
+
+TABLE = 33
+"""Instants at which the camera's motion is tabled for a rolling shutter; between them it is a straight line, which at
+half a degree over the whole leaves 1e-8 of a pixel's focal length."""
+
+
+def _by_rows(
+    image: Image, depth_m: Image, camera: Camera, poses: Sequence[Pose], shutter: Shutter, motion: float
+) -> Image:
+    """`motion_blur` of a shutter that rolls, or that is open for a part of the time only."""
+    frames = int(np.clip(math.ceil(motion * shutter.open / STEP_PX), 1, MOST_FRAMES))
+    middle = pose_at(poses, 0.5)
+    turns, shifts = np.empty((TABLE, 3, 3)), np.empty((TABLE, 3))
+    for k in range(TABLE):
+        X_KM = pose_at(poses, k / (TABLE - 1)).inverse() @ middle
+        turns[k], shifts[k] = X_KM.R, X_KM.p_m
+    out, planes = np.empty_like(image), np.empty((3, *depth_m.shape), np.float32)
+    lens, h = np.append(camera.row, 1.0 / camera.row[1:3]), camera.height
+    bands = range(0, h, BAND_ROWS)
+    in_threads(lambda first: _split(first, min(first + BAND_ROWS, h), planes, image), bands)
+
+    def band(first: int) -> None:
+        last = min(first + BAND_ROWS, h)
+        _roll(first, last, frames, shutter.open, shutter.rolling, out, planes, depth_m, turns, shifts, lens)
+
+    in_threads(band, bands)
     return out
 
 
@@ -252,6 +315,43 @@ def _average(first: int, last: int, out: Any, planes: Any, depth_m: Any, turns: 
             if k == frames // 2:
                 continue
             _sources(lens, turns, shifts, k, y, depth_m, nearness, qx, qy)
+            for x in range(w):
+                u = min(max(qx[x] - 0.5, 0.0), w - 1.0)
+                v = min(max(qy[x] - 0.5, 0.0), h - 1.0)
+                columns[x], rows[x] = int(u), int(v)
+                across[x] = u - columns[x]
+                down[0, x], down[1, x], down[2, x], down[3, x] = _cubic(np.float32(v - rows[x]))
+            _add_frame(totals, planes, columns, rows, across, down)
+        for x in range(w):
+            for c in range(3):
+                out[y, x, c] = max(totals[c, x], dark) * share
+
+
+@njit(nogil=True)
+def _roll(
+    first: int, last: int, frames: int, share_open: float, rolling: float, out: Any, planes: Any, depth_m: Any,
+    turns: Any, shifts: Any, lens: Any,
+) -> None:  # fmt: skip
+    """As `_average`, each row over its own time, from motion tabled over all of it, turns (n, 3, 3), shifts (n, 3)."""
+    h, w = depth_m.shape
+    n = turns.shape[0]
+    totals, down = np.empty((3, w), np.float32), np.empty((4, w), np.float32)
+    qx, qy, nearness = np.empty(w), np.empty(w), np.empty(w)
+    columns, rows, across = np.empty(w, np.int64), np.empty(w, np.int64), np.empty(w, np.float32)
+    turn, shift = np.empty((1, 3, 3)), np.empty((1, 3))
+    share, dark = np.float32(1.0 / frames), np.float32(0.0)
+    for y in range(first, last):
+        totals[:] = dark
+        for k in range(frames):
+            at = 0.5 + rolling * ((y + 0.5) / h - 0.5) + share_open * ((k + 0.5) / frames - 0.5)
+            place = min(max(at, 0.0), 1.0) * (n - 1)
+            j = min(int(place), n - 2)
+            t = place - j
+            for a in range(3):
+                shift[0, a] = (1.0 - t) * shifts[j, a] + t * shifts[j + 1, a]
+                for b in range(3):
+                    turn[0, a, b] = (1.0 - t) * turns[j, a, b] + t * turns[j + 1, a, b]
+            _sources(lens, turn, shift, 0, y, depth_m, nearness, qx, qy)
             for x in range(w):
                 u = min(max(qx[x] - 0.5, 0.0), w - 1.0)
                 v = min(max(qy[x] - 0.5, 0.0), h - 1.0)

@@ -15,7 +15,7 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.compiled import njit, prange
 from wakewise.geometry import Pose
-from wakewise.imaging.blur import pose_at
+from wakewise.imaging.blur import GLOBAL, Shutter, pose_at
 from wakewise.imaging.camera import Camera
 from wakewise.imaging.optics import WaterOptics, sample_grid
 from wakewise.imaging.renderer import LAMP_REFERENCE_M, Image, Lights
@@ -30,6 +30,8 @@ FOCUS_M = 0.5
 REFLECTANCE = 0.5
 STEPS = 9
 """Instants at which a streak is drawn."""
+BANDS = 16
+"""Of rows, within which flakes see a rolling shutter open at one time."""
 
 
 def flake_positions(
@@ -77,6 +79,7 @@ def draw_flakes(
     water: WaterOptics,
     lights: Lights,
     rng: np.random.Generator,
+    shutter: Shutter = GLOBAL,
 ) -> Image:
     """Lay flakes over a photograph, each a soft disk, streaked by the camera's motion; returns a new image.
 
@@ -102,12 +105,25 @@ def draw_flakes(
 
     middle = pose_at(poses, 0.5)
     points_W = middle.apply(points_C_m)
-    track = np.stack(
-        [camera.project(pose_at(poses, (k + 0.5) / STEPS).inverse().apply(points_W)) for k in range(STEPS)], axis=1
-    )
+    track = _tracks(camera, poses, points_W, camera.project(points_C_m)[:, 1] / camera.height, shutter)
     out = image.copy()
     _splat(out, depth_m, np.nan_to_num(track, nan=-1e6), z, radius, cover, colour)
     return out
+
+
+def _tracks(camera: Camera, poses: Sequence[Pose], points_W_m: Array, rows: Array, shutter: Shutter) -> Array:
+    """Pixels of points, shape (n, 3), while their rows, shape (n,), 0 top to 1, are exposed, shape (n, STEPS, 2)."""
+    track = np.empty((len(points_W_m), STEPS, 2))
+    bands = (
+        np.clip((rows * BANDS).astype(np.int64), 0, BANDS - 1) if shutter.rolling > 0.0 else np.zeros(len(rows), int)
+    )
+    for band in np.unique(bands):
+        here = bands == band
+        row = (band + 0.5) / BANDS
+        for k in range(STEPS):
+            pose = pose_at(poses, shutter.fraction(row, (k + 0.5) / STEPS))
+            track[here, k] = camera.project(pose.inverse().apply(points_W_m[here]))
+    return track
 
 
 @njit(parallel=True)

@@ -9,10 +9,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.imaging.blur import motion_blur, pose_at
 from wakewise.imaging.camera import Camera
+from wakewise.imaging.metering import Chosen, automatic
 from wakewise.imaging.optics import SiltOptics, haze_between, through_water
 from wakewise.imaging.particles import draw_flakes, flake_positions
 from wakewise.imaging.renderer import Image, Render, render
@@ -30,12 +32,15 @@ class Photo:
     """A photograph and what is known about it.
 
     `image` (h, w, 3) uint8 RGB; `sharpness` see `sharpness`, None if the target is not in view; `turbidity_per_m` mean
-    attenuation by silt along the rays to the target, or over the whole image if the target is not in view.
+    attenuation by silt along the rays to the target, or over the whole image if the target is not in view; `exposure_s`
+    and `gain`, the signal of a white card in unit light, as they were set or chosen.
     """
 
     image: NDArray[np.uint8]
     sharpness: float | None
     turbidity_per_m: float
+    exposure_s: float
+    gain: float
 
 
 def photograph(
@@ -46,6 +51,7 @@ def photograph(
     settings: ImagingSettings,
     rng: np.random.Generator,
     grains: SiltOptics | None = None,
+    before: Sequence[Pose] = (),
 ) -> Photo:
     """Take one photograph.
 
@@ -55,7 +61,8 @@ def photograph(
     camera : Camera
         `settings.camera()`, or another one.
     poses : sequence of Pose
-        True X_WC at instants evenly spaced over the exposure, the first and last at its ends; one means no motion.
+        True X_WC at instants evenly spaced over `settings.window_s`, the exposure and the readout, the first and last
+        at its ends; one means no motion.
     silt : ScalarGrid or None
         Concentration in kg/m3.
     settings : ImagingSettings
@@ -63,6 +70,9 @@ def photograph(
         Draws flakes and noise, nothing else.
     grains : SiltOptics, optional
         What the silt is made of; pale 20 um carbonate mud if not given.
+    before : sequence of Pose
+        True X_WC before, `METERED_EVERY_S` apart, oldest first, for automatic exposure; without them it goes by the
+        photograph's own view.
 
     Raises
     ------
@@ -70,7 +80,17 @@ def photograph(
         If there is no pose, or the silt is negative somewhere.
     """
     view = render(scene, camera, pose_at(poses, 0.5), settings.lights(), settings.samples)
-    return photograph_of(view, camera, poses, silt, settings, rng, grains)
+    chosen = None
+    if settings.auto_exposure:
+        balance = white_balance(settings)
+        views = before or (pose_at(poses, 0.5),)
+        chosen = automatic(scene, views, silt, settings, grains or SiltOptics(), balance)
+    return photograph_of(view, camera, poses, silt, settings, rng, grains, chosen)
+
+
+def white_balance(settings: ImagingSettings) -> Array:
+    """Factors of red, green and blue, shape (3,)."""
+    return np.asarray(np.exp(settings.water().signal_per_m * BALANCE_M))
 
 
 def photograph_of(
@@ -81,24 +101,33 @@ def photograph_of(
     settings: ImagingSettings,
     rng: np.random.Generator,
     grains: SiltOptics | None = None,
+    chosen: Chosen | None = None,
 ) -> Photo:
-    """As `photograph`, from a render of the middle of the exposure that is there already."""
+    """As `photograph`, from a render of the middle of the exposure that is there already.
+
+    Exposure and gain are those `chosen`, or those of the settings.
+    """
+    taken = chosen or Chosen(exposure_s=settings.exposure_s, gain=settings.gain, amplification=1.0)
+    shutter = settings.shutter(taken.exposure_s)
     if silt is not None and silt.values.size and float(silt.values.min()) < 0.0:
         raise InputError(f"silt: concentration {float(silt.values.min()):g} kg/m3, must not be negative")
     middle = pose_at(poses, 0.5)
     lights, water = settings.lights(), settings.water()
     haze = haze_between(camera, middle, water, grains or SiltOptics(), silt, lights)
     radiance, silt_per_m = through_water(view, camera, haze, water, lights.from_above)
-    radiance = motion_blur(radiance, view.depth_m, camera, poses)
+    radiance = motion_blur(radiance, view.depth_m, camera, poses, shutter)
     flakes = flake_positions(camera, middle, silt, settings.flakes_per_m3, FLAKES_PER_KG, rng)
-    radiance = draw_flakes(radiance, view.depth_m, camera, poses, flakes, water, lights, rng)
-    gains = settings.gain * np.exp(water.signal_per_m * BALANCE_M)
-    image = expose(radiance, gains, ELECTRONS_PER_S * settings.exposure_s, READ_NOISE_E, rng)
+    radiance = draw_flakes(radiance, view.depth_m, camera, poses, flakes, water, lights, rng, shutter)
+    # Unamplified, a full well is a saturated signal; amplified, a part of it.
+    well_e = ELECTRONS_PER_S * settings.exposure_s / taken.amplification
+    image = expose(radiance, taken.gain * white_balance(settings), well_e, READ_NOISE_E, rng)
     on_target = view.target_fraction >= 0.5
     return Photo(
         image=image,
         sharpness=sharpness(image, view.target_fraction),
         turbidity_per_m=float(np.mean(silt_per_m[on_target] if on_target.any() else silt_per_m)),
+        exposure_s=taken.exposure_s,
+        gain=taken.gain,
     )
 
 

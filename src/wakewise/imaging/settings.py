@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from wakewise.settings import Settings
 
 if TYPE_CHECKING:
+    from wakewise.imaging.blur import Shutter
     from wakewise.imaging.camera import LensCamera, PinholeCamera
     from wakewise.imaging.optics import WaterOptics
     from wakewise.imaging.renderer import Lights
@@ -23,17 +24,64 @@ LAMP_OFFSET_M = 0.2
 """Distance of each of two lamps to the camera's side: where small vehicles carry them."""
 FLAKES_PER_KG = 1e6
 """Visible flakes per kilogram of suspended silt."""
+METERED, METERED_EVERY_S = 8, 0.1
+"""Views before each photograph that automatic exposure goes by, and the time between them: five of its lags."""
 ELECTRONS_PER_S, READ_NOISE_E = 1.5e6, 4.0
 """Electrons per second at saturation, 12000 in the default exposure, and read noise, rms, of a small CMOS sensor."""
+
+CAMERAS: dict[str, dict[str, Any]] = {
+    "still": {},
+    # Blue Robotics' low-light HD USB camera, what a BlueROV2 carries: Sony IMX322, 1080p at 30/s as H.264, 80 deg
+    # across (maker's page). Readout: 1080 of 1125 lines of a frame of 1/30 s, estimate from the sensor's 1080p mode.
+    "rov-video": {
+        "fov_deg": 80.0,
+        "readout_s": 0.032,
+        "auto_exposure": True,
+        "exposure_most_s": 1.0 / 30.0,
+        "photo_format": "jpeg",
+        "jpeg_quality": 60,
+    },
+    # A GoPro Hero 8 in 4K at 30/s: readout 17 ms (OpenDroneMap's table of rolling shutters; the Hero 4 has 30 ms).
+    # Estimates: 80 deg across behind a flat port, from some 120 deg in air; the quality of its 60 Mbit/s.
+    "action-4k": {
+        "fov_deg": 80.0,
+        "readout_s": 0.017,
+        "auto_exposure": True,
+        "exposure_most_s": 1.0 / 30.0,
+        "photo_format": "jpeg",
+        "jpeg_quality": 75,
+    },
+}
+"""Fields that a kind of camera sets, unless they are given as well. The size of the image is left to the scenario, as
+time grows with it (they have 1920 x 1080 and 3840 x 2160 px). Frames of compressed video are JPEGs of 4:2:0 colour, a
+stand-in for H.264: its blocks and its loss of fine detail, not its memory of the frames before."""
 
 
 class ImagingSettings(Settings):
     """Camera, light, water and sensor of the simulated photographs."""
 
+    kind: Literal["still", "rov-video", "action-4k"] = Field(
+        "still", description="sets view, readout, automatic exposure and compression, unless they are given too"
+    )
     width: int = Field(960, description="image width, px", ge=16, le=8192)
     height: int = Field(720, description="image height, px", ge=16, le=8192)
     fov_deg: float = Field(90.0, description="horizontal field of view in water, deg", ge=10.0, le=150.0)
     exposure_s: float = Field(0.008, description="time the shutter is open, s", gt=0.0, le=1.0)
+    readout_s: float = Field(
+        0.0, description="from the first row's exposure to the last's, s; 0 = global shutter", ge=0.0, le=0.2
+    )
+    auto_exposure: bool = Field(
+        False, description="choose exposure and gain by what is seen; exposure_s and gain are then the base sensitivity"
+    )
+    exposure_most_s: float = Field(
+        0.03,
+        description="longest exposure that is chosen automatically, s; darker scenes are amplified",
+        gt=0.0,
+        le=1.0,
+    )
+    amplification_most: float = Field(
+        8.0, description="most amplification that is chosen automatically, 1 = none", ge=1.0, le=100.0
+    )
     instants: int = Field(5, description="true camera poses kept across each exposure, for motion blur", ge=2, le=101)
     samples: int = Field(2, description="rays across a pixel (squared in all) on target and edges", ge=1, le=8)
     distortion: tuple[float, float, float, float] = Field(
@@ -55,6 +103,28 @@ class ImagingSettings(Settings):
     flakes_per_m3: float = Field(1500.0, description="visible flakes in clear water, 1/m3", ge=0.0, le=1e6)
     photo_format: Literal["png", "jpeg"] = Field("png", description="how photographs are stored")
     jpeg_quality: int = Field(92, description="quality of photographs stored as JPEG", ge=1, le=100)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_its_kind_has_it(cls, given: Any) -> Any:
+        """Fill in what the kind says and the user does not."""
+        if isinstance(given, dict) and isinstance(given.get("kind"), str):
+            return CAMERAS.get(given["kind"], {}) | given
+        return given
+
+    @property
+    def window_s(self) -> float:
+        """From when the first row may open to when the last has closed."""
+        return (self.exposure_most_s if self.auto_exposure else self.exposure_s) + self.readout_s
+
+    def shutter(self, exposure_s: float | None = None) -> Shutter:
+        """When rows see, within `window_s`; for an exposure that was chosen, else for the one that is set."""
+        from wakewise.imaging.blur import GLOBAL, Shutter
+
+        if self.readout_s == 0.0 and not self.auto_exposure:
+            return GLOBAL
+        exposure_s = self.exposure_s if exposure_s is None else exposure_s
+        return Shutter(open=exposure_s / self.window_s, rolling=self.readout_s / self.window_s)
 
     def camera(self) -> PinholeCamera | LensCamera:
         """Camera of these settings; an ideal one if it has neither distortion nor port.

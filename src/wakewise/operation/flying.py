@@ -14,6 +14,7 @@ import polars as pl
 from wakewise.errors import StageError, WakewiseError
 from wakewise.evaluation import flight_figures
 from wakewise.extras import has
+from wakewise.imaging.settings import METERED
 from wakewise.interfaces import Witness, no_progress
 from wakewise.missions import SETTLING
 from wakewise.operation.loop import Step, run_loop
@@ -145,7 +146,8 @@ def fly(
         route=route,
         X_BC=vehicle.X_BC,
         joint=vehicle.tilt,
-        exposure_s=scenario.imaging.exposure_s,
+        exposure_s=scenario.imaging.window_s,
+        metered=METERED if scenario.imaging.auto_exposure else 0,
         instants=scenario.imaging.instants,
         thrusters=thrusters,
         dt_s=dt_s,

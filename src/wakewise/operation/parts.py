@@ -11,7 +11,8 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from wakewise.control import in_pulses, make_controller
+from wakewise.control import ControlSettings, in_pulses, make_controller
+from wakewise.control.settings import flown_by
 from wakewise.errors import InputError
 from wakewise.estimation import ErrorStateFilter
 from wakewise.importers import any_vehicle
@@ -161,6 +162,11 @@ class Parts:
         """Where goals come from: by default the route, by the clock."""
         return make_pilot(self)
 
+    @cached_property
+    def control(self) -> ControlSettings:
+        """What the controllers are told: the scenario's settings, and who flies."""
+        return flown_by(self.scenario.control, int(self.seeds.person().integers(2**32)))
+
     @part
     def wake(self) -> WakeModel:
         """What the controller believes its jets do."""
@@ -179,7 +185,7 @@ class Parts:
             self.vehicle,
             self.region,
             self.wake,
-            self.scenario.control,
+            self.control,
             self.surroundings,
         )
 

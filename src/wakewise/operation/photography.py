@@ -86,7 +86,9 @@ def take_photograph(parts: Parts, folder: Path, number: int, exposure: ExposureR
     rng = parts.seeds.imaging().spawn(len(names))[number]
     grains = SiltOptics(diameter_m=scenario.tank.silt.grain_m, density_kg_m3=scenario.tank.silt.grain_density_kg_m3)
     silt = exposure.silt if float(exposure.silt.values.max(initial=0.0)) > 0.0 else None
-    photo = photograph(parts.scene, parts.camera, exposure.X_WC_true, silt, scenario.imaging, rng, grains)
+    photo = photograph(
+        parts.scene, parts.camera, exposure.X_WC_true, silt, scenario.imaging, rng, grains, exposure.X_WC_before
+    )
     write_image(image, photo.image, scenario.imaging.jpeg_quality)
     noted = {"exposure": mark, "sharpness": photo.sharpness, "turbidity_per_m": photo.turbidity_per_m}
     write_text(note, json.dumps(noted))
@@ -96,7 +98,7 @@ def take_photograph(parts: Parts, folder: Path, number: int, exposure: ExposureR
 def fingerprint(exposure: ExposureRecord) -> str:
     """Digest of all that a photograph's pixels hang on."""
     digest = hashlib.blake2b(digest_size=16)
-    for X_WC in exposure.X_WC_true:
+    for X_WC in (*exposure.X_WC_true, *exposure.X_WC_before):
         digest.update(X_WC.p_m.tobytes() + X_WC.q.tobytes())
     silt = exposure.silt
     digest.update(np.array([silt.spacing_m, *silt.origin_W_m, *silt.values.shape]).tobytes() + silt.values.tobytes())

@@ -6,6 +6,7 @@ timings.parquet. Column names carry units; frames and meanings are in docs/conve
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -17,6 +18,7 @@ import polars as pl
 from wakewise.arrays import Array
 from wakewise.files import whole_file
 from wakewise.geometry import Pose, quat_integrate
+from wakewise.imaging.settings import METERED_EVERY_S
 from wakewise.interfaces import BodyState, ScalarGrid, WaterTruth, Witness
 from wakewise.missions import Route
 from wakewise.operation.loop import Step
@@ -44,12 +46,16 @@ def step_columns(thrusters: int) -> list[str]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ExposureRecord:
-    """One opening of the shutter: true camera poses across it, the estimate at its middle, the silt in the water."""
+    """One opening of the shutter: true camera poses across it, the estimate at its middle, the silt in the water.
+
+    `X_WC_before` are true poses of the camera before, oldest first, which automatic exposure goes by; else none.
+    """
 
     time_s: float
     X_WC_true: tuple[Pose, ...]
     X_WC_est: Pose
     silt: ScalarGrid
+    X_WC_before: tuple[Pose, ...] = ()
 
 
 @dataclass(kw_only=True, eq=False)
@@ -65,9 +71,11 @@ class FlightRecorder:
     joint : TiltJoint or None
         What tilts the camera; true poses go with its true angle, estimated ones with the measured angle.
     exposure_s : float
-        How long the shutter stays open.
+        How long the shutter stays open, from the first row to the last.
     instants : int
         How many true poses are kept across each exposure.
+    metered : int
+        How many true poses are kept from before each exposure, for automatic exposure.
     thrusters : int
     witness : Witness or None
         Without one, true columns and water columns are NaN and no exposure is rendered.
@@ -87,6 +95,7 @@ class FlightRecorder:
     water_every_s: float = 0.1
     exposed: Callable[[int, ExposureRecord], None] | None = None
     joint: TiltJoint | None = None
+    metered: int = 0
     exposures: list[ExposureRecord] = field(default_factory=list)
     _rows: list[Array] = field(default_factory=list)
     _legs: list[str] = field(default_factory=list)
@@ -138,6 +147,7 @@ class FlightRecorder:
                     X_WC_est=_moved(step.estimate, float(opens_s[k]) - step.time_s + 0.5 * self.exposure_s)
                     @ self._mount(step.tilt_rad),
                     silt=self.witness.silt(),
+                    X_WC_before=self._before(),
                 )
             )
             if self.exposed is not None:
@@ -145,6 +155,13 @@ class FlightRecorder:
 
     def _mount(self, tilt_rad: float) -> Pose:
         return self.X_BC if self.joint is None else self.joint.mount(self.X_BC, tilt_rad)
+
+    def _before(self) -> tuple[Pose, ...]:
+        """True camera poses until now, the last of them now; the first of the flight stand for those before it."""
+        every = max(1, round(METERED_EVERY_S / self.dt_s))
+        rows = [self._rows[max(0, len(self._rows) - 1 - every * k)] for k in reversed(range(self.metered))]
+        # The last three numbers of a row are the camera's tilt, true, measured and wished.
+        return tuple(Pose(row[1:4], row[4:8]) @ self._mount(math.radians(float(row[-3]))) for row in rows)
 
     @property
     def duration_s(self) -> float:
@@ -185,7 +202,9 @@ def write_exposures(path: Path, exposures: list[ExposureRecord], exposure_s: flo
 
 def exposure_arrays(exposures: list[ExposureRecord]) -> dict[str, Any]:
     """What an exposure is, as the arrays that are kept of it; silt in single precision."""
-    return {
+    before = [[X.p_m for X in e.X_WC_before] for e in exposures], [[X.q for X in e.X_WC_before] for e in exposures]
+    metered = {"X_WC_before_p_m": np.array(before[0]), "X_WC_before_q": np.array(before[1])}
+    return (metered if exposures[0].X_WC_before else {}) | {
         "time_s": np.array([e.time_s for e in exposures]),
         "X_WC_p_m": np.array([[X.p_m for X in e.X_WC_true] for e in exposures]),
         "X_WC_q": np.array([[X.q for X in e.X_WC_true] for e in exposures]),
@@ -203,12 +222,15 @@ def read_exposures(path: Path | IO[bytes]) -> list[ExposureRecord]:
         origin, spacing = data["silt_origin_W_m"], float(data["silt_spacing_m"])
         p, q, silt = data["X_WC_p_m"], data["X_WC_q"], data["silt_kg_m3"]
         est_p, est_q = data["X_WC_est_p_m"], data["X_WC_est_q"]
+        none = np.empty((len(p), 0))
+        before_p, before_q = data.get("X_WC_before_p_m", none), data.get("X_WC_before_q", none)
         return [
             ExposureRecord(
                 time_s=float(time_s),
                 X_WC_true=tuple(Pose(p[k, i], q[k, i]) for i in range(p.shape[1])),
                 X_WC_est=Pose(est_p[k], est_q[k]),
                 silt=ScalarGrid(origin_W_m=origin, spacing_m=spacing, values=silt[k]),
+                X_WC_before=tuple(Pose(*X) for X in zip(before_p[k], before_q[k], strict=True)),
             )
             for k, time_s in enumerate(data["time_s"])
         ]

@@ -16,6 +16,7 @@ from wakewise.errors import InputError
 from wakewise.estimation import FilterSettings
 from wakewise.files import write_text
 from wakewise.imaging import ImagingSettings
+from wakewise.imaging.settings import CAMERAS
 from wakewise.missions import MissionSettings
 from wakewise.operation.draws import Draw, values_of
 from wakewise.operation.pilots import PILOTS
@@ -173,7 +174,7 @@ class Scenario(Settings):
             return self
         tree = self.model_dump()
         for name, value in values_of(self.draws, self.seed).items():
-            tree = _merged(tree, _with_silt(_nested(name, value)))
+            tree = _merged(tree, _with_kinds(_nested(name, value)))
         try:
             return Scenario.model_validate(tree | {"draws": {}})
         except ValidationError as fault:
@@ -192,8 +193,9 @@ def load_scenario(preset: str | None, path: Path | None, overrides: dict[str, An
     A world of the library that one of them names lies between the preset and the file: it gives values, and draws,
     which yield to what file and overrides say of their fields.
 
-    A kind of silt (`tank.silt.kind`) sets load and grains: they replace those of the layers below it, where a scenario
-    that a trial left behind spells them out, and yield to what its own layer, or one above, says of them.
+    A kind of silt (`tank.silt.kind`) sets load and grains, one of camera (`imaging.kind`) its fields: they replace
+    those of the layers below it, where a scenario that a trial left behind spells them out, and yield to what its own
+    layer, or one above, says of them.
 
     Parameters
     ----------
@@ -362,7 +364,7 @@ def _leave(tree: dict[str, Any], name: str) -> None:
 
 def _laid(tree: dict[str, Any], layer: dict[str, Any]) -> dict[str, Any]:
     """The layer over the tree; draws of fields that the layer gives are gone."""
-    full = _with_silt(layer)
+    full = _with_kinds(layer)
     given = _leaves({name: value for name, value in full.items() if name != "draws"})
     draws = tree.get("draws", {})
     kept = {name: draw for name, draw in draws.items() if not any(f"{name}.".startswith(f"{g}.") for g in given)}
@@ -375,6 +377,21 @@ def _leaves(tree: dict[str, Any], prefix: str = "") -> list[str]:
     for key, value in tree.items():
         found += _leaves(value, f"{prefix}{key}.") if isinstance(value, dict) else [f"{prefix}{key}"]
     return found
+
+
+def _with_kinds(layer: dict[str, Any]) -> dict[str, Any]:
+    """The layer with what its kinds of silt and camera say and it does not."""
+    return _with_camera(_with_silt(layer))
+
+
+def _with_camera(layer: dict[str, Any]) -> dict[str, Any]:
+    """The same for its kind of camera; `still` takes back what another kind had set."""
+    imaging = layer.get("imaging")
+    if not isinstance(imaging, dict) or not isinstance(imaging.get("kind"), str):
+        return layer
+    fields, own = ImagingSettings.model_fields, {name for kind in CAMERAS.values() for name in kind}
+    usual = {name: fields[name].default for name in own}
+    return layer | {"imaging": usual | CAMERAS.get(imaging["kind"], {}) | imaging}
 
 
 def _nested(dotted: str, value: Any) -> dict[str, Any]:

@@ -45,5 +45,9 @@ class Seeds:
         place, camera = self._child(5).spawn(2)
         return place, camera
 
+    def person(self) -> np.random.Generator:
+        """Who flies by hand."""
+        return self._child(6)
+
     def _child(self, k: int) -> np.random.Generator:
-        return np.random.default_rng(self.seed).spawn(6)[k]
+        return np.random.default_rng(self.seed).spawn(7)[k]

@@ -180,7 +180,7 @@ def _one(
     smear_m = level * standoff_m / camera.focal_px if factor == "blur" else 0.0
     # The same draws at every level: only the factor changes.
     rng = np.random.default_rng(scenario.seed)
-    views = planned_views(target, scenario.mission, imaging.exposure_s, rng, smear_m)
+    views = planned_views(target, scenario.mission, imaging.window_s, rng, smear_m)
     if not clean:
         clean += render_clean(target, views, imaging, scenario.target.seed, progress)
     if factor == "particles":

@@ -1,0 +1,160 @@
+"""`manual`: a person at two sticks, the autopilot that such vehicles have, and direct allocation.
+
+Flown as BlueROV2 and its kin are flown, in ArduSub's ALT_HOLD: sticks for forward and right push straight through, at
+the pilot's gain; the stick for down asks for a rate of climb and holds the depth where it is let go, that for turn
+asks for a rate and holds the heading; roll and pitch are held level, or at the angle that is set. The wrench is
+shared out by the pseudo-inverse, which for ArduSub's vectored_6dof frame is its motor factors up to a scale per axis.
+The person sees what the estimator says, late (`wakewise.pilot`), and knows neither jets nor target's water.
+
+Assumed, in favour of the person: the autopilot holds depth, heading and attitude with the gains of `dp` and knows the
+righting moment; full stick makes the least thrust that any mix of thrusters reaches along its axis; the angle of
+pitch is set as the mission wants it. ArduSub's factory rates: 5 m/s of climb and 3.375 x 45 deg/s of turn at full
+stick (PILOT_SPEED_UP, ACRO_YAW_P, 4.0.0), both times the pilot's gain.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wakewise.allocation import Layout, least_thrusts
+from wakewise.arrays import Array, freeze
+from wakewise.control.loop import FULL, HOLD_S, vehicle_layout
+from wakewise.control.settings import ControlSettings
+from wakewise.control.tracker import Tracker, TrackerState, make_tracker
+from wakewise.geometry import Pose, euler_from_quat, quat_from_euler
+from wakewise.interfaces import BodyState, Command, Goal, WakeModel
+from wakewise.pilot import Person, PersonState, Sticks, View, begin, draw_person, steer
+from wakewise.planning import Surroundings
+from wakewise.targets import Region
+from wakewise.vehicles import Vehicle, restoring_wrench
+from wakewise.wake import WakeView
+
+CLIMB_M_S, TURN_RAD_S = 5.0, math.radians(3.375 * 45.0)
+"""What full stick asks for at gain 1 (ArduSub 4.0.0, BlueROV2)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ManualState:
+    """Person, autopilot's integral of attitude and of depth (N), its set points, and the thrusts last asked for.
+
+    `depth_m` and `heading_rad` are None before the first step.
+    """
+
+    person: PersonState
+    tracker: TrackerState
+    thrusts_N: Array
+    depth_m: float | None = None
+    heading_rad: float = 0.0
+    lift_N: float = 0.0
+    share: float = 1.0
+
+    def __post_init__(self) -> None:
+        freeze(self, thrusts_N=(None,))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ManualController:
+    """Flown by hand; implements `wakewise.interfaces.Controller`. Make one with `manual`."""
+
+    name: str
+    person: Person
+    tracker: Tracker
+    layout: Layout
+    view: WakeView
+    X_BC: Pose
+    middle_W_m: Array
+
+    def init(self) -> ManualState:
+        """State before the first step."""
+        return ManualState(
+            person=begin(self.person), tracker=self.tracker.init(), thrusts_N=np.zeros(self.layout.B.shape[1])
+        )
+
+    def step(self, state: ManualState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[ManualState, Command]:
+        """Decide the thrusts for the next `dt_s` seconds."""
+        for what, X_WB, nu_B in (("estimate", estimate.X_WB, estimate.nu_B), ("goal", goal.X_WB, goal.nu_B)):
+            if not np.isfinite(X_WB.p_m.sum() + X_WB.q.sum() + nu_B.sum()):
+                thrusts = state.thrusts_N * np.exp(-dt_s / HOLD_S)
+                why = f"{what} not finite: holding the last thrusts, fading"
+                return replace(state, thrusts_N=thrusts), Command(thrusts_N=thrusts, wrench_B=np.zeros(6), fallback=why)
+        wish = View.of(goal.X_WB, goal.nu_B, self.X_BC)
+        now = View.of(estimate.X_WB, estimate.nu_B, self.X_BC)
+        person, asked = steer(self.person, state.person, dt_s, now, wish, self._watched(goal))
+        state, wrench = self._autopilot(replace(state, person=person), dt_s, estimate, goal, asked)
+        gram = self.view.gram(estimate.X_WB)
+        found = least_thrusts(self.layout, wrench, gram if np.isfinite(gram).all() else None)
+        fallback = None if found.scale >= FULL else f"thrusters saturated: {100.0 * found.scale:.0f} % of the wrench"
+        command = Command(thrusts_N=found.thrusts_N, wrench_B=wrench, disturbance=found.disturbance, fallback=fallback)
+        return replace(state, thrusts_N=found.thrusts_N, share=found.scale), command
+
+    def _watched(self, goal: Goal) -> Array:
+        """What the wished picture has in its middle, shape (3,): on its axis, as far as the target is."""
+        X_WC = goal.X_WB @ self.X_BC
+        axis_W = X_WC.R[:, 2]
+        return np.asarray(X_WC.p_m + axis_W * float((self.middle_W_m - X_WC.p_m) @ axis_W))
+
+    def _autopilot(
+        self, state: ManualState, dt_s: float, estimate: BodyState, goal: Goal, asked: Array
+    ) -> tuple[ManualState, Array]:
+        """Hold depth, heading and attitude where sticks left them; the next state and the wrench in B, shape (6,)."""
+        R_WB, nu = estimate.X_WB.R, estimate.nu_B
+        forward, right, climb_m_s, turn_rad_s = asked
+        _, _, heading_rad = euler_from_quat(estimate.X_WB.q)
+        v_W = R_WB @ nu[:3]
+        depth_m, held_rad = state.depth_m, state.heading_rad
+        if depth_m is None:
+            depth_m, held_rad = float(estimate.X_WB.p_m[2]), float(heading_rad)
+        depth_m, held_rad = depth_m + climb_m_s * dt_s, held_rad + turn_rad_s * dt_s
+        roll_rad, pitch_rad, _ = euler_from_quat(goal.X_WB.q)
+        held = Pose(estimate.X_WB.p_m, quat_from_euler(roll_rad, pitch_rad, held_rad))
+        saturated = state.share < FULL
+        R_GW = held.R.T
+        # As the place is where the vehicle is and the velocity what it has, only attitude is steered by this.
+        level = Goal(X_WB=held, nu_B=np.concatenate([R_GW @ v_W, R_GW @ np.array([0.0, 0.0, turn_rad_s])]))
+        tracker, wrench = self.tracker.correction(state.tracker, dt_s, estimate, level, saturated=saturated)
+        weight_B = restoring_wrench(self.tracker.body, estimate.X_WB.q)
+        error_m, k = depth_m - float(estimate.X_WB.p_m[2]), self.tracker
+        lift_N = state.lift_N
+        if not saturated:
+            lift_N = float(np.clip(lift_N + k.ki[2] * error_m * dt_s, -k.integral_limit[2], k.integral_limit[2]))
+        down_N = k.kp[2] * error_m + k.kd[2] * (climb_m_s - v_W[2]) + lift_N - float((R_WB @ weight_B[:3])[2])
+        c, s = math.cos(heading_rad), math.sin(heading_rad)
+        force_W = np.array([c * forward - s * right, s * forward + c * right, down_N])
+        moment_B = wrench[3:] - restoring_wrench(self.tracker.body, held.q)[3:]
+        after = replace(state, tracker=tracker, depth_m=depth_m, heading_rad=held_rad, lift_N=lift_N)
+        return after, np.concatenate([R_WB.T @ force_W, moment_B])
+
+
+def vehicle_sticks(vehicle: Vehicle, tracker: Tracker) -> Sticks:
+    """What the sticks of a vehicle do: force forward and right, rate of climb and of turn."""
+    reach = np.abs(vehicle.allocation_matrix) @ np.minimum(-vehicle.thrust_lower_N, vehicle.thrust_upper_N)
+    body = tracker.body
+    return Sticks(
+        inertia=np.array([body.mass_matrix[0, 0], body.mass_matrix[1, 1], 0.0, 0.0]),
+        drag=np.array([body.linear_damping[0, 0], body.linear_damping[1, 1], 0.0, 0.0]),
+        full=np.array([reach[0], reach[1], CLIMB_M_S, TURN_RAD_S]),
+        lag_s=np.full(4, float(vehicle.time_constants_s.max())),
+    )
+
+
+def manual(
+    vehicle: Vehicle,
+    region: Region,
+    wake: WakeModel,
+    settings: ControlSettings,
+    around: Surroundings | None = None,  # noqa: ARG001
+) -> ManualController:
+    """`manual`: the person whom the trial's seed draws; the wake model is only asked what D the thrusts cause."""
+    tracker = make_tracker(vehicle, settings)
+    return ManualController(
+        name="manual",
+        person=draw_person(settings.person, 0, vehicle_sticks(vehicle, tracker)),
+        tracker=tracker,
+        layout=vehicle_layout(vehicle),
+        view=WakeView.of(vehicle, region, wake, settings.superposition),
+        X_BC=vehicle.X_BC,
+        middle_W_m=np.average(region.points_W_m, axis=0, weights=region.weights),
+    )
