@@ -199,7 +199,8 @@ class WaterTruth:
     0.3 m, and `tracer_speed_mean_m_s` what PIV would call the speed there, the straight way of tracers over the time
     of one picture. `turbidity_per_m` is the mean beam attenuation by silt in the water within 0.3 m of the target's
     centre, and `ray_optical_depth` that attenuation along the rays from the camera to the side of the target that it
-    faces, from end to end, a mean without unit. NaN where a witness does not know.
+    faces, from end to end, a mean without unit. `silt_lifted_g` is what the bed has given up since the start, settled
+    again or not, `silt_suspended_g` what is in the water now. NaN where a witness does not know.
     """
 
     target_speed_mean_m_s: float
@@ -211,6 +212,8 @@ class WaterTruth:
     bed_shear_p95_Pa: float = math.nan
     tracer_speed_mean_m_s: float = math.nan
     ray_optical_depth: float = math.nan
+    silt_lifted_g: float = math.nan
+    silt_suspended_g: float = math.nan
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

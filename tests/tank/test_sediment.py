@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from wakewise.tank.grains import mean_excess
 from wakewise.tank.sediment import Silt, SiltLaws
 
 SIZE_M = (1.0, 1.0, 0.5)
@@ -170,7 +171,7 @@ def test_sand_is_lifted_by_van_rijns_law():
     silt._shear(Uniform([0.6, 0, 0]), EVERYWHERE)
     silt._erode(0.05)
     stress = 1000.0 * silt._star_m_s**2
-    expected = silt.laws.lifted_kg_m2_s(stress).sum() * 0.05
+    expected = silt.laws.lifted_kg_m2_s(stress.ravel(), np.full(stress.size, 50.0)).sum() * 0.05
     assert before - silt.bed_kg_m2.sum() == pytest.approx(expected, rel=0.05)
 
 
@@ -181,3 +182,61 @@ def test_mass_is_kept_to_a_millionth_through_lifting_and_settling_of_sand():
     for k in range(150):
         silt.step(Uniform([0.5 if k < 100 else 0.0, 0, 0]), EVERYWHERE, 0.1)
     assert silt.mass_error_rel < 1e-9
+
+
+def test_a_fluctuating_stress_lifts_what_its_mean_does_not():
+    """Just below the threshold a steady stress moves nothing, a turbulent one what the mean excess says."""
+    stress = 0.9 * 0.0625
+    laws = [SiltLaws.of(20e-6, 2710.0, 1000.0, 5e-5, 0.0625, stress_intensity=i) for i in (0.0, 0.4)]
+    load = np.array([1.0])
+    assert laws[0].lifted_kg_m2_s(np.array([stress]), load)[0] == 0.0
+    assert laws[1].lifted_kg_m2_s(np.array([stress]), load)[0] == pytest.approx(5e-5 * mean_excess(0.9, 0.4))
+    assert laws[1].stirring_Pa < 0.5 * laws[0].stirring_Pa
+
+
+def test_fluff_goes_first_and_the_firm_layer_stays():
+    """Between the two thresholds all the fluff leaves, no firm grain; above both, the firm layer erodes too."""
+    laws = SiltLaws.of(8e-6, 2650.0, 1000.0, 1e-3, 0.035, firm_kg_m2=0.5, firm_threshold_Pa=0.35)
+    silt = Silt(laws, 0.6, SIZE_M, 4000, np.random.default_rng(0))
+    start = silt.total_kg
+    star = np.sqrt(0.2 / 1000.0)
+    for _ in range(400):
+        silt._star_m_s = np.full(silt._shape, star)
+        silt._erode(0.1)
+    assert silt.bed_kg_m2 == pytest.approx(np.full(silt._shape, 0.5), abs=1e-6)
+    assert silt.lifted_kg == pytest.approx(0.1, rel=1e-3)
+    silt._star_m_s = np.full(silt._shape, np.sqrt(0.7 / 1000.0))
+    silt._erode(1.0)
+    assert silt.lifted_kg == pytest.approx(0.1 + 1e-3, rel=0.01)
+    assert silt.total_kg == pytest.approx(start, rel=1e-12)
+
+
+def test_what_settles_on_a_firm_bed_is_fluff():
+    """A grain that has settled on a bare firm layer goes again at the fluff's threshold."""
+    laws = SiltLaws.of(8e-6, 2650.0, 1000.0, 1e-3, 0.035, firm_kg_m2=0.5)
+    stress = np.array([0.1, 0.1])
+    rates = laws.lifted_kg_m2_s(stress, np.array([0.5, 0.501]))
+    assert rates[0] == 0.0
+    assert rates[1] == pytest.approx(1e-3 * (0.1 / 0.035 - 1))
+    assert laws.firm_threshold_Pa == pytest.approx(0.35)
+
+
+def test_what_was_lifted_is_what_left_the_bed():
+    """Lifted less settled again is what is in the water, through a flight of erosion and rest, to rounding."""
+    silt = _silt()
+    settled, before = 0.0, silt.bed_kg_m2.sum() * silt._cell.prod()
+    for k in range(120):
+        silt.step(Whirl() if k < 60 else Uniform([0, 0, 0]), EVERYWHERE, 0.05)
+    after = silt.bed_kg_m2.sum() * silt._cell.prod()
+    settled = silt.lifted_kg - (before - after)
+    assert silt.lifted_kg > 0.0
+    assert settled > 0.0
+    assert silt.suspended_kg == pytest.approx(silt.lifted_kg - settled, rel=1e-9)
+
+
+def test_aggregates_sink_at_the_speed_given():
+    """A settling speed that is given replaces the grain's own and nothing else."""
+    own, given = (SiltLaws.of(8e-6, 2650.0, 1000.0, 1e-4, settling_m_s=w) for w in (None, 3e-4))
+    assert given.settling_m_s == 3e-4
+    assert own.settling_m_s == pytest.approx(5.2e-5, rel=0.05)
+    assert given.threshold_Pa == own.threshold_Pa

@@ -12,6 +12,7 @@ from wakewise.interfaces import Flow, ScalarGrid, WaterTruth
 from wakewise.tank.grains import beam_attenuation_per_m, friction_velocity_m_s
 from wakewise.tank.probes import bed_points, surface_points, water_points
 from wakewise.tank.sediment import SHEAR_HEIGHT_M, SiltLaws
+from wakewise.tank.swell import Swell
 from wakewise.targets import Target
 
 CLOSE_M = 0.3
@@ -58,6 +59,8 @@ class TargetProbes:
         silt: ScalarGrid | None,
         camera_W_m: Array,
         density_kg_m3: float,
+        swell: Swell | None = None,
+        time_s: float = 0.0,
     ) -> WaterTruth:
         """Look at all of them.
 
@@ -69,13 +72,20 @@ class TargetProbes:
             Concentration in kg/m3; None for clear water.
         camera_W_m : ndarray, shape (3,)
         density_kg_m3 : float
+        swell : Swell, optional
+            The wave that is part of the ambient water, at `time_s`.
         """
         excess = water.excess_velocity(self._all_W_m)
         whole = excess + self._ambient_m_s(water)
         n, m = len(self.surface_W_m), len(self.surface_W_m) + len(self.bed_W_m)
         at_target, at_bed = np.linalg.norm(excess[:n], axis=1), np.linalg.norm(excess[n:m], axis=1)
         pressure = 0.5 * density_kg_m3 * np.einsum("ij,ij->i", whole[:n], whole[:n])
-        star = friction_velocity_m_s(np.linalg.norm(whole[m:, :2], axis=1), SHEAR_HEIGHT_M, laws.grain_m)
+        on_bed, swell_Pa = whole[m:, :2], np.zeros(len(whole) - m)
+        if swell is not None:
+            floor = self._floor_W_m[:, :2]
+            on_bed = on_bed - swell.speed_m_s(floor, time_s)[:, None] * swell.ahead
+            swell_Pa = swell.stress_Pa(floor, time_s)
+        star = friction_velocity_m_s(np.linalg.norm(on_bed, axis=1), SHEAR_HEIGHT_M, laws.grain_m)
         every = max(n // _TRACERS, 1)
         return WaterTruth(
             target_speed_mean_m_s=float(at_target.mean()),
@@ -84,7 +94,7 @@ class TargetProbes:
             turbidity_per_m=self.turbidity_per_m(laws, silt),
             target_pressure_mean_Pa=float(pressure.mean()),
             target_pressure_p95_Pa=_p95(pressure),
-            bed_shear_p95_Pa=float(density_kg_m3 * _p95(star) ** 2),
+            bed_shear_p95_Pa=_p95(np.hypot(density_kg_m3 * star**2, swell_Pa)),
             tracer_speed_mean_m_s=float(
                 tracer_speeds_m_s(water, self.surface_W_m[::every], whole[:n:every], FRAME_S, self._bed_z).mean()
             ),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,11 +20,12 @@ from wakewise.tank.probes import surface_points
 from wakewise.tank.sediment import SHEAR_HEIGHT_M, Silt, SiltLaws
 from wakewise.tank.sensors import Sensors
 from wakewise.tank.settings import MAX_PARCELS, MAX_SILT_PARTICLES, TankSettings
+from wakewise.tank.swell import Swell
 from wakewise.tank.tether import Tether
 from wakewise.targets import Target
 from wakewise.thrusters import electrical_power_W
 from wakewise.vehicles import Vehicle
-from wakewise.water import AmbientSum
+from wakewise.water import AiryWave, AmbientSum
 from wakewise.water.blockage import Blockage
 from wakewise.water.closure import PLAIN, SWIRLING
 from wakewise.water.induction import impulse_velocity
@@ -107,8 +109,13 @@ class Tank:
             silt.erosion_kg_m2_s,
             silt.threshold_Pa,
             silt.pickup,
+            settling_m_s=silt.settling_m_s,
+            stress_intensity=silt.stress_intensity,
+            firm_kg_m2=silt.firm_load_kg_m2,
+            firm_threshold_Pa=silt.firm_threshold_Pa,
         )
-        self._silt = Silt(laws, silt.load_kg_m2, settings.size_m, MAX_SILT_PARTICLES, silt_rng)
+        self._swell = _swell(self.ambient, laws)
+        self._silt = Silt(laws, silt.load_kg_m2, settings.size_m, MAX_SILT_PARTICLES, silt_rng, self._swell)
         self._silt.suspend(1e-3 * silt.suspended_mg_l, target.centre_W_m)
         _say_when_it_clears(settings, laws)
         self._stirring_speed = _STIRRING_SHARE * speed_at_stress_m_s(
@@ -220,7 +227,12 @@ class Tank:
         if self._measured is None:
             X_WC = self._plant.state.X_WB @ self._plant.vehicle.X_BC
             grid, density = self._silt_grid(), self.settings.density_kg_m3
-            self._measured = self._probes.measure(self.water, self.silt.laws, grid, X_WC.p_m, density)
+            measured = self._probes.measure(
+                self.water, self.silt.laws, grid, X_WC.p_m, density, self._swell, self._water.time_s
+            )
+            self._measured = replace(
+                measured, silt_lifted_g=1e3 * self.silt.lifted_kg, silt_suspended_g=1e3 * self.silt.suspended_kg
+            )
         return self._measured
 
     def _silt_grid(self) -> ScalarGrid | None:
@@ -298,6 +310,14 @@ def _tether(settings: TankSettings) -> Tether | None:
         length_m=settings.tether.length_m,
         density_kg_m3=settings.density_kg_m3,
     )
+
+
+def _swell(ambient: AmbientSum, laws: SiltLaws) -> Swell | None:
+    """The ambient water's wave over this bed, if there is one."""
+    for part in ambient.parts:
+        if isinstance(part, AiryWave):
+            return Swell(wave=part, grain_m=laws.grain_m, density_kg_m3=laws.water_density_kg_m3)
+    return None
 
 
 def _say_when_it_clears(settings: TankSettings, laws: SiltLaws) -> None:
