@@ -96,15 +96,33 @@ class Command:
 class ScalarGrid:
     """A scalar field on a regular grid of the world, such as silt concentration in kg/m3.
 
-    `values`, shape (nx, ny, nz), sits at `origin_W_m + spacing_m * (i, j, k)`; outside the grid the field is zero.
+    `values`, shape (nx, ny, nz), sits at `origin_W_m + spacing_m * (i, j, k)`; outside the grid the field is that of
+    the coarser grid `outer`, and zero where there is none.
     """
 
     origin_W_m: Array
     spacing_m: float
     values: Array
+    outer: ScalarGrid | None = None
 
     def __post_init__(self) -> None:
         freeze(self, origin_W_m=(3,), values=(None, None, None))
+
+    @property
+    def levels(self) -> tuple[Array, Array, float, Array, Array, float]:
+        """Values, origin and spacing of the grid, then of the outer one; a single zero far away stands for none."""
+        outer = self.outer
+        coarse = _NOWHERE if outer is None else (outer.values, outer.origin_W_m, outer.spacing_m)
+        return self.values, self.origin_W_m, self.spacing_m, *coarse
+
+    @property
+    def largest(self) -> float:
+        """Largest value on either grid; 0 of an empty one."""
+        highest = float(self.values.max(initial=0.0))
+        return highest if self.outer is None else max(highest, self.outer.largest)
+
+
+_NOWHERE = (np.zeros((1, 1, 1)), np.full(3, 1e12), 1.0)
 
 
 class WakeModel(Protocol):

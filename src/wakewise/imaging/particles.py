@@ -17,7 +17,7 @@ from wakewise.compiled import njit, prange
 from wakewise.geometry import Pose
 from wakewise.imaging.blur import pose_at
 from wakewise.imaging.camera import Camera
-from wakewise.imaging.optics import WaterOptics, sample_grid
+from wakewise.imaging.optics import WaterOptics, sample_levels
 from wakewise.imaging.renderer import LAMP_REFERENCE_M, Image, Lights
 from wakewise.interfaces import ScalarGrid
 
@@ -41,7 +41,7 @@ def flake_positions(
     rng: np.random.Generator,
 ) -> Array:
     """Draw where flakes are, shape (n, 3) in the camera frame: a Poisson process with density per_m3 + per_kg C."""
-    densest = per_m3 + (per_kg * float(silt.values.max(initial=0.0)) if silt is not None else 0.0)
+    densest = per_m3 + (per_kg * silt.largest if silt is not None else 0.0)
     # A pyramid that holds the whole view: slopes to the points of the image's border.
     w, h = float(camera.width), float(camera.height)
     edge = np.linspace(0.0, 1.0, 17)
@@ -65,7 +65,7 @@ def concentration(silt: ScalarGrid | None, points_W_m: Array) -> Array:
     """Value of the grid at points, shape (n, 3) to (n,); zero without a grid."""
     if silt is None:
         return np.zeros(len(points_W_m))
-    return _sample(silt.values, silt.origin_W_m, silt.spacing_m, points_W_m)
+    return _sample(*silt.levels, points_W_m)
 
 
 def draw_flakes(
@@ -111,10 +111,14 @@ def draw_flakes(
 
 
 @njit(parallel=True)
-def _sample(values: Any, origin: Any, spacing: float, points: Any) -> Any:
+def _sample(
+    values: Any, origin: Any, spacing: float, outer: Any, outer_origin: Any, outer_spacing: float, points: Any
+) -> Any:
     out = np.empty(points.shape[0])
     for i in prange(points.shape[0]):
-        out[i] = sample_grid(values, origin, spacing, points[i, 0], points[i, 1], points[i, 2])
+        out[i] = sample_levels(
+            values, origin, spacing, outer, outer_origin, outer_spacing, points[i, 0], points[i, 1], points[i, 2]
+        )
     return out
 
 

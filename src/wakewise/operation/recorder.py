@@ -184,6 +184,19 @@ def exposure_arrays(exposures: list[ExposureRecord]) -> dict[str, Any]:
         "silt_origin_W_m": exposures[0].silt.origin_W_m,
         "silt_spacing_m": np.array(exposures[0].silt.spacing_m),
         "silt_kg_m3": np.array([e.silt.values for e in exposures], dtype=np.float32),
+        **_outer_arrays([e.silt.outer for e in exposures]),
+    }
+
+
+def _outer_arrays(grids: list[ScalarGrid | None]) -> dict[str, Any]:
+    """Arrays of the silt's outer grids; nothing where there are none."""
+    known = [grid for grid in grids if grid is not None]
+    if len(known) < len(grids) or not known:
+        return {}
+    return {
+        "silt_outer_origin_W_m": known[0].origin_W_m,
+        "silt_outer_spacing_m": np.array(known[0].spacing_m),
+        "silt_outer_kg_m3": np.array([grid.values for grid in known], dtype=np.float32),
     }
 
 
@@ -193,12 +206,16 @@ def read_exposures(path: Path | IO[bytes]) -> list[ExposureRecord]:
         origin, spacing = data["silt_origin_W_m"], float(data["silt_spacing_m"])
         p, q, silt = data["X_WC_p_m"], data["X_WC_q"], data["silt_kg_m3"]
         est_p, est_q = data["X_WC_est_p_m"], data["X_WC_est_q"]
+        outers: list[ScalarGrid | None] = [None] * len(p)
+        if "silt_outer_kg_m3" in data:  # not in files of before there was one
+            far, coarse = data["silt_outer_origin_W_m"], float(data["silt_outer_spacing_m"])
+            outers = [ScalarGrid(origin_W_m=far, spacing_m=coarse, values=v) for v in data["silt_outer_kg_m3"]]
         return [
             ExposureRecord(
                 time_s=float(time_s),
                 X_WC_true=tuple(Pose(p[k, i], q[k, i]) for i in range(p.shape[1])),
                 X_WC_est=Pose(est_p[k], est_q[k]),
-                silt=ScalarGrid(origin_W_m=origin, spacing_m=spacing, values=silt[k]),
+                silt=ScalarGrid(origin_W_m=origin, spacing_m=spacing, values=silt[k], outer=outers[k]),
             )
             for k, time_s in enumerate(data["time_s"])
         ]

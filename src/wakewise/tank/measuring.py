@@ -124,7 +124,7 @@ class TargetProbes:
         ends = self.surface_W_m[::every]
         facing = (ends - self._centre) @ (camera_W_m - self._centre) > 0.0
         ends = ends[facing] if facing.any() else ends
-        return _attenuation(laws, _along_rays(silt.values, silt.origin_W_m, silt.spacing_m, ends, camera_W_m))
+        return _attenuation(laws, _along_rays(*silt.levels, ends, camera_W_m))
 
 
 def tracer_speeds_m_s(water: Flow, starts_W_m: Array, velocities_m_s: Array, frame_s: float, bed_z_m: float) -> Array:
@@ -139,30 +139,38 @@ def tracer_speeds_m_s(water: Flow, starts_W_m: Array, velocities_m_s: Array, fra
 
 
 def concentration_at(silt: ScalarGrid, points_W_m: Array) -> Array:
-    """Concentration at the node nearest to each point, shape (n,); zero outside the grid."""
-    found: Array = _at_nodes(silt.values, silt.origin_W_m, silt.spacing_m, np.ascontiguousarray(points_W_m))
+    """Concentration at the node nearest to each point, shape (n,), of the outer grid outside the inner one."""
+    found: Array = _at_nodes(*silt.levels, np.ascontiguousarray(points_W_m))
     return found
 
 
 @njit
-def _at_nodes(values: Array, origin: Array, spacing: float, points: Array) -> Array:
+def _at_nodes(
+    values: Array, origin: Array, spacing: float, outer: Array, outer_origin: Array, outer_spacing: float, points: Array
+) -> Array:
     found = np.empty(points.shape[0])
     for p in range(points.shape[0]):
         found[p] = _at_node(values, origin, spacing, points[p, 0], points[p, 1], points[p, 2])
+        if found[p] < 0.0:
+            found[p] = max(_at_node(outer, outer_origin, outer_spacing, points[p, 0], points[p, 1], points[p, 2]), 0.0)
     return found
 
 
 @njit
 def _at_node(values: Array, origin: Array, spacing: float, x: float, y: float, z: float) -> float:
+    """Value of the node nearest to a place; -1 outside the grid."""
     i, j = round((x - origin[0]) / spacing), round((y - origin[1]) / spacing)
     k = round((z - origin[2]) / spacing)
     if 0 <= i < values.shape[0] and 0 <= j < values.shape[1] and 0 <= k < values.shape[2]:
         return values[i, j, k]
-    return 0.0
+    return -1.0
 
 
 @njit
-def _along_rays(values: Array, origin: Array, spacing: float, ends: Array, eye: Array) -> float:
+def _along_rays(
+    values: Array, origin: Array, spacing: float, outer: Array, outer_origin: Array, outer_spacing: float, ends: Array,
+    eye: Array,
+) -> float:  # fmt: skip
     """Line integral of a field from an eye to places, shape (n, 3), by the midpoint rule; mean over them."""
     total = 0.0
     for r in range(ends.shape[0]):
@@ -170,7 +178,11 @@ def _along_rays(values: Array, origin: Array, spacing: float, ends: Array, eye: 
         sum_ = 0.0
         for k in range(_RAY_STEPS):
             s = (k + 0.5) / _RAY_STEPS
-            sum_ += _at_node(values, origin, spacing, eye[0] + s * dx, eye[1] + s * dy, eye[2] + s * dz)
+            x, y, z = eye[0] + s * dx, eye[1] + s * dy, eye[2] + s * dz
+            found = _at_node(values, origin, spacing, x, y, z)
+            if found < 0.0:
+                found = max(_at_node(outer, outer_origin, outer_spacing, x, y, z), 0.0)
+            sum_ += found
         total += sum_ / _RAY_STEPS * np.sqrt(dx * dx + dy * dy + dz * dz)
     return total / ends.shape[0]
 

@@ -252,9 +252,14 @@ class Silt:
             origin = np.array(origin_W_m, dtype=np.float64)
             shared_among_nodes(self.position_m, self.mass_kg / spacing_m**3, origin, float(spacing_m), values)
         bed = (self._size[2] - origin_W_m[2]) / spacing_m
-        # A node on the bed has water only on its upper side.
+        # A node on the bed has water only on its upper side, one on a wall only before it.
         if 0 <= bed <= shape[2] - 1 and abs(bed - round(bed)) < 1e-6:
             values[:, :, round(bed)] *= 2.0
+        for axis in range(2):
+            for wall in (self._low[axis], -self._low[axis]):
+                node = (wall - origin_W_m[axis]) / spacing_m
+                if 0 <= round(node) < shape[axis] and abs(node - round(node)) < 1e-6:
+                    np.moveaxis(values, axis, 0)[round(node)] *= 2.0
         return ScalarGrid(origin_W_m=origin_W_m, spacing_m=spacing_m, values=values)
 
     def _shear(self, flow: Flow, stirred_W_m: Array) -> None:

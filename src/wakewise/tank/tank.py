@@ -35,6 +35,7 @@ from wakewise.water.water import Water
 GRID_SPACING_M = 0.05
 _GRID_HALF_M = 0.8
 _GRID_HEIGHT_M = 1.0
+_OUTER_SPACING_M, _OUTER_NODES = 0.2, 8000
 _CONTACT_POINTS = 1500  # on the target, besides its vertices, so that a hull meets one
 _SILT_STEP_S = 0.1  # longest step of the silt: a few cm of travel in the fastest wall jets
 _STIRRING_SHARE = 0.4  # jets slower than this share of the threshold's speed are left out of the search for erosion
@@ -215,12 +216,24 @@ class Tank:
         return self.water.excess_velocity(points_W_m)
 
     def concentration_grid(self) -> ScalarGrid:
-        """Silt in kg/m3 over 1.6 x 1.6 m about the target's foot, from the bed up to 1 m or the surface."""
+        """Silt in kg/m3 over 1.6 x 1.6 m about the target's foot, from the bed up to 1 m or the surface.
+
+        Its outer grid is a coarser one of all the water: light comes from farther away than 0.8 m.
+        """
         centre, depth = self.target.centre_W_m, self.settings.size_m[2]
         layers = int(min(_GRID_HEIGHT_M, depth) / GRID_SPACING_M + 1e-9) + 1
         across = 2 * round(_GRID_HALF_M / GRID_SPACING_M) + 1
         origin = np.array([centre[0] - _GRID_HALF_M, centre[1] - _GRID_HALF_M, depth - (layers - 1) * GRID_SPACING_M])
-        return self.silt.concentration(origin, GRID_SPACING_M, (across, across, layers))
+        near = self.silt.concentration(origin, GRID_SPACING_M, (across, across, layers))
+        return replace(near, outer=self._outer_grid())
+
+    def _outer_grid(self) -> ScalarGrid:
+        """Silt in kg/m3 in all the water, on some 8,000 nodes no closer than 0.2 m."""
+        length, width, depth = self.settings.size_m
+        spacing = max(_OUTER_SPACING_M, (length * width * depth / _OUTER_NODES) ** (1 / 3))
+        nx, ny, nz = (math.ceil(side / spacing - 1e-9) + 1 for side in (length, width, depth))
+        origin = np.array([-length / 2, -width / 2, depth - (nz - 1) * spacing])
+        return self.silt.concentration(origin, spacing, (nx, ny, nz))
 
     def measure(self) -> WaterTruth:
         """Speeds and turbidity at the target now; the water moves in steps, so it is computed once for each."""
