@@ -122,6 +122,47 @@ class ScalarGrid:
         return highest if self.outer is None else max(highest, self.outer.largest)
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FlakeCloud:
+    """Flakes that drift with the water, at one instant: those that a camera may see one by one.
+
+    They are the same ones from instant to instant, evenly spread, `per_m3` in a cubic metre, in the box of the world
+    from `low_W_m` to `high_W_m`; of them those at a depth below `depth_m` and with slopes x / z and y / z up to
+    `slopes` in the camera's frame are given.
+
+    Parameters
+    ----------
+    p_W_m, v_W_m_s : ndarray, shape (n, 3)
+        Where they are and how the water moves them.
+    looks : ndarray, shape (n, 3)
+        Of each flake, for good: its rank among them (0 to 1: where fewer are in the water than `per_m3`, those of the
+        lowest ranks), its size (standard normal) and its shade (0 to 1).
+    """
+
+    p_W_m: Array
+    v_W_m_s: Array
+    looks: Array
+    low_W_m: Array
+    high_W_m: Array
+    per_m3: float
+    depth_m: float
+    slopes: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        n = len(self.p_W_m)
+        freeze(self, p_W_m=(n, 3), v_W_m_s=(n, 3), looks=(n, 3), low_W_m=(3,), high_W_m=(3,))
+
+    def covers(self, points_W_m: Array, X_WC: Pose) -> Array:
+        """Whether places, shape (n, 3), lie where all flakes are given, shape (n,), for a camera at X_WC."""
+        p_C = X_WC.inverse().apply(points_W_m)
+        z = np.maximum(p_C[:, 2], 1e-9)
+        ahead = (p_C[:, 2] > 0.0) & (p_C[:, 2] < self.depth_m)
+        seen = (np.abs(p_C[:, 0]) < self.slopes[0] * z) & (np.abs(p_C[:, 1]) < self.slopes[1] * z)
+        boxed = np.all((points_W_m >= self.low_W_m) & (points_W_m <= self.high_W_m), axis=1)
+        covered: Array = ahead & seen & boxed
+        return covered
+
+
 _NOWHERE = (np.zeros((1, 1, 1)), np.full(3, 1e12), 1.0)
 
 

@@ -13,7 +13,8 @@ from scipy.interpolate import RegularGridInterpolator
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.imaging import Lights, PinholeCamera, Render, SiltOptics, haze_between, through_water, water_optics
-from wakewise.imaging.optics import BACKSCATTER_RATIO, decayed, sample_grid, water_types
+from wakewise.imaging.grids import sample_grid
+from wakewise.imaging.optics import BACKSCATTER_RATIO, decayed, water_types
 from wakewise.interfaces import ScalarGrid
 
 DATA = pathlib.Path(os.environ.get("WAKEWISE_DATA", pathlib.Path(__file__).parents[3] / "shared" / "data"))

@@ -14,12 +14,12 @@ from wakewise.geometry import Pose
 from wakewise.imaging.blur import motion_blur, pose_at
 from wakewise.imaging.camera import Camera
 from wakewise.imaging.optics import SiltOptics, haze_between, through_water
-from wakewise.imaging.particles import draw_flakes, flake_positions
+from wakewise.imaging.particles import draw_flakes, flakes_before
 from wakewise.imaging.renderer import Image, Render, render
 from wakewise.imaging.scene import Scene
 from wakewise.imaging.sensor import expose
 from wakewise.imaging.settings import ELECTRONS_PER_S, FLAKES_PER_KG, READ_NOISE_E, ImagingSettings
-from wakewise.interfaces import ScalarGrid
+from wakewise.interfaces import FlakeCloud, ScalarGrid
 
 BALANCE_M = 0.25
 """White balance: a grey card at this range in clear water comes out grey, so that farther things turn bluish."""
@@ -46,6 +46,7 @@ def photograph(
     settings: ImagingSettings,
     rng: np.random.Generator,
     grains: SiltOptics | None = None,
+    drifting: FlakeCloud | None = None,
 ) -> Photo:
     """Take one photograph.
 
@@ -63,6 +64,8 @@ def photograph(
         Draws flakes and noise, nothing else.
     grains : SiltOptics, optional
         What the silt is made of; pale 20 um carbonate mud if not given.
+    drifting : FlakeCloud, optional
+        Flakes that other photographs show too, where the water has brought them; all are drawn here if not given.
 
     Raises
     ------
@@ -70,7 +73,7 @@ def photograph(
         If there is no pose, or the silt is negative somewhere.
     """
     view = render(scene, camera, pose_at(poses, 0.5), settings.lights(), settings.samples)
-    return photograph_of(view, camera, poses, silt, settings, rng, grains)
+    return photograph_of(view, camera, poses, silt, settings, rng, grains, drifting)
 
 
 def photograph_of(
@@ -81,6 +84,7 @@ def photograph_of(
     settings: ImagingSettings,
     rng: np.random.Generator,
     grains: SiltOptics | None = None,
+    drifting: FlakeCloud | None = None,
 ) -> Photo:
     """As `photograph`, from a render of the middle of the exposure that is there already."""
     if silt is not None and silt.values.size and float(silt.values.min()) < 0.0:
@@ -91,8 +95,8 @@ def photograph_of(
     haze = haze_between(camera, middle, water, grains, silt, lights)
     radiance, silt_per_m = through_water(view, camera, haze, water, lights.from_above, grains)
     radiance = motion_blur(radiance, view.depth_m, camera, poses)
-    flakes = flake_positions(camera, middle, silt, settings.flakes_per_m3, FLAKES_PER_KG, rng)
-    radiance = draw_flakes(radiance, view.depth_m, camera, poses, flakes, water, lights, rng)
+    flakes = flakes_before(camera, middle, silt, settings.flakes_per_m3, FLAKES_PER_KG, rng, drifting)
+    radiance = draw_flakes(radiance, view.depth_m, camera, poses, flakes, settings.exposure_s, water, lights)
     gains = settings.gain * np.exp(water.signal_per_m * BALANCE_M)
     image = expose(radiance, gains, ELECTRONS_PER_S * settings.exposure_s, READ_NOISE_E, rng)
     on_target = view.target_fraction >= 0.5

@@ -10,8 +10,10 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
-from wakewise.interfaces import BodyState, Measurement, ScalarGrid, WaterTruth
+from wakewise.geometry import Pose
+from wakewise.interfaces import BodyState, FlakeCloud, Measurement, ScalarGrid, WaterTruth
 from wakewise.tank.ambient import build_ambient
+from wakewise.tank.flakes import Flakes
 from wakewise.tank.grains import speed_at_stress_m_s
 from wakewise.tank.lane import Lane
 from wakewise.tank.measuring import TargetProbes
@@ -124,6 +126,8 @@ class Tank:
         )
         self._sensors = Sensors(settings.sensors, sensor_rng)
         self._probes = TargetProbes(target, probe_rng)
+        self._flakes: Flakes | None = None  # drawn when first asked for
+        self._flake_rng = probe_rng.spawn(1)[0]
         self._time = 0.0
         self._flow_steps = 0
         self._silt_every = max(1, math.floor(_SILT_STEP_S / settings.flow_step_s + 1e-9))
@@ -234,6 +238,12 @@ class Tank:
         nx, ny, nz = (math.ceil(side / spacing - 1e-9) + 1 for side in (length, width, depth))
         origin = np.array([-length / 2, -width / 2, depth - (nz - 1) * spacing])
         return self.silt.concentration(origin, spacing, (nx, ny, nz))
+
+    def flakes(self, X_WC: Pose) -> FlakeCloud:
+        """Visible flakes before a camera now; the same ones each time, carried by the water meanwhile."""
+        if self._flakes is None:
+            self._flakes = Flakes(self.target.centre_W_m, self.settings.size_m[2], self.ambient, self._flake_rng)
+        return self._flakes.before(X_WC, self._time, self.water)
 
     def measure(self) -> WaterTruth:
         """Speeds and turbidity at the target now; the water moves in steps, so it is computed once for each."""
