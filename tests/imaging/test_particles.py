@@ -80,7 +80,7 @@ def test_motion_streaks_a_flake_without_more_light():
 
 
 def test_moving_water_streaks_a_flake_as_a_moving_camera_does():
-    """A flake that drifts past a still camera leaves the streak of a still flake before a camera that goes the other way."""
+    """A flake that drifts past a still camera leaves the streak of a still one before a camera going the other way."""
     image, depth = np.zeros((120, 160, 3), np.float32), np.full((120, 160), 1.0, np.float32)
     water, one = water_optics("IB"), np.array([[0.01, 0.0, 0.15]])
     poses = [Pose(np.array([x, 0.0, 0.0])) for x in np.linspace(-0.004, 0.004, 9)]

@@ -153,7 +153,7 @@ def test_a_photograph_of_another_flight_is_made_anew(parts, exposures, tmp_path)
 
 
 def test_flakes_and_outer_silt_are_kept_and_old_files_are_read_without(exposures, tmp_path):
-    """What was written is read again; a file of before they were kept gives neither; both are part of the fingerprint."""
+    """What was written is read again; a file of before they were kept has neither; both are in the fingerprint."""
     path = tmp_path / "exposures.npz"
     write_exposures(path, exposures, 0.01)
     read = read_exposures(path)

@@ -42,7 +42,7 @@ def test_flakes_go_with_a_current():
 
 
 def test_a_swell_brings_flakes_back():
-    """After one period of a small wave they are where they were, though nobody looked meanwhile, to a tenth of its orbit."""
+    """After one period of a small wave they are where they were, to a tenth of the way they were away."""
     wave = AiryWave(amplitude_m=0.02, period_s=4.0, heading_rad=0.0, depth_m=1.5)
     flakes = _flakes(wave)
     start = flakes.p_W_m.copy()
@@ -55,7 +55,7 @@ def test_a_swell_brings_flakes_back():
 
 
 def test_their_number_stays_even():
-    """After minutes in a current the box still holds them evenly: each half as many as the other, to five deviations."""
+    """After minutes in a current the box still holds them evenly, each half as many as the other."""
     flakes = _flakes()
     for k in range(60):
         flakes.move(2.0 * k, Jet([0.0, 0.0, 0.01]))
@@ -78,7 +78,7 @@ def test_those_before_the_camera_are_told():
     later = flakes.before(LEVEL, 1.5, Jet([0, 0, 0]))
     common = np.isin(told.looks[:, 1], later.looks[:, 1])
     assert common.mean() > 0.85
-    where = {size: p for size, p in zip(later.looks[:, 1], later.p_W_m, strict=True)}
+    where = dict(zip(later.looks[:, 1], later.p_W_m, strict=True))
     moved = np.array([where[size] for size in told.looks[common, 1]]) - told.p_W_m[common]
     assert moved == pytest.approx(np.tile([0.025, -0.01, 0.0], (len(moved), 1)), abs=1e-9)
 

@@ -67,7 +67,7 @@ def flake_positions(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Seen:
-    """Flakes before a camera: places in its frame and velocities in the world, (n, 3), size (normal) and shade, (n,)."""
+    """Flakes before a camera: places in its frame and velocities in the world, (n, 3), size and shade, (n,)."""
 
     p_C_m: Array
     v_W_m_s: Array
@@ -129,7 +129,7 @@ def draw_flakes(
     """Lay flakes over a photograph, each a soft disk, streaked by its own motion and the camera's; returns a new image.
 
     A flake covers as much light as its shadow: the blur disk of a thin lens spreads it, with diameter
-    f A |1/z - 1/z_focus| in pixels, and the cover falls by the ratio of areas. Their places are those of the middle of the exposure.
+    f A |1/z - 1/z_focus| in pixels, and the cover falls by the ratio of areas. Places are those of mid-exposure.
     """
     points_C_m = flakes.p_C_m
     diameter = MEDIAN_DIAMETER_M * np.exp(LOG_SPREAD * flakes.size)

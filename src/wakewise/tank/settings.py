@@ -72,7 +72,11 @@ class WaveSettings(Settings):
 
 
 class PumpSettings(Settings):
-    """A pump's fixed jet."""
+    """A pump's fixed jet.
+
+    0.5 m/s from an outlet of 0.3 m at 1.2 m depth makes 0.3 m/s at a target in the middle of the tank; the same speed
+    in all the water, as of a recirculating channel, is a `current`.
+    """
 
     speed_m_s: float = Field(0.0, ge=0.0, le=5.0, description="its exit speed, 0 for none")
     diameter_m: float = Field(0.05, ge=0.005, le=0.5, description="diameter of its outlet")
