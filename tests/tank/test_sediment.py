@@ -252,7 +252,7 @@ def test_a_plume_is_that_of_advection_and_diffusion():
     silt = Silt(laws, 0.0, (1.2, 1.0, 0.6), 10**6, np.random.default_rng(0))
     source, rng, dt, each = np.array([-0.5, 0.0, 0.3]), np.random.default_rng(1), 0.1, 250
     water = Uniform([speed, 0, 0])
-    for _ in range(160):
+    for _ in range(200):
         silt.step(water, NOWHERE, dt)
         fresh = source + np.column_stack([rng.random(each) * speed * dt, np.zeros((each, 2))])
         silt.position_m = np.concatenate([silt.position_m, fresh])
@@ -290,7 +290,7 @@ def test_a_settling_plume_sinks_as_it_goes():
 
 
 def test_nodes_on_bed_and_walls_tell_what_is_before_them():
-    """Even silt is even on a grid of all the water, on its faces and edges too, where a node has less water round it."""
+    """Even silt is even on a grid of all the water, on its faces too, where a node has less water round it."""
     silt = _silt(load=0.0)
     n = 400_000
     silt.position_m = np.random.default_rng(2).uniform([-0.5, -0.5, 0.0], [0.5, 0.5, 0.5], (n, 3))
