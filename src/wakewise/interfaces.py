@@ -102,15 +102,74 @@ class Command:
 class ScalarGrid:
     """A scalar field on a regular grid of the world, such as silt concentration in kg/m3.
 
-    `values`, shape (nx, ny, nz), sits at `origin_W_m + spacing_m * (i, j, k)`; outside the grid the field is zero.
+    `values`, shape (nx, ny, nz), sits at `origin_W_m + spacing_m * (i, j, k)`; outside the grid the field is that of
+    the coarser grid `outer`, and zero where there is none.
     """
 
     origin_W_m: Array
     spacing_m: float
     values: Array
+    outer: ScalarGrid | None = None
 
     def __post_init__(self) -> None:
         freeze(self, origin_W_m=(3,), values=(None, None, None))
+
+    @property
+    def levels(self) -> tuple[Array, Array, float, Array, Array, float]:
+        """Values, origin and spacing of the grid, then of the outer one; a single zero far away stands for none."""
+        outer = self.outer
+        coarse = _NOWHERE if outer is None else (outer.values, outer.origin_W_m, outer.spacing_m)
+        return self.values, self.origin_W_m, self.spacing_m, *coarse
+
+    @property
+    def largest(self) -> float:
+        """Largest value on either grid; 0 of an empty one."""
+        highest = float(self.values.max(initial=0.0))
+        return highest if self.outer is None else max(highest, self.outer.largest)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FlakeCloud:
+    """Flakes that drift with the water, at one instant: those that a camera may see one by one.
+
+    They are the same ones from instant to instant, evenly spread, `per_m3` in a cubic metre, in the box of the world
+    from `low_W_m` to `high_W_m`; of them those at a depth below `depth_m` and with slopes x / z and y / z up to
+    `slopes` in the camera's frame are given.
+
+    Parameters
+    ----------
+    p_W_m, v_W_m_s : ndarray, shape (n, 3)
+        Where they are and how the water moves them.
+    looks : ndarray, shape (n, 3)
+        Of each flake, for good: its rank among them (0 to 1: where fewer are in the water than `per_m3`, those of the
+        lowest ranks), its size (standard normal) and its shade (0 to 1).
+    """
+
+    p_W_m: Array
+    v_W_m_s: Array
+    looks: Array
+    low_W_m: Array
+    high_W_m: Array
+    per_m3: float
+    depth_m: float
+    slopes: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        n = len(self.p_W_m)
+        freeze(self, p_W_m=(n, 3), v_W_m_s=(n, 3), looks=(n, 3), low_W_m=(3,), high_W_m=(3,))
+
+    def covers(self, points_W_m: Array, X_WC: Pose) -> Array:
+        """Whether places, shape (n, 3), lie where all flakes are given, shape (n,), for a camera at X_WC."""
+        p_C = X_WC.inverse().apply(points_W_m)
+        z = np.maximum(p_C[:, 2], 1e-9)
+        ahead = (p_C[:, 2] > 0.0) & (p_C[:, 2] < self.depth_m)
+        seen = (np.abs(p_C[:, 0]) < self.slopes[0] * z) & (np.abs(p_C[:, 1]) < self.slopes[1] * z)
+        boxed = np.all((points_W_m >= self.low_W_m) & (points_W_m <= self.high_W_m), axis=1)
+        covered: Array = ahead & seen & boxed
+        return covered
+
+
+_NOWHERE = (np.zeros((1, 1, 1)), np.full(3, 1e12), 1.0)
 
 
 class WakeModel(Protocol):
@@ -209,7 +268,8 @@ class WaterTruth:
     0.3 m, and `tracer_speed_mean_m_s` what PIV would call the speed there, the straight way of tracers over the time
     of one picture. `turbidity_per_m` is the mean beam attenuation by silt in the water within 0.3 m of the target's
     centre, and `ray_optical_depth` that attenuation along the rays from the camera to the side of the target that it
-    faces, from end to end, a mean without unit. NaN where a witness does not know.
+    faces, from end to end, a mean without unit. `silt_lifted_g` is what the bed has given up since the start, settled
+    again or not, `silt_suspended_g` what is in the water now. NaN where a witness does not know.
     """
 
     target_speed_mean_m_s: float
@@ -221,6 +281,8 @@ class WaterTruth:
     bed_shear_p95_Pa: float = math.nan
     tracer_speed_mean_m_s: float = math.nan
     ray_optical_depth: float = math.nan
+    silt_lifted_g: float = math.nan
+    silt_suspended_g: float = math.nan
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

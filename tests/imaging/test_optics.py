@@ -13,7 +13,8 @@ from scipy.interpolate import RegularGridInterpolator
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.imaging import Lights, PinholeCamera, Render, SiltOptics, haze_between, through_water, water_optics
-from wakewise.imaging.optics import BACKSCATTER_RATIO, decayed, sample_grid, water_types
+from wakewise.imaging.grids import sample_grid
+from wakewise.imaging.optics import BACKSCATTER_RATIO, decayed, water_types
 from wakewise.interfaces import ScalarGrid
 
 DATA = pathlib.Path(os.environ.get("WAKEWISE_DATA", pathlib.Path(__file__).parents[3] / "shared" / "data"))
@@ -179,3 +180,16 @@ def test_band_values_follow_from_the_published_tables():
             assert water.veil_per_m[k] == pytest.approx(-2 * np.log(((w * veil) @ kept) / (w @ veil)), abs=6e-4)
             assert water.backscatter_per_m[k] == pytest.approx((w @ back) / w.sum(), abs=6e-6)
             assert water.veil[k] == pytest.approx((w @ veil) / w.sum(), abs=6e-5)
+
+
+def test_outside_the_grid_lies_the_outer_one():
+    """A ray that leaves the inner grid goes on through the outer grid's silt: the depth is the sum of both."""
+    water = water_optics("I")
+    outer = uniform_silt(0.01)
+    inner = ScalarGrid(
+        origin_W_m=np.array([-1.0, -1.0, -0.5]), spacing_m=0.5, values=np.full((5, 5, 3), 0.03), outer=outer
+    )
+    haze = haze_between(CAMERA, Pose(np.zeros(3)), water, SILT, inner, DARK)
+    ahead = haze.silt_tau[haze.silt_tau.shape[0] // 2, haze.silt_tau.shape[1] // 2]
+    expected = SILT.attenuation_m2_kg * (0.03 * 0.5 + 0.01 * 0.5)
+    assert np.interp(1.0, haze.ranges_m, ahead) == pytest.approx(expected, rel=0.08)

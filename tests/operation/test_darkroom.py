@@ -4,6 +4,7 @@ import os
 import sys
 import time
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from wakewise.operation import Darkroom, load_scenario, photograph_flight
 from wakewise.operation.darkroom import MOST_WAITING, packed, unpacked
 from wakewise.operation.photography import fingerprint, take_photograph
 from wakewise.operation.recorder import ExposureRecord, read_exposures, write_exposures
+from wakewise.tank.flakes import Flakes
+from wakewise.water import SteadyCurrent
 
 SMALL = {
     "mission.elevations_deg": [40],
@@ -32,14 +35,28 @@ def parts():
 def exposures(parts):
     """Four exposures on the planned way, moving, in patchy silt."""
     rng = np.random.default_rng(0)
+    current = SteadyCurrent(velocity_W_m_s=np.array([0.03, 0.02, 0.0]))
+    drift = Flakes(parts.target.centre_W_m, parts.target.bed_z_m, current, rng)
     out = []
     for time_s, X in zip(parts.route.exposures_s, parts.route.X_WC_planned, strict=True):
         poses = tuple(X @ Pose(np.array([k * 2e-4, 0, 0]), quat_from_rotvec(np.zeros(3))) for k in range(5))
         silt = ScalarGrid(
             origin_W_m=np.array([-1.0, -1, 0.5]), spacing_m=0.1, values=rng.uniform(0, 0.004, (20, 20, 10))
         )
-        out.append(ExposureRecord(time_s=float(time_s), X_WC_true=poses, X_WC_est=X, silt=silt))
+        outer = ScalarGrid(
+            origin_W_m=np.array([-3.0, -2.5, -0.1]), spacing_m=0.2, values=rng.uniform(0, 0.002, (31, 26, 9))
+        )
+        flakes = drift.before(X, float(time_s), Still())
+        silt = replace(silt, outer=outer)
+        out.append(ExposureRecord(time_s=float(time_s), X_WC_true=poses, X_WC_est=X, silt=silt, flakes=flakes))
     return out
+
+
+class Still:
+    """Water to which no thruster adds."""
+
+    def excess_velocity(self, points_W_m):
+        return np.zeros((len(points_W_m), 3))
 
 
 def photographed(parts, exposures, folder, beside):
@@ -133,3 +150,22 @@ def test_a_photograph_of_another_flight_is_made_anew(parts, exposures, tmp_path)
     assert take_photograph(parts, tmp_path, 0, kept[0]) == first
     again = take_photograph(parts, tmp_path, 0, kept[1])
     assert again["exposure"] != first["exposure"] and path.read_bytes() != before
+
+
+def test_flakes_and_outer_silt_are_kept_and_old_files_are_read_without(exposures, tmp_path):
+    """What was written is read again; a file of before they were kept has neither; both are in the fingerprint."""
+    path = tmp_path / "exposures.npz"
+    write_exposures(path, exposures, 0.01)
+    read = read_exposures(path)
+    for before, after in zip(exposures, read, strict=True):
+        assert after.silt.outer.values == pytest.approx(before.silt.outer.values, abs=1e-9)
+        assert after.flakes.p_W_m == pytest.approx(before.flakes.p_W_m, abs=1e-6)
+        assert after.flakes.v_W_m_s == pytest.approx(before.flakes.v_W_m_s, abs=1e-4)
+        assert after.flakes.slopes == before.flakes.slopes
+    with np.load(path) as data:
+        kept = {name: data[name] for name in data if not name.startswith(("flake", "silt_outer"))}
+    np.savez(path, **kept)
+    old = read_exposures(path)
+    assert all(exposure.flakes is None and exposure.silt.outer is None for exposure in old)
+    marks = {fingerprint(e) for e in (read[0], replace(read[0], flakes=None), replace(read[0], silt=old[0].silt))}
+    assert len(marks) == 3

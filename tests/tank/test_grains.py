@@ -10,11 +10,14 @@ from hypothesis import strategies as st
 from wakewise.errors import InputError
 from wakewise.tank.grains import (
     beam_attenuation_per_m,
-    erosion_rate_kg_m2_s,
+    erosion_rates_kg_m2_s,
     friction_from,
     friction_table_m_s,
     friction_velocity_m_s,
     grain_number,
+    least_mean,
+    mean_excess,
+    mean_pickup_rates_kg_m2_s,
     pickup_rate_kg_m2_s,
     settling_speed_m_s,
     speed_at_stress_m_s,
@@ -64,8 +67,48 @@ def test_the_table_of_friction_velocities_is_the_law(grain):
 
 
 def test_erosion_starts_at_the_threshold():
-    """Nothing below it, M at twice it."""
-    assert erosion_rate_kg_m2_s([0.0, 0.05, 0.1, 0.2], 0.1, 5e-5) == pytest.approx([0, 0, 0, 5e-5])
+    """Under a steady stress nothing below it, M at twice it."""
+    stress = np.array([0.0, 0.05, 0.1, 0.2])
+    assert erosion_rates_kg_m2_s(stress, np.full(4, 0.1), 5e-5, 0.0) == pytest.approx([0, 0, 0, 5e-5])
+
+
+def _drawn(mean, intensity):
+    s = np.sqrt(np.log1p(intensity**2))
+    return mean * np.exp(s * np.random.default_rng(0).standard_normal(1_000_000) - 0.5 * s**2)
+
+
+@pytest.mark.parametrize("intensity", [0.2, 0.4, 0.8])
+@pytest.mark.parametrize("mean", [0.5, 0.8, 1.0, 1.5, 4.0])
+def test_the_mean_excess_is_that_of_drawn_stresses(mean, intensity):
+    """A million log-normal stresses with that mean and rms exceed the threshold by as much on average."""
+    drawn = _drawn(mean, intensity)
+    assert drawn.std() == pytest.approx(intensity * mean, rel=0.01)
+    excess = np.maximum(drawn - 1.0, 0.0)
+    noise = 4 * excess.std() / 1000
+    assert mean_excess(mean, intensity) == pytest.approx(excess.mean(), abs=noise)
+
+
+def test_strong_stress_erodes_as_if_it_were_steady():
+    """Far above the threshold the fluctuation adds nothing, far below hardly anything, and never less than nothing."""
+    assert mean_excess(10.0, 0.4) == pytest.approx(9.0, rel=1e-6)
+    assert 0.0 < mean_excess(0.5, 0.4) < 0.01
+    assert mean_excess(0.0, 0.4) == mean_excess(1e-9, 0.4) == 0.0
+    assert mean_excess(1.5, 0.0) == 0.5
+    below = least_mean(0.4)
+    assert 0.2 < below < 0.5
+    assert mean_excess(below, 0.4) == pytest.approx(1e-4, rel=1e-3)
+
+
+@pytest.mark.parametrize("over", [0.7, 1.0, 2.0, 10.0])
+def test_the_mean_pickup_is_that_of_drawn_stresses(over):
+    """Van Rijn's rate averaged over a million drawn stresses is the quadrature, to its noise."""
+    grain = 2.5e-4, 2710.0, 1000.0
+    threshold = threshold_stress_Pa(*grain)
+    drawn = pickup_rate_kg_m2_s(_drawn(over * threshold, 0.4), threshold, *grain)
+    found = mean_pickup_rates_kg_m2_s(np.array([over * threshold]), np.array([threshold]), *grain, 0.4)
+    assert found[0] == pytest.approx(drawn.mean(), abs=4 * drawn.std() / 1000 + 1e-12)
+    steady = mean_pickup_rates_kg_m2_s(np.array([over * threshold]), np.array([threshold]), *grain, 0.0)
+    assert steady[0] == pytest.approx(float(pickup_rate_kg_m2_s(over * threshold, threshold, *grain)))
 
 
 def test_fifty_milligrams_of_silt_dim_a_beam():

@@ -106,3 +106,17 @@ def test_tracers_go_by_the_midpoint():
     starts = np.array([[0.1, 0.0, 1.0], [0.2, 0.0, 1.0]])
     speeds = tracer_speeds_m_s(Growing(), starts, Growing().velocity(starts), FRAME_S, 1.5)
     assert speeds == pytest.approx(3.0 * starts[:, 0] * (1 + 1.5 * FRAME_S))
+
+
+def test_silt_outside_the_inner_grid_is_that_of_the_outer():
+    """A ray and a point beyond the inner grid see the outer one's silt; within it the inner one alone counts."""
+    outer = ScalarGrid(origin_W_m=np.array([-3.0, -2.5, -0.1]), spacing_m=0.2, values=np.full((31, 26, 9), 0.03))
+    silt = ScalarGrid(
+        origin_W_m=np.array([-0.8, -0.8, 0.5]), spacing_m=0.05, values=np.full((33, 33, 21), 0.02), outer=outer
+    )
+    points = np.array([[0.0, 0.0, 1.2], [1.5, 0.0, 1.2], [0.0, 0.0, 0.2], [9.0, 0.0, 1.0]])
+    assert concentration_at(silt, points).tolist() == [0.02, 0.03, 0.03, 0.0]
+    probes = TargetProbes(PYRAMID, np.random.default_rng(0))
+    far = np.array([1.6, 0.0, 1.35])
+    alone = ScalarGrid(origin_W_m=silt.origin_W_m, spacing_m=0.05, values=silt.values)
+    assert probes.ray_optical_depth(LAWS, silt, far) > 1.5 * probes.ray_optical_depth(LAWS, alone, far)

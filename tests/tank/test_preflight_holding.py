@@ -31,3 +31,15 @@ def test_the_hardest_stream_counts():
 def test_a_stream_too_fast_leaves_less_than_nothing():
     """At 2.5 m/s no small vehicle holds: the margin is negative."""
     assert holding(VEHICLE, np.array([[0.0, 2.5, 0.0]]), 1000.0).margin_pct < 0.0
+
+
+def test_the_worst_drag_counts():
+    """A share of drag on top raises force and lowers what is to spare, and is said with speed, force and limit."""
+    believed = holding(VEHICLE, np.array([[-0.5, 0.0, 0.0]]), 1000.0)
+    worst = holding(VEHICLE, np.array([[-0.5, 0.0, 0.0]]), 1000.0, 0.0, 0.3)
+    assert worst.drag_N == pytest.approx(1.3 * believed.drag_N)
+    assert worst.share == pytest.approx(believed.share / 1.3, rel=1e-6)
+    assert "0.50 m/s" in worst.said()
+    assert f"{abs(worst.drag_N[0]):.1f} N in surge if its drag is 30 % more than believed" in worst.said()
+    assert f"hold {worst.share * abs(worst.drag_N[0]):.1f} N" in worst.said()
+    assert "believed" not in believed.said()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from wakewise.tank.grains import mean_excess
 from wakewise.tank.sediment import Silt, SiltLaws
 
 SIZE_M = (1.0, 1.0, 0.5)
@@ -170,7 +171,7 @@ def test_sand_is_lifted_by_van_rijns_law():
     silt._shear(Uniform([0.6, 0, 0]), EVERYWHERE)
     silt._erode(0.05)
     stress = 1000.0 * silt._star_m_s**2
-    expected = silt.laws.lifted_kg_m2_s(stress).sum() * 0.05
+    expected = silt.laws.lifted_kg_m2_s(stress.ravel(), np.full(stress.size, 50.0)).sum() * 0.05
     assert before - silt.bed_kg_m2.sum() == pytest.approx(expected, rel=0.05)
 
 
@@ -181,3 +182,119 @@ def test_mass_is_kept_to_a_millionth_through_lifting_and_settling_of_sand():
     for k in range(150):
         silt.step(Uniform([0.5 if k < 100 else 0.0, 0, 0]), EVERYWHERE, 0.1)
     assert silt.mass_error_rel < 1e-9
+
+
+def test_a_fluctuating_stress_lifts_what_its_mean_does_not():
+    """Just below the threshold a steady stress moves nothing, a turbulent one what the mean excess says."""
+    stress = 0.9 * 0.0625
+    laws = [SiltLaws.of(20e-6, 2710.0, 1000.0, 5e-5, 0.0625, stress_intensity=i) for i in (0.0, 0.4)]
+    load = np.array([1.0])
+    assert laws[0].lifted_kg_m2_s(np.array([stress]), load)[0] == 0.0
+    assert laws[1].lifted_kg_m2_s(np.array([stress]), load)[0] == pytest.approx(5e-5 * mean_excess(0.9, 0.4))
+    assert laws[1].stirring_Pa < 0.5 * laws[0].stirring_Pa
+
+
+def test_fluff_goes_first_and_the_firm_layer_stays():
+    """Between the two thresholds all the fluff leaves, no firm grain; above both, the firm layer erodes too."""
+    laws = SiltLaws.of(8e-6, 2650.0, 1000.0, 1e-3, 0.035, firm_kg_m2=0.5, firm_threshold_Pa=0.35)
+    silt = Silt(laws, 0.6, SIZE_M, 4000, np.random.default_rng(0))
+    start = silt.total_kg
+    star = np.sqrt(0.2 / 1000.0)
+    for _ in range(400):
+        silt._star_m_s = np.full(silt._shape, star)
+        silt._erode(0.1)
+    assert silt.bed_kg_m2 == pytest.approx(np.full(silt._shape, 0.5), abs=1e-6)
+    assert silt.lifted_kg == pytest.approx(0.1, rel=1e-3)
+    silt._star_m_s = np.full(silt._shape, np.sqrt(0.7 / 1000.0))
+    silt._erode(1.0)
+    assert silt.lifted_kg == pytest.approx(0.1 + 1e-3, rel=0.01)
+    assert silt.total_kg == pytest.approx(start, rel=1e-12)
+
+
+def test_what_settles_on_a_firm_bed_is_fluff():
+    """A grain that has settled on a bare firm layer goes again at the fluff's threshold."""
+    laws = SiltLaws.of(8e-6, 2650.0, 1000.0, 1e-3, 0.035, firm_kg_m2=0.5)
+    stress = np.array([0.1, 0.1])
+    rates = laws.lifted_kg_m2_s(stress, np.array([0.5, 0.501]))
+    assert rates[0] == 0.0
+    assert rates[1] == pytest.approx(1e-3 * (0.1 / 0.035 - 1))
+    assert laws.firm_threshold_Pa == pytest.approx(0.35)
+
+
+def test_what_was_lifted_is_what_left_the_bed():
+    """Lifted less settled again is what is in the water, through a flight of erosion and rest, to rounding."""
+    silt = _silt()
+    settled, before = 0.0, silt.bed_kg_m2.sum() * silt._cell.prod()
+    for k in range(120):
+        silt.step(Whirl() if k < 60 else Uniform([0, 0, 0]), EVERYWHERE, 0.05)
+    after = silt.bed_kg_m2.sum() * silt._cell.prod()
+    settled = silt.lifted_kg - (before - after)
+    assert silt.lifted_kg > 0.0
+    assert settled > 0.0
+    assert silt.suspended_kg == pytest.approx(silt.lifted_kg - settled, rel=1e-9)
+
+
+def test_aggregates_sink_at_the_speed_given():
+    """A settling speed that is given replaces the grain's own and nothing else."""
+    own, given = (SiltLaws.of(8e-6, 2650.0, 1000.0, 1e-4, settling_m_s=w) for w in (None, 3e-4))
+    assert given.settling_m_s == 3e-4
+    assert own.settling_m_s == pytest.approx(5.2e-5, rel=0.05)
+    assert given.threshold_Pa == own.threshold_Pa
+
+
+def test_a_plume_is_that_of_advection_and_diffusion():
+    """Downstream of a steady point source in a uniform stream: Q / U through each plane, Gaussian with variance 2 K t.
+
+    Far from the bed K is even, K0 + 0.40 u* 0.065 m; along the stream diffusion is negligible there.
+    """
+    speed, rate, h = 0.05, 1e-6, 0.02
+    laws = SiltLaws.of(1e-6, 2710.0, 1000.0, 0.0)
+    silt = Silt(laws, 0.0, (1.2, 1.0, 0.6), 10**6, np.random.default_rng(0))
+    source, rng, dt, each = np.array([-0.5, 0.0, 0.3]), np.random.default_rng(1), 0.1, 250
+    water = Uniform([speed, 0, 0])
+    for _ in range(200):
+        silt.step(water, NOWHERE, dt)
+        fresh = source + np.column_stack([rng.random(each) * speed * dt, np.zeros((each, 2))])
+        silt.position_m = np.concatenate([silt.position_m, fresh])
+        silt.mass_kg = np.concatenate([silt.mass_kg, np.full(each, rate * dt / each)])
+    diffusivity = 1e-5 + 0.4 * 0.065 * float(silt._star_m_s[0, 0])
+    assert diffusivity > 5e-5
+    grid = silt.concentration(np.array([-0.6, -0.3, 0.0]), h, (61, 31, 31))
+    for x in (-0.3, 0.0, 0.2):
+        spread = 2 * diffusivity * (x - source[0]) / speed
+        near = silt.position_m[np.abs(silt.position_m[:, 0] - x) < 0.05]
+        assert (near[:, 1:] - source[1:]).var(axis=0) == pytest.approx(np.full(2, spread), rel=0.1)
+        planes = grid.values[round((x + 0.6) / h) - 2 : round((x + 0.6) / h) + 3].mean(axis=0)
+        assert planes.sum() * h**2 == pytest.approx(rate / speed, rel=0.03)
+        # Sharing among nodes spreads each grain by h^2 / 6 per axis.
+        wide = spread + h**2 / 6
+        y, z = np.meshgrid(-0.3 + h * np.arange(31), h * np.arange(31), indexing="ij")
+        law = rate / (2 * np.pi * wide * speed) * np.exp(-(y**2 + (z - 0.3) ** 2) / (2 * wide))
+        assert np.abs(planes - law).max() < 0.12 * law.max()
+        assert np.abs(planes - law).sum() < 0.12 * law.sum()
+
+
+def test_a_settling_plume_sinks_as_it_goes():
+    """Grains released into a stream lie lower by w x / U, and what reaches the bed is counted there."""
+    laws = SiltLaws.of(20e-6, 2710.0, 1000.0, 0.0, settling_m_s=0.01)
+    silt = Silt(laws, 0.0, (1.2, 1.0, 0.6), 10**6, np.random.default_rng(0))
+    silt.position_m = np.tile([-0.5, 0.0, 0.2], (4000, 1))
+    silt.mass_kg = np.full(4000, 1e-6)
+    for _ in range(100):
+        silt.step(Uniform([0.05, 0, 0]), NOWHERE, 0.1)
+    assert silt.position_m.mean(axis=0) == pytest.approx([0.0, 0.0, 0.3], abs=0.005)
+    for _ in range(700):
+        silt.step(Uniform([0.0, 0, 0]), NOWHERE, 0.1)
+    assert silt.suspended_kg < 1e-3 * 4000e-6
+    assert silt.total_kg == pytest.approx(4000e-6, rel=1e-12)
+
+
+def test_nodes_on_bed_and_walls_tell_what_is_before_them():
+    """Even silt is even on a grid of all the water, on its faces too, where a node has less water round it."""
+    silt = _silt(load=0.0)
+    n = 400_000
+    silt.position_m = np.random.default_rng(2).uniform([-0.5, -0.5, 0.0], [0.5, 0.5, 0.5], (n, 3))
+    silt.mass_kg = np.full(n, 0.02 * 0.5 / n)
+    values = silt.concentration(np.array([-0.5, -0.5, 0.0]), 0.1, (11, 11, 6)).values[:, :, 1:]
+    for part in (values[0], values[-1], values[:, 0], values[:, -1], values[:, :, -1], values[1:-1, 1:-1, :-1]):
+        assert part.mean() == pytest.approx(0.02, rel=0.02)

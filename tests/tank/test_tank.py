@@ -204,3 +204,63 @@ def test_bad_settings_are_refused(bad):
     """Negative silt, a grain of no size, no time step and unknown fields do not validate."""
     with pytest.raises(ValidationError):
         TankSettings(**bad)
+
+
+@pytest.mark.parametrize("kind", ["fresh-mud", "fluff", "sand"])
+def test_a_flight_over_any_bed_keeps_its_grams(kind):
+    """Through seconds of downwash and of rest: bed and water hold what they held, and what is lifted is told."""
+    tank = _tank(silt={"kind": kind})
+    start, bed = tank.silt.total_kg, tank.silt.bed_kg_m2.copy()
+    told = []
+    for thrusts in (HOLD_DOWN, np.zeros(8)):
+        _fly(tank, 2.0, thrusts)
+        told.append(tank.measure())
+    silt = tank.silt
+    assert silt.total_kg == pytest.approx(start, rel=1e-9)
+    assert told[0].silt_lifted_g > 0.0
+    assert told[1].silt_lifted_g >= told[0].silt_lifted_g
+    assert told[1].silt_suspended_g == pytest.approx(1e3 * silt.suspended_kg)
+    settled_kg = silt.lifted_kg - silt.suspended_kg
+    left_kg = float((bed - silt.bed_kg_m2).sum()) * silt._cell.prod()
+    assert left_kg == pytest.approx(silt.lifted_kg - settled_kg, rel=1e-6)
+    assert settled_kg > -1e-12
+
+
+def test_silt_is_known_in_all_the_water():
+    """Silt evenly in the water is told by the inner grid and, in the whole tank, by the outer one."""
+    tank = _tank(silt={"kind": "caco3-50mg"})
+    grid = tank.concentration_grid()
+    outer = grid.outer
+    assert outer.values.size < 10_000
+    assert outer.origin_W_m[:2] == pytest.approx([-3.0, -2.5])
+    far = outer.origin_W_m + outer.spacing_m * (np.array(outer.values.shape) - 1)
+    assert far == pytest.approx([3.0, 2.5, 1.5])
+    assert outer.values[:, :, 1:].mean() == pytest.approx(0.05, rel=0.05)
+    assert grid.values.mean() == pytest.approx(0.05, rel=0.05)
+
+
+def test_a_swell_works_on_the_bed_of_the_tank():
+    """Under a swell the bed's stress beside the target is the swell's, and silt is lifted without any thrust."""
+    tank = _tank(waves={"amplitude_m": 0.06, "period_s": 4.0}, p=(1.5, 0.0, 0.7))
+    highest = 0.0
+    for _ in range(10):
+        _fly(tank, 0.2, np.zeros(8))
+        highest = max(highest, tank.measure().bed_shear_p95_Pa)
+    swell = tank._swell
+    peak = float(swell.stress_Pa(np.zeros((1, 2)), 0.0)[0])
+    assert highest == pytest.approx(peak, rel=0.15)
+    assert tank.measure().silt_lifted_g > 0.0
+
+
+def test_the_tanks_flakes_drift_with_its_current():
+    """Flakes before the camera a second later are where the current has brought them, and are the same ones."""
+    tank = _tank(current={"velocity_m_s": (0.05, 0.0, 0.0)}, silt=CLEAN)
+    eye = Pose(np.array([0.0, 0.0, 0.8]))
+    first = tank.flakes(eye)
+    _fly(tank, 1.0, np.zeros(8))
+    second = tank.flakes(eye)
+    where = dict(zip(second.looks[:, 1], second.p_W_m, strict=True))
+    both = [k for k, size in enumerate(first.looks[:, 1]) if size in where]
+    assert len(both) > 0.7 * len(first.p_W_m)
+    moved = np.array([where[first.looks[k, 1]] for k in both]) - first.p_W_m[both]
+    assert np.median(moved, axis=0) == pytest.approx([0.05, 0.0, 0.0], abs=1e-3)

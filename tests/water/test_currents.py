@@ -128,3 +128,15 @@ def test_a_pump_outside_the_water_is_refused():
         _built(pump={"speed_m_s": 1.0, "at_m": (0.0, 0.0, 2.0)})
     with pytest.raises(InputError, match=r"pump\.towards"):
         _built(pump={"speed_m_s": 1.0, "towards": (0.0, 0.0, 0.0)})
+
+
+def test_a_wide_pump_sends_the_papers_current_over_the_target():
+    """0.5 m/s from an outlet of 0.3 m at 1.2 m depth is 0.3 m/s at a target 2.9 m away, and a jet."""
+    jet = PumpJet(
+        outlet_W_m=np.array([-2.9, 0.0, 1.2]), towards_W=np.array([1.0, 0.0, 0.0]), speed_m_s=0.5, diameter_m=0.3,
+        bed_z_m=1.5, reach_m=8.0,
+    )  # fmt: skip
+    at_target = np.array([[0.0, y, z] for y in (-0.07, 0.0, 0.07) for z in (1.25, 1.35, 1.45)])
+    assert jet.velocity(at_target, 0.0)[:, 0] == pytest.approx(np.full(9, 0.3), rel=0.15)
+    beside = jet.velocity(np.array([[0.0, 1.5, 1.2], [0.0, 0.0, 0.3]]), 0.0)
+    assert np.abs(beside[:, 0]).max() < 0.03

@@ -31,7 +31,7 @@ from wakewise.imaging import (
     sharpness,
     through_water,
 )
-from wakewise.imaging.particles import draw_flakes, flake_positions
+from wakewise.imaging.particles import draw_flakes, flakes_before
 from wakewise.imaging.sensor import expose
 from wakewise.imaging.settings import FLAKES_PER_KG
 from wakewise.interfaces import ScalarGrid
@@ -110,8 +110,10 @@ def parts(scene: Scene, settings: ImagingSettings, views: list[Pose], silt: Scal
         haze = timed("haze", haze_between, camera, view, water, SiltOptics(), silt, lights)
         wet, _ = timed("water", through_water, clean, camera, haze, water, lights.from_above)
         soft = timed("blur", motion_blur, wet, clean.depth_m, camera, moving(view))
-        flakes = timed("flakes", flake_positions, camera, view, silt, settings.flakes_per_m3, FLAKES_PER_KG, rng)
-        soft = timed("flakes", draw_flakes, soft, clean.depth_m, camera, moving(view), flakes, water, lights, rng)
+        flakes = timed("flakes", flakes_before, camera, view, silt, settings.flakes_per_m3, FLAKES_PER_KG, rng)
+        soft = timed(
+            "flakes", draw_flakes, soft, clean.depth_m, camera, moving(view), flakes, settings.exposure_s, water, lights
+        )
         image = timed("sensor", expose, soft, np.ones(3), 12000.0, 4.0, rng)
         timed("sharpness", sharpness, image, clean.target_fraction)
         moved += motion_px(camera, moving(view), 0.4) / len(views)

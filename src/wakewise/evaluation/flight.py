@@ -98,6 +98,7 @@ def flight_figures(steps: pl.DataFrame) -> dict[str, float | int | None]:
     open. bed_speed_p95_m_s: the same percentile at the bed. turbidity_mean_per_m, disturbance: averaged over time.
     So are target_pressure_mean_Pa, target_pressure_p95_Pa, bed_shear_p95_Pa, tracer_speed_mean_m_s and
     ray_optical_depth, of the whole water; exposure_*: speed, pressure and optical depth while the shutter is open.
+    silt_lifted_g: given up by the bed until the end, settled again or not. silt_suspended_max_g: most in the water.
     position_rmse_mm: true position against the goal's at the same instant. path_rmse_mm: against the goal's path.
     estimate_rmse_mm: estimated against true position. velocity_deviation_pct, roll_pitch_rms_deg: see the functions.
     energy_kJ: electrical. sign_flips_per_s: reversals of all thrusters together per second. fallbacks: steps on which
@@ -138,6 +139,10 @@ def flight_figures(steps: pl.DataFrame) -> dict[str, float | int | None]:
         ("exposure_optical_depth", "ray_optical_depth"),
     ):
         out[key] = None if exposing is None else _mean(steps, column, lasts, exposing)
+    lifted = _finite(steps, "silt_lifted_g")
+    out["silt_lifted_g"] = None if lifted is None else float(lifted[-1])
+    suspended = _finite(steps, "silt_suspended_g")
+    out["silt_suspended_max_g"] = None if suspended is None else float(suspended.max())
     out |= _tracking(steps, time)
     power = _maybe(steps, "power_W")
     out["energy_kJ"] = None if power is None else 1e-3 * float(power[:, 0] @ lasts)
@@ -184,6 +189,15 @@ def _maybe(steps: pl.DataFrame, *names: str) -> Array | None:
         return None
     values = _columns(steps, *names)
     return values if np.all(np.isfinite(values)) else None
+
+
+def _finite(steps: pl.DataFrame, name: str) -> Array | None:
+    """Values of a column that are finite, shape (n,); None if there is none."""
+    if name not in steps.columns:
+        return None
+    values = _columns(steps, name)[:, 0]
+    values = values[np.isfinite(values)]
+    return values if len(values) else None
 
 
 def _flags(steps: pl.DataFrame, name: str) -> BoolArray | None:

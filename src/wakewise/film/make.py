@@ -6,6 +6,7 @@ import hashlib
 import math
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -216,12 +217,18 @@ def silt_at(exposures: list[ExposureRecord], time_s: float) -> ScalarGrid | None
     if k == 0:
         first = exposures[0].silt
         share = float(np.clip(time_s / times[0], 0.0, 1.0)) if times[0] > 0.0 else 1.0
-        return ScalarGrid(origin_W_m=first.origin_W_m, spacing_m=first.spacing_m, values=share * first.values)
+        return _mixed(first, first, share, 0.0)
     if k == len(times):
         return exposures[-1].silt
     a, b = exposures[k - 1].silt, exposures[k].silt
     share = float((time_s - times[k - 1]) / (times[k] - times[k - 1]))
-    return ScalarGrid(origin_W_m=a.origin_W_m, spacing_m=a.spacing_m, values=(1 - share) * a.values + share * b.values)
+    return _mixed(a, b, 1 - share, share)
+
+
+def _mixed(a: ScalarGrid, b: ScalarGrid, of_a: float, of_b: float) -> ScalarGrid:
+    """Weighted sum of two grids that lie alike, and of their outer ones."""
+    outer = None if a.outer is None or b.outer is None else _mixed(a.outer, b.outer, of_a, of_b)
+    return replace(a, values=of_a * a.values + of_b * b.values, outer=outer)
 
 
 def _at(column: Array | None, row: int) -> float | None:

@@ -5,7 +5,9 @@ I = J exp(-beta_D r) + B_inf (1 - exp(-beta_B r)) along a ray of length r, one b
 Silt adds its beam attenuation, integrated along each ray through the field of concentration, and veils in turn; and the
 vehicle's lamps, whose light fades on the way out as well, are scattered back by water and silt.
 
-Left out: the ambient light that silt above the scene takes away, and the blur of forward scattering.
+Half of what large grains take from a beam they only diffract by a degree or so: that half comes back as a blur.
+
+Left out: the ambient light that silt above the scene takes away, and forward scattering in the lamps' veil.
 """
 
 from __future__ import annotations
@@ -21,6 +23,8 @@ from wakewise.compiled import njit
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.imaging.camera import Camera
+from wakewise.imaging.forward_scatter import FORWARD_SHARE, forward_scattered, lobe_rad, mean_square_lever
+from wakewise.imaging.grids import sample_levels
 from wakewise.imaging.lens import ray_at
 from wakewise.imaging.renderer import BAND_ROWS, LAMP_REFERENCE_M, Image, Lights, Render, in_threads
 from wakewise.interfaces import ScalarGrid
@@ -162,14 +166,13 @@ def haze_between(
     ranges = reach_m * np.linspace(0.0, 1.0, nodes) ** 2
     columns, rows = -(-camera.width // stride) + 1, -(-camera.height // stride) + 1
     table = np.zeros((rows, columns, nodes, 4), np.float32)
-    values = np.zeros((1, 1, 1)) if silt is None else silt.values
-    origin = np.zeros(3) if silt is None else silt.origin_W_m
-    spacing = 1.0 if silt is None else silt.spacing_m
+    clear = ScalarGrid(origin_W_m=np.zeros(3), spacing_m=1.0, values=np.zeros((1, 1, 1)))
+    levels = (clear if silt is None else silt).levels
     power = lights.lamp * LAMP_REFERENCE_M**2 / max(1, len(lights.lamps_C_m))
 
     def band(first: int) -> None:
         _march(
-            first, min(first + 4, rows), table, ranges, stride, camera.row, X_WC.R, X_WC.p_m, values, origin, spacing,
+            first, min(first + 4, rows), table, ranges, stride, camera.row, X_WC.R, X_WC.p_m, *levels,
             silt_optics.attenuation_m2_kg, water.signal_per_m, water.veil_per_m, lights.from_above * water.veil,
             lights.from_above * silt_optics.veil, water.backscatter_per_m, silt_optics.backscatter_share,
             lights.lamps_C_m, power,
@@ -180,9 +183,17 @@ def haze_between(
 
 
 def through_water(
-    view: Render, camera: Camera, haze: Haze, water: WaterOptics, from_above: float = 1.0
+    view: Render,
+    camera: Camera,
+    haze: Haze,
+    water: WaterOptics,
+    from_above: float = 1.0,
+    grains: SiltOptics | None = None,
 ) -> tuple[Image, Image]:
     """Lay the water over a view under light `from_above`, relative to the reference.
+
+    Given the silt's `grains`, what they only diffract is blurred and not lost (`wakewise.imaging.forward_scatter`), on
+    the way from the scene as on the lamps' way to it.
 
     Returns
     -------
@@ -192,39 +203,31 @@ def through_water(
     """
     out = np.empty_like(view.radiance)
     silt_per_m = np.empty_like(view.depth_m)
+    spread = grains is not None and bool(haze.silt_tau.max(initial=0.0) > 0.0)
+    signal = np.empty_like(out if spread else out[:0])
+    tau = np.empty_like(silt_per_m if spread else silt_per_m[:0])
+    lost = 1.0 - FORWARD_SHARE if spread else 1.0
 
     def band(first: int) -> None:
         _apply(
-            first, min(first + BAND_ROWS, camera.height), out, silt_per_m, view.radiance, view.lamp_radiance,
-            view.depth_m, haze.ranges_m, haze.table, haze.stride, camera.row, water.signal_per_m, water.veil_per_m,
-            from_above * water.veil,
+            first, min(first + BAND_ROWS, camera.height), out, silt_per_m, signal, tau, lost, view.radiance,
+            view.lamp_radiance, view.depth_m, haze.ranges_m, haze.table, haze.stride, camera.row, water.signal_per_m,
+            water.veil_per_m, from_above * water.veil,
         )  # fmt: skip
 
     in_threads(band, range(0, camera.height, BAND_ROWS))
+    if grains is not None and spread:
+        length_m = tau / np.maximum(silt_per_m, np.float32(1e-9))
+        lever = mean_square_lever(haze.ranges_m, haze.silt_tau, length_m[:: haze.stride, :: haze.stride])
+        out += forward_scattered(signal, tau, lever, camera.focal_px * lobe_rad(grains.diameter_m))
     return out, silt_per_m
-
-
-@njit
-def sample_grid(values: Any, origin: Any, spacing: float, x: float, y: float, z: float) -> float:
-    """Trilinear value of a grid at a point; zero outside."""
-    u, v, w = (x - origin[0]) / spacing, (y - origin[1]) / spacing, (z - origin[2]) / spacing
-    nx, ny, nz = values.shape
-    if not (0.0 <= u <= nx - 1 and 0.0 <= v <= ny - 1 and 0.0 <= w <= nz - 1):
-        return 0.0
-    i, j, k = min(int(u), max(nx - 2, 0)), min(int(v), max(ny - 2, 0)), min(int(w), max(nz - 2, 0))
-    a, b, c = u - i, v - j, w - k
-    i1, j1, k1 = min(i + 1, nx - 1), min(j + 1, ny - 1), min(k + 1, nz - 1)
-    low = (values[i, j, k] * (1 - a) + values[i1, j, k] * a) * (1 - b)
-    low += (values[i, j1, k] * (1 - a) + values[i1, j1, k] * a) * b
-    high = (values[i, j, k1] * (1 - a) + values[i1, j, k1] * a) * (1 - b)
-    high += (values[i, j1, k1] * (1 - a) + values[i1, j1, k1] * a) * b
-    return low * (1 - c) + high * c
 
 
 @njit(nogil=True)
 def _march(
     first: int, last: int, table: Any, ranges: Any, stride: int, lens: Any, R_WC: Any, p: Any, values: Any, origin: Any,
-    spacing: float, attenuation: float, signal: Any, veil_rate: Any, water_veil: Any, silt_veil: Any, water_back: Any,
+    spacing: float, outer: Any, outer_origin: Any, outer_spacing: float, attenuation: float,
+    signal: Any, veil_rate: Any, water_veil: Any, silt_veil: Any, water_back: Any,
     silt_back: Any, lamps: Any, power: float,
 ) -> None:  # fmt: skip
     """Midpoint rule in rows first..last-1, two steps between nodes; in a step the medium is uniform.
@@ -260,8 +263,8 @@ def _march(
                 for half in range(2):
                     t = ranges[node - 1] + (half + 0.5) * length
                     x, y, z = x0 + t * dx, y0 + t * dy, z0 + t * dz
-                    silt = attenuation * sample_grid(
-                        values, origin, spacing,
+                    silt = attenuation * sample_levels(
+                        values, origin, spacing, outer, outer_origin, outer_spacing,
                         p[0] + R_WC[0, 0] * x + R_WC[0, 1] * y + R_WC[0, 2] * z,
                         p[1] + R_WC[1, 0] * x + R_WC[1, 1] * y + R_WC[1, 2] * z,
                         p[2] + R_WC[2, 0] * x + R_WC[2, 1] * y + R_WC[2, 2] * z,
@@ -314,8 +317,9 @@ def decayed(tau: float) -> float:
 
 @njit(nogil=True)
 def _apply(
-    first_row: int, last_row: int, out: Any, silt_per_m: Any, radiance: Any, lamp_radiance: Any, depth_m: Any,
-    ranges: Any, table: Any, stride: int, lens: Any, signal: Any, veil_rate: Any, water_veil: Any,
+    first_row: int, last_row: int, out: Any, silt_per_m: Any, signals: Any, taus: Any, lost: float, radiance: Any,
+    lamp_radiance: Any, depth_m: Any, ranges: Any, table: Any, stride: int, lens: Any, signal: Any, veil_rate: Any,
+    water_veil: Any,
 ) -> None:  # fmt: skip
     w = depth_m.shape[1]
     _, columns, nodes, _ = table.shape
@@ -325,7 +329,7 @@ def _apply(
     per_gap = 1.0 / (ranges[1:] - ranges[:-1])
     line = np.empty((columns, nodes, 4), np.float32)
     lengths, silts = np.empty(w), np.empty(w)
-    veils, kept = np.empty((3, w)), np.empty(w)
+    veils, kept, lit = np.empty((3, w)), np.empty(w), np.empty(w)
     for y in range(first_row, last_row):
         v = (y + 0.5) * per_stride
         j = int(v)
@@ -359,8 +363,17 @@ def _apply(
             for x in range(w):
                 kept[x] = decayed(signal[c] * lengths[x] + silts[x])
             for x in range(w):
+                lit[x] = kept[x]
+            if lost < 1.0:
+                for x in range(w):
+                    lit[x] = decayed(signal[c] * lengths[x] + lost * silts[x])
+            for x in range(w):
                 lamp = lamp_radiance[y, x, c]
-                out[y, x, c] = veil[x] + kept[x] * (radiance[y, x, c] - lamp + lamp * kept[x])
+                seen = kept[x] * (radiance[y, x, c] - lamp + lamp * lit[x])
+                out[y, x, c] = veil[x] + seen
+                if lost < 1.0:
+                    signals[y, x, c] = seen
+                    taus[y, x] = silts[x]
         for x in range(w):
             if lengths[x] > reach:
                 for c in range(3):

@@ -1,25 +1,29 @@
 """Flakes that drift between camera and scene, lit by daylight and lamps, mostly out of focus.
 
 Silt's single grains are far below a pixel and make haze; what a camera sees as specks are aggregates, a few tenths of
-a millimetre across. Their number follows the concentration of silt, with a little in clear water.
+a millimetre across. Their number follows the concentration of silt, with a little in clear water. Where a world tells
+which flakes drift in its water, photographs show those, and the same ones again later where the water has brought them.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from wakewise.arrays import Array
 from wakewise.compiled import njit, prange
 from wakewise.geometry import Pose
 from wakewise.imaging.blur import GLOBAL, Shutter, pose_at
 from wakewise.imaging.camera import Camera
-from wakewise.imaging.optics import WaterOptics, sample_grid
+from wakewise.imaging.grids import sample_levels
+from wakewise.imaging.optics import WaterOptics
 from wakewise.imaging.renderer import LAMP_REFERENCE_M, Image, Lights
-from wakewise.interfaces import ScalarGrid
+from wakewise.interfaces import FlakeCloud, ScalarGrid
 
 NEAREST_M, FARTHEST_M = 0.04, 0.6
 """Range of depth in which flakes are drawn one by one."""
@@ -43,7 +47,7 @@ def flake_positions(
     rng: np.random.Generator,
 ) -> Array:
     """Draw where flakes are, shape (n, 3) in the camera frame: a Poisson process with density per_m3 + per_kg C."""
-    densest = per_m3 + (per_kg * float(silt.values.max(initial=0.0)) if silt is not None else 0.0)
+    densest = per_m3 + (per_kg * silt.largest if silt is not None else 0.0)
     # A pyramid that holds the whole view: slopes to the points of the image's border.
     w, h = float(camera.width), float(camera.height)
     edge = np.linspace(0.0, 1.0, 17)
@@ -63,11 +67,55 @@ def flake_positions(
     return points_C[keep]
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Seen:
+    """Flakes before a camera: places in its frame and velocities in the world, (n, 3), size and shade, (n,)."""
+
+    p_C_m: Array
+    v_W_m_s: Array
+    size: Array
+    shade: Array
+
+
+def flakes_before(
+    camera: Camera,
+    X_WC: Pose,
+    silt: ScalarGrid | None,
+    per_m3: float,
+    per_kg: float,
+    rng: np.random.Generator,
+    drifting: FlakeCloud | None = None,
+) -> Seen:
+    """Flakes at the density per_m3 + per_kg C: those that drift, as many as there should be, and new ones beyond.
+
+    New ones move as the nearest of those that drift does.
+    """
+    new = flake_positions(camera, X_WC, silt, per_m3, per_kg, rng)
+    size, shade = rng.standard_normal(len(new)), rng.random(len(new))
+    if drifting is None or not len(drifting.p_W_m):
+        return Seen(p_C_m=new, v_W_m_s=np.zeros_like(new), size=size, shade=shade)
+    places = X_WC.apply(new)
+    wanted = per_m3 + per_kg * concentration(silt, places)
+    spare = rng.random(len(new)) * wanted < wanted - drifting.per_m3
+    more = spare | ~np.asarray(drifting.covers(places, X_WC), dtype=np.bool_)
+    velocity = drifting.v_W_m_s[cKDTree(drifting.p_W_m).query(places[more])[1]]
+    rank = drifting.looks[:, 0] * drifting.per_m3
+    p_C = X_WC.inverse().apply(drifting.p_W_m)
+    old = (rank < per_m3 + per_kg * concentration(silt, drifting.p_W_m)) & (p_C[:, 2] > NEAREST_M)
+    old &= p_C[:, 2] < FARTHEST_M
+    return Seen(
+        p_C_m=np.concatenate([p_C[old], new[more]]),
+        v_W_m_s=np.concatenate([drifting.v_W_m_s[old], velocity]),
+        size=np.concatenate([drifting.looks[old, 1], size[more]]),
+        shade=np.concatenate([drifting.looks[old, 2], shade[more]]),
+    )
+
+
 def concentration(silt: ScalarGrid | None, points_W_m: Array) -> Array:
     """Value of the grid at points, shape (n, 3) to (n,); zero without a grid."""
     if silt is None:
         return np.zeros(len(points_W_m))
-    return _sample(silt.values, silt.origin_W_m, silt.spacing_m, points_W_m)
+    return _sample(*silt.levels, points_W_m)
 
 
 def draw_flakes(
@@ -75,21 +123,22 @@ def draw_flakes(
     depth_m: Image,
     camera: Camera,
     poses: Sequence[Pose],
-    points_C_m: Array,
+    flakes: Seen,
+    exposure_s: float,
     water: WaterOptics,
     lights: Lights,
-    rng: np.random.Generator,
     shutter: Shutter = GLOBAL,
 ) -> Image:
-    """Lay flakes over a photograph, each a soft disk, streaked by the camera's motion; returns a new image.
+    """Lay flakes over a photograph, each a soft disk, streaked by its own motion and the camera's; returns a new image.
 
+    `exposure_s` is the time that the poses span, of which `shutter` says what each row sees.
     A flake covers as much light as its shadow: the blur disk of a thin lens spreads it, with diameter
-    f A |1/z - 1/z_focus| in pixels, and the cover falls by the ratio of areas. Flakes are still in the world.
+    f A |1/z - 1/z_focus| in pixels, and the cover falls by the ratio of areas. Places are those of mid-exposure.
     """
-    n = len(points_C_m)
-    diameter = MEDIAN_DIAMETER_M * np.exp(LOG_SPREAD * rng.standard_normal(n))
-    reflectance = REFLECTANCE * rng.uniform(0.6, 1.4, n)
-    if n == 0:
+    points_C_m = flakes.p_C_m
+    diameter = MEDIAN_DIAMETER_M * np.exp(LOG_SPREAD * flakes.size)
+    reflectance = REFLECTANCE * (0.6 + 0.8 * flakes.shade)
+    if len(points_C_m) == 0:
         return image
     z = points_C_m[:, 2]
     f = camera.focal_px
@@ -105,14 +154,20 @@ def draw_flakes(
 
     middle = pose_at(poses, 0.5)
     points_W = middle.apply(points_C_m)
-    track = _tracks(camera, poses, points_W, camera.project(points_C_m)[:, 1] / camera.height, shutter)
+    rows = camera.project(points_C_m)[:, 1] / camera.height
+    track = _tracks(camera, poses, points_W, exposure_s * flakes.v_W_m_s, rows, shutter)
     out = image.copy()
     _splat(out, depth_m, np.nan_to_num(track, nan=-1e6), z, radius, cover, colour)
     return out
 
 
-def _tracks(camera: Camera, poses: Sequence[Pose], points_W_m: Array, rows: Array, shutter: Shutter) -> Array:
-    """Pixels of points, shape (n, 3), while their rows, shape (n,), 0 top to 1, are exposed, shape (n, STEPS, 2)."""
+def _tracks(
+    camera: Camera, poses: Sequence[Pose], points_W_m: Array, moved_W_m: Array, rows: Array, shutter: Shutter
+) -> Array:
+    """Pixels of points, shape (n, 3), while their rows, shape (n,), 0 top to 1, are exposed, shape (n, STEPS, 2).
+
+    `moved_W_m` is how far each goes in the world over the time that the poses span, half of it before its middle.
+    """
     track = np.empty((len(points_W_m), STEPS, 2))
     bands = (
         np.clip((rows * BANDS).astype(np.int64), 0, BANDS - 1) if shutter.rolling > 0.0 else np.zeros(len(rows), int)
@@ -121,16 +176,21 @@ def _tracks(camera: Camera, poses: Sequence[Pose], points_W_m: Array, rows: Arra
         here = bands == band
         row = (band + 0.5) / BANDS
         for k in range(STEPS):
-            pose = pose_at(poses, shutter.fraction(row, (k + 0.5) / STEPS))
-            track[here, k] = camera.project(pose.inverse().apply(points_W_m[here]))
+            share = shutter.fraction(row, (k + 0.5) / STEPS)
+            places = points_W_m[here] + (share - 0.5) * moved_W_m[here]
+            track[here, k] = camera.project(pose_at(poses, share).inverse().apply(places))
     return track
 
 
 @njit(parallel=True)
-def _sample(values: Any, origin: Any, spacing: float, points: Any) -> Any:
+def _sample(
+    values: Any, origin: Any, spacing: float, outer: Any, outer_origin: Any, outer_spacing: float, points: Any
+) -> Any:
     out = np.empty(points.shape[0])
     for i in prange(points.shape[0]):
-        out[i] = sample_grid(values, origin, spacing, points[i, 0], points[i, 1], points[i, 2])
+        out[i] = sample_levels(
+            values, origin, spacing, outer, outer_origin, outer_spacing, points[i, 0], points[i, 1], points[i, 2]
+        )
     return out
 
 

@@ -16,12 +16,12 @@ from wakewise.imaging.blur import motion_blur, pose_at
 from wakewise.imaging.camera import Camera
 from wakewise.imaging.metering import Chosen, automatic
 from wakewise.imaging.optics import SiltOptics, haze_between, through_water
-from wakewise.imaging.particles import draw_flakes, flake_positions
+from wakewise.imaging.particles import draw_flakes, flakes_before
 from wakewise.imaging.renderer import Image, Render, render
 from wakewise.imaging.scene import Scene
 from wakewise.imaging.sensor import expose
 from wakewise.imaging.settings import ELECTRONS_PER_S, FLAKES_PER_KG, READ_NOISE_E, ImagingSettings
-from wakewise.interfaces import ScalarGrid
+from wakewise.interfaces import FlakeCloud, ScalarGrid
 
 BALANCE_M = 0.25
 """White balance: a grey card at this range in clear water comes out grey, so that farther things turn bluish."""
@@ -52,6 +52,7 @@ def photograph(
     rng: np.random.Generator,
     grains: SiltOptics | None = None,
     before: Sequence[Pose] = (),
+    drifting: FlakeCloud | None = None,
 ) -> Photo:
     """Take one photograph.
 
@@ -73,6 +74,8 @@ def photograph(
     before : sequence of Pose
         True X_WC before, `METERED_EVERY_S` apart, oldest first, for automatic exposure; without them it goes by the
         photograph's own view.
+    drifting : FlakeCloud, optional
+        Flakes that other photographs show too, where the water has brought them; all are drawn here if not given.
 
     Raises
     ------
@@ -85,7 +88,7 @@ def photograph(
         balance = white_balance(settings)
         views = before or (pose_at(poses, 0.5),)
         chosen = automatic(scene, views, silt, settings, grains or SiltOptics(), balance)
-    return photograph_of(view, camera, poses, silt, settings, rng, grains, chosen)
+    return photograph_of(view, camera, poses, silt, settings, rng, grains, chosen, drifting)
 
 
 def white_balance(settings: ImagingSettings) -> Array:
@@ -102,6 +105,7 @@ def photograph_of(
     rng: np.random.Generator,
     grains: SiltOptics | None = None,
     chosen: Chosen | None = None,
+    drifting: FlakeCloud | None = None,
 ) -> Photo:
     """As `photograph`, from a render of the middle of the exposure that is there already.
 
@@ -113,11 +117,12 @@ def photograph_of(
         raise InputError(f"silt: concentration {float(silt.values.min()):g} kg/m3, must not be negative")
     middle = pose_at(poses, 0.5)
     lights, water = settings.lights(), settings.water()
-    haze = haze_between(camera, middle, water, grains or SiltOptics(), silt, lights)
-    radiance, silt_per_m = through_water(view, camera, haze, water, lights.from_above)
+    grains = grains or SiltOptics()
+    haze = haze_between(camera, middle, water, grains, silt, lights)
+    radiance, silt_per_m = through_water(view, camera, haze, water, lights.from_above, grains)
     radiance = motion_blur(radiance, view.depth_m, camera, poses, shutter)
-    flakes = flake_positions(camera, middle, silt, settings.flakes_per_m3, FLAKES_PER_KG, rng)
-    radiance = draw_flakes(radiance, view.depth_m, camera, poses, flakes, water, lights, rng, shutter)
+    flakes = flakes_before(camera, middle, silt, settings.flakes_per_m3, FLAKES_PER_KG, rng, drifting)
+    radiance = draw_flakes(radiance, view.depth_m, camera, poses, flakes, settings.window_s, water, lights, shutter)
     # Unamplified, a full well is a saturated signal; amplified, a part of it.
     well_e = ELECTRONS_PER_S * settings.exposure_s / taken.amplification
     image = expose(radiance, taken.gain * white_balance(settings), well_e, READ_NOISE_E, rng)

@@ -85,9 +85,17 @@ def take_photograph(parts: Parts, folder: Path, number: int, exposure: ExposureR
             return noted
     rng = parts.seeds.imaging().spawn(len(names))[number]
     grains = SiltOptics(diameter_m=scenario.tank.silt.grain_m, density_kg_m3=scenario.tank.silt.grain_density_kg_m3)
-    silt = exposure.silt if float(exposure.silt.values.max(initial=0.0)) > 0.0 else None
+    silt = exposure.silt if exposure.silt.largest > 0.0 else None
     photo = photograph(
-        parts.scene, parts.camera, exposure.X_WC_true, silt, scenario.imaging, rng, grains, exposure.X_WC_before
+        parts.scene,
+        parts.camera,
+        exposure.X_WC_true,
+        silt,
+        scenario.imaging,
+        rng,
+        grains,
+        exposure.X_WC_before,
+        exposure.flakes,
     )
     write_image(image, photo.image, scenario.imaging.jpeg_quality)
     noted = {"exposure": mark, "sharpness": photo.sharpness, "turbidity_per_m": photo.turbidity_per_m}
@@ -100,8 +108,13 @@ def fingerprint(exposure: ExposureRecord) -> str:
     digest = hashlib.blake2b(digest_size=16)
     for X_WC in (*exposure.X_WC_true, *exposure.X_WC_before):
         digest.update(X_WC.p_m.tobytes() + X_WC.q.tobytes())
-    silt = exposure.silt
-    digest.update(np.array([silt.spacing_m, *silt.origin_W_m, *silt.values.shape]).tobytes() + silt.values.tobytes())
+    for silt in (exposure.silt, exposure.silt.outer):
+        if silt is not None:
+            where = np.array([silt.spacing_m, *silt.origin_W_m, *silt.values.shape])
+            digest.update(where.tobytes() + silt.values.tobytes())
+    if exposure.flakes is not None:
+        for part in (exposure.flakes.p_W_m, exposure.flakes.v_W_m_s, exposure.flakes.looks):
+            digest.update(part.tobytes())
     return digest.hexdigest()
 
 

@@ -83,6 +83,8 @@ def check_begin(parts: Parts) -> None:
 def check_current(parts: Parts, looks: int = 200) -> Holding | None:
     """Hold the water that passes the vehicle along its route against what its thrusters can give.
 
+    The drag is the worst that the plant may have: above the believed one by all of `tank.mismatch.damping_pct`.
+
     Raises
     ------
     InputError
@@ -101,7 +103,7 @@ def check_current(parts: Parts, looks: int = 200) -> Holding | None:
         passing.append(current @ wished.X_WB.R - wished.nu_B[:3])
     apart = tank.mismatch
     trim_N = apart.trim_range_N if apart.trim_N is None else apart.trim_N
-    found = holding(vehicle, np.array(passing), tank.density_kg_m3, trim_N)
+    found = holding(vehicle, np.array(passing), tank.density_kg_m3, trim_N, 0.01 * apart.damping_pct)
     if found is not None and found.share < 1.0:
         raise InputError(f"tank: {vehicle.name} cannot hold its route, {found.said()}")
     return found

@@ -19,7 +19,7 @@ from wakewise.arrays import Array
 from wakewise.files import whole_file
 from wakewise.geometry import Pose, quat_integrate
 from wakewise.imaging.settings import METERED_EVERY_S
-from wakewise.interfaces import BodyState, ScalarGrid, WaterTruth, Witness
+from wakewise.interfaces import BodyState, FlakeCloud, ScalarGrid, WaterTruth, Witness
 from wakewise.missions import Route
 from wakewise.operation.loop import Step
 from wakewise.vehicles.tilt import TiltJoint
@@ -49,6 +49,8 @@ class ExposureRecord:
     """One opening of the shutter: true camera poses across it, the estimate at its middle, the silt in the water.
 
     `X_WC_before` are true poses of the camera before, oldest first, which automatic exposure goes by; else none.
+    `flakes` are those that drift before the camera; None where nobody knows, so that they are drawn for each
+    photograph.
     """
 
     time_s: float
@@ -56,6 +58,7 @@ class ExposureRecord:
     X_WC_est: Pose
     silt: ScalarGrid
     X_WC_before: tuple[Pose, ...] = ()
+    flakes: FlakeCloud | None = None
 
 
 @dataclass(kw_only=True, eq=False)
@@ -148,6 +151,7 @@ class FlightRecorder:
                     @ self._mount(step.tilt_rad),
                     silt=self.witness.silt(),
                     X_WC_before=self._before(),
+                    flakes=_flakes_before(self.witness, truth.state.X_WB @ self._mount(truth.tilt_rad)),
                 )
             )
             if self.exposed is not None:
@@ -213,6 +217,60 @@ def exposure_arrays(exposures: list[ExposureRecord]) -> dict[str, Any]:
         "silt_origin_W_m": exposures[0].silt.origin_W_m,
         "silt_spacing_m": np.array(exposures[0].silt.spacing_m),
         "silt_kg_m3": np.array([e.silt.values for e in exposures], dtype=np.float32),
+        **_outer_arrays([e.silt.outer for e in exposures]),
+        **_flake_arrays([e.flakes for e in exposures]),
+    }
+
+
+def _flakes_before(witness: Witness, X_WC: Pose) -> FlakeCloud | None:
+    """Flakes of a witness that knows them."""
+    look = getattr(witness, "flakes", None)
+    found: FlakeCloud | None = None if look is None else look(X_WC)
+    return found
+
+
+def _flake_arrays(clouds: list[FlakeCloud | None]) -> dict[str, Any]:
+    """Arrays of the drifting flakes, one after the other; nothing where they are not known."""
+    known = [cloud for cloud in clouds if cloud is not None]
+    if len(known) < len(clouds) or not known:
+        return {}
+    one = known[0]
+    return {
+        "flakes": np.array([len(cloud.p_W_m) for cloud in known]),
+        "flake_p_W_m": np.concatenate([cloud.p_W_m for cloud in known]).astype(np.float32),
+        "flake_v_W_m_s": np.concatenate([cloud.v_W_m_s for cloud in known]).astype(np.float16),
+        "flake_looks": np.concatenate([cloud.looks for cloud in known]).astype(np.float16),
+        "flake_box_W_m": np.stack([one.low_W_m, one.high_W_m]),
+        "flake_limits": np.array([one.per_m3, one.depth_m, *one.slopes]),
+    }
+
+
+def _read_flakes(data: Any, count: int) -> list[FlakeCloud | None]:
+    """The flakes of each exposure; None of files of before they were kept."""
+    if "flakes" not in data:
+        return [None] * count
+    ends = np.cumsum(data["flakes"])
+    low, high = data["flake_box_W_m"]
+    per_m3, depth_m, across, along = (float(v) for v in data["flake_limits"])
+    parts = [np.split(data[f"flake_{name}"].astype(np.float64), ends[:-1]) for name in ("p_W_m", "v_W_m_s", "looks")]
+    return [
+        FlakeCloud(
+            p_W_m=p, v_W_m_s=v, looks=looks, low_W_m=low, high_W_m=high, per_m3=per_m3, depth_m=depth_m,
+            slopes=(across, along),
+        )
+        for p, v, looks in zip(*parts, strict=True)
+    ]  # fmt: skip
+
+
+def _outer_arrays(grids: list[ScalarGrid | None]) -> dict[str, Any]:
+    """Arrays of the silt's outer grids; nothing where there are none."""
+    known = [grid for grid in grids if grid is not None]
+    if len(known) < len(grids) or not known:
+        return {}
+    return {
+        "silt_outer_origin_W_m": known[0].origin_W_m,
+        "silt_outer_spacing_m": np.array(known[0].spacing_m),
+        "silt_outer_kg_m3": np.array([grid.values for grid in known], dtype=np.float32),
     }
 
 
@@ -224,13 +282,19 @@ def read_exposures(path: Path | IO[bytes]) -> list[ExposureRecord]:
         est_p, est_q = data["X_WC_est_p_m"], data["X_WC_est_q"]
         none = np.empty((len(p), 0))
         before_p, before_q = data.get("X_WC_before_p_m", none), data.get("X_WC_before_q", none)
+        flakes = _read_flakes(data, len(p))
+        outers: list[ScalarGrid | None] = [None] * len(p)
+        if "silt_outer_kg_m3" in data:  # not in files of before there was one
+            far, coarse = data["silt_outer_origin_W_m"], float(data["silt_outer_spacing_m"])
+            outers = [ScalarGrid(origin_W_m=far, spacing_m=coarse, values=v) for v in data["silt_outer_kg_m3"]]
         return [
             ExposureRecord(
                 time_s=float(time_s),
                 X_WC_true=tuple(Pose(p[k, i], q[k, i]) for i in range(p.shape[1])),
                 X_WC_est=Pose(est_p[k], est_q[k]),
-                silt=ScalarGrid(origin_W_m=origin, spacing_m=spacing, values=silt[k]),
+                silt=ScalarGrid(origin_W_m=origin, spacing_m=spacing, values=silt[k], outer=outers[k]),
                 X_WC_before=tuple(Pose(*X) for X in zip(before_p[k], before_q[k], strict=True)),
+                flakes=flakes[k],
             )
             for k, time_s in enumerate(data["time_s"])
         ]

@@ -28,7 +28,7 @@ from wakewise.plugins import names
 from wakewise.reconstruction import ReconstructionSettings
 from wakewise.settings import Settings
 from wakewise.tank import TankSettings
-from wakewise.tank.settings import SILTS
+from wakewise.tank.beds import SILTS
 from wakewise.targets import coral_kinds
 from wakewise.yaml_text import YamlError, read_yaml
 

@@ -12,6 +12,7 @@ from wakewise.interfaces import Flow, ScalarGrid, WaterTruth
 from wakewise.tank.grains import beam_attenuation_per_m, friction_velocity_m_s
 from wakewise.tank.probes import bed_points, surface_points, water_points
 from wakewise.tank.sediment import SHEAR_HEIGHT_M, SiltLaws
+from wakewise.tank.swell import Swell
 from wakewise.targets import Target
 
 CLOSE_M = 0.3
@@ -58,6 +59,8 @@ class TargetProbes:
         silt: ScalarGrid | None,
         camera_W_m: Array,
         density_kg_m3: float,
+        swell: Swell | None = None,
+        time_s: float = 0.0,
     ) -> WaterTruth:
         """Look at all of them.
 
@@ -69,13 +72,20 @@ class TargetProbes:
             Concentration in kg/m3; None for clear water.
         camera_W_m : ndarray, shape (3,)
         density_kg_m3 : float
+        swell : Swell, optional
+            The wave that is part of the ambient water, at `time_s`.
         """
         excess = water.excess_velocity(self._all_W_m)
         whole = excess + self._ambient_m_s(water)
         n, m = len(self.surface_W_m), len(self.surface_W_m) + len(self.bed_W_m)
         at_target, at_bed = np.linalg.norm(excess[:n], axis=1), np.linalg.norm(excess[n:m], axis=1)
         pressure = 0.5 * density_kg_m3 * np.einsum("ij,ij->i", whole[:n], whole[:n])
-        star = friction_velocity_m_s(np.linalg.norm(whole[m:, :2], axis=1), SHEAR_HEIGHT_M, laws.grain_m)
+        on_bed, swell_Pa = whole[m:, :2], np.zeros(len(whole) - m)
+        if swell is not None:
+            floor = self._floor_W_m[:, :2]
+            on_bed = on_bed - swell.speed_m_s(floor, time_s)[:, None] * swell.ahead
+            swell_Pa = swell.stress_Pa(floor, time_s)
+        star = friction_velocity_m_s(np.linalg.norm(on_bed, axis=1), SHEAR_HEIGHT_M, laws.grain_m)
         every = max(n // _TRACERS, 1)
         return WaterTruth(
             target_speed_mean_m_s=float(at_target.mean()),
@@ -84,7 +94,7 @@ class TargetProbes:
             turbidity_per_m=self.turbidity_per_m(laws, silt),
             target_pressure_mean_Pa=float(pressure.mean()),
             target_pressure_p95_Pa=_p95(pressure),
-            bed_shear_p95_Pa=float(density_kg_m3 * _p95(star) ** 2),
+            bed_shear_p95_Pa=_p95(np.hypot(density_kg_m3 * star**2, swell_Pa)),
             tracer_speed_mean_m_s=float(
                 tracer_speeds_m_s(water, self.surface_W_m[::every], whole[:n:every], FRAME_S, self._bed_z).mean()
             ),
@@ -114,7 +124,7 @@ class TargetProbes:
         ends = self.surface_W_m[::every]
         facing = (ends - self._centre) @ (camera_W_m - self._centre) > 0.0
         ends = ends[facing] if facing.any() else ends
-        return _attenuation(laws, _along_rays(silt.values, silt.origin_W_m, silt.spacing_m, ends, camera_W_m))
+        return _attenuation(laws, _along_rays(*silt.levels, ends, camera_W_m))
 
 
 def tracer_speeds_m_s(water: Flow, starts_W_m: Array, velocities_m_s: Array, frame_s: float, bed_z_m: float) -> Array:
@@ -129,30 +139,38 @@ def tracer_speeds_m_s(water: Flow, starts_W_m: Array, velocities_m_s: Array, fra
 
 
 def concentration_at(silt: ScalarGrid, points_W_m: Array) -> Array:
-    """Concentration at the node nearest to each point, shape (n,); zero outside the grid."""
-    found: Array = _at_nodes(silt.values, silt.origin_W_m, silt.spacing_m, np.ascontiguousarray(points_W_m))
+    """Concentration at the node nearest to each point, shape (n,), of the outer grid outside the inner one."""
+    found: Array = _at_nodes(*silt.levels, np.ascontiguousarray(points_W_m))
     return found
 
 
 @njit
-def _at_nodes(values: Array, origin: Array, spacing: float, points: Array) -> Array:
+def _at_nodes(
+    values: Array, origin: Array, spacing: float, outer: Array, outer_origin: Array, outer_spacing: float, points: Array
+) -> Array:
     found = np.empty(points.shape[0])
     for p in range(points.shape[0]):
         found[p] = _at_node(values, origin, spacing, points[p, 0], points[p, 1], points[p, 2])
+        if found[p] < 0.0:
+            found[p] = max(_at_node(outer, outer_origin, outer_spacing, points[p, 0], points[p, 1], points[p, 2]), 0.0)
     return found
 
 
 @njit
 def _at_node(values: Array, origin: Array, spacing: float, x: float, y: float, z: float) -> float:
+    """Value of the node nearest to a place; -1 outside the grid."""
     i, j = round((x - origin[0]) / spacing), round((y - origin[1]) / spacing)
     k = round((z - origin[2]) / spacing)
     if 0 <= i < values.shape[0] and 0 <= j < values.shape[1] and 0 <= k < values.shape[2]:
         return values[i, j, k]
-    return 0.0
+    return -1.0
 
 
 @njit
-def _along_rays(values: Array, origin: Array, spacing: float, ends: Array, eye: Array) -> float:
+def _along_rays(
+    values: Array, origin: Array, spacing: float, outer: Array, outer_origin: Array, outer_spacing: float, ends: Array,
+    eye: Array,
+) -> float:  # fmt: skip
     """Line integral of a field from an eye to places, shape (n, 3), by the midpoint rule; mean over them."""
     total = 0.0
     for r in range(ends.shape[0]):
@@ -160,7 +178,11 @@ def _along_rays(values: Array, origin: Array, spacing: float, ends: Array, eye: 
         sum_ = 0.0
         for k in range(_RAY_STEPS):
             s = (k + 0.5) / _RAY_STEPS
-            sum_ += _at_node(values, origin, spacing, eye[0] + s * dx, eye[1] + s * dy, eye[2] + s * dz)
+            x, y, z = eye[0] + s * dx, eye[1] + s * dy, eye[2] + s * dz
+            found = _at_node(values, origin, spacing, x, y, z)
+            if found < 0.0:
+                found = max(_at_node(outer, outer_origin, outer_spacing, x, y, z), 0.0)
+            sum_ += found
         total += sum_ / _RAY_STEPS * np.sqrt(dx * dx + dy * dy + dz * dz)
     return total / ends.shape[0]
 

@@ -29,11 +29,14 @@ class Holding:
         What it puts on the vehicle along each body axis.
     share : float
         The largest multiple of the wrench needed that the thrusters give without turning the vehicle.
+    more_drag : float
+        Share by which the drag is taken above that of the vehicle's model.
     """
 
     passing_B_m_s: Array
     drag_N: Array
     share: float
+    more_drag: float = 0.0
 
     def __post_init__(self) -> None:
         freeze(self, passing_B_m_s=(3,), drag_N=(3,))
@@ -48,18 +51,21 @@ class Holding:
         speed = float(np.linalg.norm(self.passing_B_m_s))
         axis = int(np.argmax(np.abs(self.drag_N)))
         able = self.share * abs(float(self.drag_N[axis]))
+        worst = f" if its drag is {100 * self.more_drag:.0f} % more than believed" if self.more_drag > 0.0 else ""
         return (
-            f"water that passes at {speed:.2f} m/s drags with {abs(float(self.drag_N[axis])):.1f} N in {_AXES[axis]}, "
-            f"the thrusters hold {able:.1f} N there (margin {self.margin_pct:+.0f} %)"
+            f"water that passes at {speed:.2f} m/s drags with {abs(float(self.drag_N[axis])):.1f} N in {_AXES[axis]}"
+            f"{worst}, the thrusters hold {able:.1f} N there (margin {self.margin_pct:+.0f} %)"
         )
 
 
-def holding(vehicle: Vehicle, passing_B_m_s: Array, density_kg_m3: float, trim_N: float = 0.0) -> Holding | None:
+def holding(
+    vehicle: Vehicle, passing_B_m_s: Array, density_kg_m3: float, trim_N: float = 0.0, more_drag: float = 0.0
+) -> Holding | None:
     """Find the hardest flow past the vehicle, shape (n, 3) in body axes, to hold against; None if no water moves.
 
-    The drag of each, as the vehicle's own model has it, and an upward trim must be met by thrusts within their limits
-    that make no other force and no moment but the one that balances drag; how many times over they can is a linear
-    program per current. Only the twenty fastest are looked at.
+    The drag of each, as the vehicle's own model has it and the share `more_drag` on top, and an upward trim must be met
+    by thrusts within their limits that make no other force and no moment but the one that balances drag; how many times
+    over they can is a linear program per current. Only the twenty fastest are looked at.
 
     Raises
     ------
@@ -73,15 +79,15 @@ def holding(vehicle: Vehicle, passing_B_m_s: Array, density_kg_m3: float, trim_N
     some = np.unique(np.round(flows[order], 3), axis=0)
     hardest: Holding | None = None
     for flow in some[np.any(some != 0.0, axis=1)]:
-        found = _holding(vehicle, body, flow, trim_N)
+        found = _holding(vehicle, body, flow, trim_N, more_drag)
         if hardest is None or found.share < hardest.share:
             hardest = found
     return hardest
 
 
-def _holding(vehicle: Vehicle, body: RigidBody, passing_B_m_s: Array, trim_N: float) -> Holding:
+def _holding(vehicle: Vehicle, body: RigidBody, passing_B_m_s: Array, trim_N: float, more_drag: float) -> Holding:
     # Water that moves at u past a vehicle at rest drags it as the vehicle's own motion at -u does.
-    drag = damping_wrench(body, np.concatenate([-passing_B_m_s, np.zeros(3)]))
+    drag = (1.0 + more_drag) * damping_wrench(body, np.concatenate([-passing_B_m_s, np.zeros(3)]))
     load = drag.copy()
     load[2] -= trim_N
     n = len(vehicle.thrusters)
@@ -94,7 +100,7 @@ def _holding(vehicle: Vehicle, body: RigidBody, passing_B_m_s: Array, trim_N: fl
     solved = linprog(cost, A_eq=rows, b_eq=np.zeros(len(rows)), bounds=bounds)
     if solved.x is None or not solved.success:
         raise StageError(f"holding against a current: linear program failed ({solved.message})")
-    return Holding(passing_B_m_s=passing_B_m_s, drag_N=drag[:3], share=float(solved.x[n]))
+    return Holding(passing_B_m_s=passing_B_m_s, drag_N=drag[:3], share=float(solved.x[n]), more_drag=more_drag)
 
 
 _BRACKET_M = 0.1  # a cable may be held this far off the hull

@@ -19,9 +19,10 @@ from wakewise.interfaces import Flow, ScalarGrid
 from wakewise.tank.grains import (
     SAND_M,
     VON_KARMAN,
-    erosion_rate_kg_m2_s,
+    erosion_rates_kg_m2_s,
     friction_table_m_s,
-    pickup_rate_kg_m2_s,
+    least_mean,
+    mean_pickup_rates_kg_m2_s,
     settling_speed_m_s,
     threshold_stress_Pa,
 )
@@ -36,6 +37,7 @@ from wakewise.tank.sediment_motion import (
     shared_among_nodes,
     stirred_cells,
 )
+from wakewise.tank.swell import Swell
 
 CELL_M = 0.05
 SHEAR_HEIGHT_M = 0.01  # where the log law takes the water's speed from; the wall jets' slip speed stands for it
@@ -45,11 +47,17 @@ SUSPENDED_NEAR_M = 0.8  # particles of grains suspended from the start are finer
 # A particle keeps the water's velocity until it has gone this far or this long, whichever is sooner.
 _HELD_M, _HELD_S, _NEVER_S = 0.015, 0.3, 1e9
 _FIRST_HEIGHT_M = 0.005  # silt that leaves the bed starts evenly spread below this
+_FIRMER = 10.0  # threshold of a firm layer over that of the fluff on it (see `wakewise.tank.beds`)
+_FINEST_LOAD_KG_M2 = 0.1  # thicker beds give up particles as fine as those of this load: they are never stripped whole
 
 
 @dataclass(frozen=True, kw_only=True)
 class SiltLaws:
-    """What the silt, or sand, is made of; `sand` says that van Rijn's pickup lifts it and not Partheniades' rate."""
+    """What the silt, or sand, is made of; `sand` says that van Rijn's pickup lifts it and not Partheniades' rate.
+
+    `stress_intensity` is the rms of the bed's stress over its mean. Of the load on the bed, `firm_kg_m2` lies lowest
+    and has a threshold of its own.
+    """
 
     grain_m: float
     grain_density_kg_m3: float
@@ -58,6 +66,9 @@ class SiltLaws:
     threshold_Pa: float
     settling_m_s: float
     sand: bool = False
+    stress_intensity: float = 0.0
+    firm_kg_m2: float = 0.0
+    firm_threshold_Pa: float = math.inf
 
     @classmethod
     def of(
@@ -68,25 +79,50 @@ class SiltLaws:
         erosion_kg_m2_s: float,
         threshold_Pa: float | None = None,
         pickup: str = "auto",
+        *,
+        settling_m_s: float | None = None,
+        stress_intensity: float = 0.0,
+        firm_kg_m2: float = 0.0,
+        firm_threshold_Pa: float | None = None,
     ) -> SiltLaws:
-        """Laws of a grain; its own threshold unless one is given; `pickup` is auto, partheniades or van-rijn."""
+        """Laws of a grain: its own threshold and settling speed unless given, ten times that threshold where firm.
+
+        `pickup` is auto, partheniades or van-rijn.
+        """
         own = threshold_stress_Pa(grain_m, grain_density_kg_m3, water_density_kg_m3)
+        least = own if threshold_Pa is None else threshold_Pa
+        sinks = settling_speed_m_s(grain_m, grain_density_kg_m3, water_density_kg_m3)
         return cls(
             grain_m=grain_m,
             grain_density_kg_m3=grain_density_kg_m3,
             water_density_kg_m3=water_density_kg_m3,
             erosion_kg_m2_s=erosion_kg_m2_s,
-            threshold_Pa=own if threshold_Pa is None else threshold_Pa,
-            settling_m_s=settling_speed_m_s(grain_m, grain_density_kg_m3, water_density_kg_m3),
+            threshold_Pa=least,
+            settling_m_s=sinks if settling_m_s is None else settling_m_s,
             sand=pickup == "van-rijn" or (pickup == "auto" and grain_m >= SAND_M),
+            stress_intensity=stress_intensity,
+            firm_kg_m2=firm_kg_m2,
+            firm_threshold_Pa=_FIRMER * least if firm_threshold_Pa is None else firm_threshold_Pa,
         )
 
-    def lifted_kg_m2_s(self, stress_Pa: Array) -> Array:
-        """Rate at which a bed under a stress gives up grains, same shape."""
+    def lifted_kg_m2_s(self, stress_Pa: Array, load_kg_m2: Array) -> Array:
+        """Mean rate at which a bed under mean stresses, shape (n,), gives up grains of its loads, shape (n,)."""
+        threshold = np.where(self.loose_kg_m2(load_kg_m2) > 0.0, self.threshold_Pa, self.firm_threshold_Pa)
         if self.sand:
             grain = self.grain_m, self.grain_density_kg_m3, self.water_density_kg_m3
-            return pickup_rate_kg_m2_s(stress_Pa, self.threshold_Pa, *grain)
-        return erosion_rate_kg_m2_s(stress_Pa, self.threshold_Pa, self.erosion_kg_m2_s)
+            return mean_pickup_rates_kg_m2_s(stress_Pa, threshold, *grain, self.stress_intensity)
+        rates: Array = erosion_rates_kg_m2_s(stress_Pa, threshold, self.erosion_kg_m2_s, self.stress_intensity)
+        return rates
+
+    def loose_kg_m2(self, load_kg_m2: Array) -> Array:
+        """What of loads, shape (n,), lies above the firm layer, same shape; 0 where only that is left."""
+        above = load_kg_m2 - self.firm_kg_m2
+        return np.where(above > 1e-9, above, 0.0)
+
+    @property
+    def stirring_Pa(self) -> float:
+        """Mean stress below which nothing is lifted."""
+        return self.threshold_Pa * least_mean(self.stress_intensity)
 
 
 class Silt:
@@ -103,6 +139,8 @@ class Silt:
         Above this, pairs of neighbouring particles become one: the mass adds up, the place is that of one of the two,
         drawn with their masses as odds, which keeps the expected distribution.
     rng : numpy Generator
+    swell : Swell, optional
+        The wave that is part of the flow, whose thin boundary layer drags on the bed more than its speed lets expect.
     """
 
     def __init__(
@@ -112,8 +150,10 @@ class Silt:
         size_m: tuple[float, float, float],
         max_particles: int,
         rng: np.random.Generator,
+        swell: Swell | None = None,
     ) -> None:
         self.laws = laws
+        self._swell = swell
         self._size = np.array(size_m)
         self._shape = (math.ceil(size_m[0] / CELL_M), math.ceil(size_m[1] / CELL_M))
         # Cells are stretched a little so that a whole number of them covers the bed.
@@ -121,6 +161,7 @@ class Silt:
         self._low = -self._size[:2] / 2
         self.bed_kg_m2: Array = np.full(self._shape, load_kg_m2)
         self._star_m_s: Array = np.zeros(self._shape)
+        self._stream_m_s: Array = self._star_m_s  # of it, what the water without the swell makes
         self._friction = friction_table_m_s(SHEAR_HEIGHT_M, laws.grain_m)
         self.position_m: Array = np.zeros((0, 3))
         self.mass_kg: Array = np.zeros(0)
@@ -131,7 +172,10 @@ class Silt:
         self._max = max_particles
         self._rng = rng
         # A full set of new particles stands for the load of 0.01 m2; every pairing doubles the mass of the next ones.
-        self._birth_kg = max(0.01 * load_kg_m2 / max_particles, 1e-12)
+        loose_kg_m2 = max(load_kg_m2 - laws.firm_kg_m2, 0.0) or load_kg_m2
+        self._birth_kg = max(0.01 * min(loose_kg_m2, _FINEST_LOAD_KG_M2) / max_particles, 1e-12)
+        self.lifted_kg = 0.0
+        """What the bed has given up since the start, whether it has settled again or not."""
         self.pairings = 0
         self._start_kg = self.total_kg
 
@@ -208,9 +252,14 @@ class Silt:
             origin = np.array(origin_W_m, dtype=np.float64)
             shared_among_nodes(self.position_m, self.mass_kg / spacing_m**3, origin, float(spacing_m), values)
         bed = (self._size[2] - origin_W_m[2]) / spacing_m
-        # A node on the bed has water only on its upper side.
+        # A node on the bed has water only on its upper side, one on a wall only before it.
         if 0 <= bed <= shape[2] - 1 and abs(bed - round(bed)) < 1e-6:
             values[:, :, round(bed)] *= 2.0
+        for axis in range(2):
+            for wall in (self._low[axis], -self._low[axis]):
+                node = (wall - origin_W_m[axis]) / spacing_m
+                if 0 <= round(node) < shape[axis] and abs(node - round(node)) < 1e-6:
+                    np.moveaxis(values, axis, 0)[round(node)] *= 2.0
         return ScalarGrid(origin_W_m=origin_W_m, spacing_m=spacing_m, values=values)
 
     def _shear(self, flow: Flow, stirred_W_m: Array) -> None:
@@ -224,21 +273,38 @@ class Silt:
         )
         self._looked = near
         # Away from the jets the water moves as it does in the farthest corner.
-        feel(self._star_m_s, kept, cells, flow.velocity(places), self._friction)
+        u = flow.velocity(places)
+        if self._swell is None:
+            feel(self._star_m_s, kept, cells, u, self._friction)
+            return
+        if self._stream_m_s is self._star_m_s:
+            self._stream_m_s = self._star_m_s.copy()
+            x, y = (self._low[k] + (np.arange(self._shape[k]) + 0.5) * self._cell[k] for k in range(2))
+            self._middles = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+        time_s = float(getattr(flow, "time_s", 0.0))
+        u[:, :2] -= self._swell.speed_m_s(places[:, :2], time_s)[:, None] * self._swell.ahead
+        feel(self._stream_m_s, kept, cells, u, self._friction)
+        swell = self._swell.stress_Pa(self._middles, time_s).reshape(self._shape) / self.laws.water_density_kg_m3
+        # Stream and swell cross at any angle: the root of the sum of squares is right in the mean over a wave.
+        self._star_m_s = np.hypot(self._stream_m_s**2, swell) ** 0.5
 
     def _erode(self, dt_s: float) -> None:
         """Lift whole particles, drawn so that on average each cell loses what the law says, at once."""
         laws = self.laws
-        least = math.sqrt(laws.threshold_Pa / laws.water_density_kg_m3)
+        least = math.sqrt(laws.stirring_Pa / laws.water_density_kg_m3)
         area = float(self._cell.prod())
         i, j = moved_cells(self._star_m_s, self.bed_kg_m2, least).T
         if not len(i):
             return
         stress = laws.water_density_kg_m3 * self._star_m_s[i, j] ** 2
-        worth = laws.lifted_kg_m2_s(stress) * area * dt_s / self._birth_kg
+        load = self.bed_kg_m2[i, j]
+        worth = laws.lifted_kg_m2_s(stress, load) * area * dt_s / self._birth_kg
         lifted = np.floor(worth + self._rng.uniform(size=len(i)))
-        i, j, lifted = i[lifted > 0], j[lifted > 0], lifted[lifted > 0]
-        mass = np.minimum(lifted * self._birth_kg, self.bed_kg_m2[i, j] * area)
+        i, j, lifted, load = i[lifted > 0], j[lifted > 0], lifted[lifted > 0], load[lifted > 0]
+        # What is loose goes first: the firm layer below it gives up its first grain in the step after.
+        loose = laws.loose_kg_m2(load)
+        mass = np.minimum(lifted * self._birth_kg, np.where(loose > 0.0, loose, load) * area)
+        self.lifted_kg += math.fsum(mass)
         self.bed_kg_m2[i, j] = np.maximum(self.bed_kg_m2[i, j] - mass / area, 0.0)
         place = self._rng.uniform(size=(len(i), 3))
         position = np.empty((len(i), 3))

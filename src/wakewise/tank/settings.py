@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from wakewise.settings import Settings
+from wakewise.tank.beds import SILTS
 
 Length = Annotated[float, Field(gt=0.3, le=100.0)]
 Speed = Annotated[float, Field(ge=-3.0, le=3.0)]  # beyond what most vehicles hold, which is said with the margin
@@ -15,14 +16,6 @@ Place = tuple[float, float, float]
 Nonnegative = Annotated[float, Field(ge=0.0, le=1000.0)]
 Span = tuple[Nonnegative, Nonnegative]
 
-SILTS: dict[str, dict[str, float]] = {
-    "clear": {"load_kg_m2": 0.0, "suspended_mg_l": 0.0},
-    "silt": {"load_kg_m2": 0.1, "suspended_mg_l": 0.0, "grain_m": 20e-6, "grain_density_kg_m3": 2710.0},
-    # 50 mg/L of ground calcite with a median grain of 0.3 mm. It is sand: it sinks 4 cm/s, the water of a tank 1.5 m
-    # deep is clear after 35 s, and no thruster keeps it up. What it tests is sand on the bed, not turbid water.
-    "caco3-50mg": {"load_kg_m2": 0.0, "suspended_mg_l": 50.0, "grain_m": 3e-4, "grain_density_kg_m3": 2710.0},
-}
-"""Fields that a kind of silt sets, unless they are given as well."""
 PLANT_STEP_S = 0.005
 """Longest time step of the vehicle: a twentieth of a thruster's lag."""
 EDDY_M = 0.2
@@ -81,7 +74,11 @@ class WaveSettings(Settings):
 
 
 class PumpSettings(Settings):
-    """A pump's fixed jet."""
+    """A pump's fixed jet.
+
+    0.5 m/s from an outlet of 0.3 m at 1.2 m depth makes 0.3 m/s at a target in the middle of the tank; the same speed
+    in all the water, as of a recirculating channel, is a `current`.
+    """
 
     speed_m_s: float = Field(0.0, ge=0.0, le=5.0, description="its exit speed, 0 for none")
     diameter_m: float = Field(0.05, ge=0.005, le=0.5, description="diameter of its outlet")
@@ -106,14 +103,26 @@ class SiltSettings(Settings):
 
     A load of 0.1 kg/m2 lies just below the mean of all sediment on mid-shelf reefs (0.127; inner shelf 0.864 kg/m2;
     Tebbett, Goatley and Bellwood 2017, doi 10.1371/journal.pone.0170854), of which part is as fine as the silt here: a
-    silty bed, not an average one.
+    silty bed, not an average one. Other beds by name, with sources: `wakewise.tank.beds`.
+
+    The stress under turbulence is log-normal about its mean (Cheng 2006, Phys. Fluids 18, 096602), with an rms of 0.36
+    to 0.40 of the mean in boundary layers (Alfredsson, Johansson, Haritonidis and Eckelmann 1988, doi
+    10.1063/1.866783). Where jets strike it is higher; no figure was found for that, so that what is lifted there is
+    rather too little.
     """
 
-    kind: Literal["clear", "silt", "caco3-50mg"] = Field(
+    kind: Literal["clear", "silt", "caco3-50mg", "fresh-mud", "fluff", "sand"] = Field(
         "silt",
-        description="sets load_kg_m2, suspended_mg_l and grains, unless they are given too; caco3-50mg clears in 35 s",
+        description="sets what lies on the bed and in the water, its grains and thresholds, unless they are given too; "
+        "caco3-50mg clears in 35 s",
     )
     load_kg_m2: float = Field(0.1, ge=0.0, le=20.0, description="loose fine silt on the bed, 0 for a clean bed")
+    firm_load_kg_m2: float = Field(
+        0.0,
+        ge=0.0,
+        le=20.0,
+        description="of load_kg_m2, what lies lowest and is firmer; what settles lies on top of it",
+    )
     grain_m: float = Field(20e-6, ge=1e-6, le=1e-3, description="grain diameter of the silt")
     grain_density_kg_m3: float = Field(2710.0, gt=1150.0, le=8000.0, description="density of the grains (calcite 2710)")
     suspended_mg_l: float = Field(0.0, ge=0.0, le=5000.0, description="evenly in the water at the start")
@@ -124,6 +133,26 @@ class SiltSettings(Settings):
     threshold_Pa: float | None = Field(
         None, gt=0.0, le=10.0, description="stress from which it erodes, null for Soulsby's, from the grain"
     )
+    firm_threshold_Pa: float | None = Field(
+        None, gt=0.0, le=10.0, description="stress from which the firmer part erodes, null for ten times the other's"
+    )
+    settling_m_s: float | None = Field(
+        None,
+        gt=0.0,
+        le=0.5,
+        description="speed at which it sinks, null for Soulsby's, from the grain; aggregates sink faster",
+    )
+    stress_intensity: float = Field(
+        0.4, ge=0.0, le=1.5, description="rms of the bed's stress over its mean, from turbulence; 0 for the mean alone"
+    )
+
+    @model_validator(mode="after")
+    def _firm_part_fits(self) -> SiltSettings:
+        if self.firm_load_kg_m2 > self.load_kg_m2:
+            raise ValueError(
+                f"firm_load_kg_m2: {self.firm_load_kg_m2:g}, is a part of load_kg_m2 and so at most {self.load_kg_m2:g}"
+            )
+        return self
 
     @model_validator(mode="before")
     @classmethod

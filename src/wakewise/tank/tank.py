@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import logging
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
-from wakewise.interfaces import BodyState, Measurement, ScalarGrid, WaterTruth
+from wakewise.geometry import Pose
+from wakewise.interfaces import BodyState, FlakeCloud, Measurement, ScalarGrid, WaterTruth
 from wakewise.tank.ambient import build_ambient
 from wakewise.tank.camera_joint import CameraJoint
+from wakewise.tank.flakes import Flakes
 from wakewise.tank.grains import speed_at_stress_m_s
 from wakewise.tank.lane import Lane
 from wakewise.tank.measuring import TargetProbes
@@ -20,11 +23,12 @@ from wakewise.tank.probes import surface_points
 from wakewise.tank.sediment import SHEAR_HEIGHT_M, Silt, SiltLaws
 from wakewise.tank.sensors import Sensors
 from wakewise.tank.settings import MAX_PARCELS, MAX_SILT_PARTICLES, TankSettings
+from wakewise.tank.swell import Swell
 from wakewise.tank.tether import Tether
 from wakewise.targets import Target
 from wakewise.thrusters import electrical_power_W
 from wakewise.vehicles import Vehicle
-from wakewise.water import AmbientSum
+from wakewise.water import AiryWave, AmbientSum
 from wakewise.water.blockage import Blockage
 from wakewise.water.closure import PLAIN, SWIRLING
 from wakewise.water.induction import impulse_velocity
@@ -34,6 +38,7 @@ from wakewise.water.water import Water
 GRID_SPACING_M = 0.05
 _GRID_HALF_M = 0.8
 _GRID_HEIGHT_M = 1.0
+_OUTER_SPACING_M, _OUTER_NODES = 0.2, 8000
 _CONTACT_POINTS = 1500  # on the target, besides its vertices, so that a hull meets one
 _SILT_STEP_S = 0.1  # longest step of the silt: a few cm of travel in the fastest wall jets
 _STIRRING_SHARE = 0.4  # jets slower than this share of the threshold's speed are left out of the search for erosion
@@ -116,8 +121,13 @@ class Tank:
             silt.erosion_kg_m2_s,
             silt.threshold_Pa,
             silt.pickup,
+            settling_m_s=silt.settling_m_s,
+            stress_intensity=silt.stress_intensity,
+            firm_kg_m2=silt.firm_load_kg_m2,
+            firm_threshold_Pa=silt.firm_threshold_Pa,
         )
-        self._silt = Silt(laws, silt.load_kg_m2, settings.size_m, MAX_SILT_PARTICLES, silt_rng)
+        self._swell = _swell(self.ambient, laws)
+        self._silt = Silt(laws, silt.load_kg_m2, settings.size_m, MAX_SILT_PARTICLES, silt_rng, self._swell)
         self._silt.suspend(1e-3 * silt.suspended_mg_l, target.centre_W_m)
         _say_when_it_clears(settings, laws)
         self._stirring_speed = _STIRRING_SHARE * speed_at_stress_m_s(
@@ -126,6 +136,8 @@ class Tank:
         self._sensors = Sensors(settings.sensors, sensor_rng)
         self._joint = CameraJoint(vehicle.tilt, tilt_rad, settings.sensors, sensor_rng.spawn(1)[0])
         self._probes = TargetProbes(target, probe_rng)
+        self._flakes: Flakes | None = None  # drawn when first asked for
+        self._flake_rng = probe_rng.spawn(1)[0]
         self._time = 0.0
         self._flow_steps = 0
         self._silt_every = max(1, math.floor(_SILT_STEP_S / settings.flow_step_s + 1e-9))
@@ -227,19 +239,42 @@ class Tank:
         return self.water.excess_velocity(points_W_m)
 
     def concentration_grid(self) -> ScalarGrid:
-        """Silt in kg/m3 over 1.6 x 1.6 m about the target's foot, from the bed up to 1 m or the surface."""
+        """Silt in kg/m3 over 1.6 x 1.6 m about the target's foot, from the bed up to 1 m or the surface.
+
+        Its outer grid is a coarser one of all the water: light comes from farther away than 0.8 m.
+        """
         centre, depth = self.target.centre_W_m, self.settings.size_m[2]
         layers = int(min(_GRID_HEIGHT_M, depth) / GRID_SPACING_M + 1e-9) + 1
         across = 2 * round(_GRID_HALF_M / GRID_SPACING_M) + 1
         origin = np.array([centre[0] - _GRID_HALF_M, centre[1] - _GRID_HALF_M, depth - (layers - 1) * GRID_SPACING_M])
-        return self.silt.concentration(origin, GRID_SPACING_M, (across, across, layers))
+        near = self.silt.concentration(origin, GRID_SPACING_M, (across, across, layers))
+        return replace(near, outer=self._outer_grid())
+
+    def _outer_grid(self) -> ScalarGrid:
+        """Silt in kg/m3 in all the water, on some 8,000 nodes no closer than 0.2 m."""
+        length, width, depth = self.settings.size_m
+        spacing = max(_OUTER_SPACING_M, (length * width * depth / _OUTER_NODES) ** (1 / 3))
+        nx, ny, nz = (math.ceil(side / spacing - 1e-9) + 1 for side in (length, width, depth))
+        origin = np.array([-length / 2, -width / 2, depth - (nz - 1) * spacing])
+        return self.silt.concentration(origin, spacing, (nx, ny, nz))
+
+    def flakes(self, X_WC: Pose) -> FlakeCloud:
+        """Visible flakes before a camera now; the same ones each time, carried by the water meanwhile."""
+        if self._flakes is None:
+            self._flakes = Flakes(self.target.centre_W_m, self.settings.size_m[2], self.ambient, self._flake_rng)
+        return self._flakes.before(X_WC, self._time, self.water)
 
     def measure(self) -> WaterTruth:
         """Speeds and turbidity at the target now; the water moves in steps, so it is computed once for each."""
         if self._measured is None:
             X_WC = self._plant.state.X_WB @ self._plant.vehicle.X_BC_at(self.tilt_rad)
             grid, density = self._silt_grid(), self.settings.density_kg_m3
-            self._measured = self._probes.measure(self.water, self.silt.laws, grid, X_WC.p_m, density)
+            measured = self._probes.measure(
+                self.water, self.silt.laws, grid, X_WC.p_m, density, self._swell, self._water.time_s
+            )
+            self._measured = replace(
+                measured, silt_lifted_g=1e3 * self.silt.lifted_kg, silt_suspended_g=1e3 * self.silt.suspended_kg
+            )
         return self._measured
 
     def _silt_grid(self) -> ScalarGrid | None:
@@ -317,6 +352,14 @@ def _tether(settings: TankSettings) -> Tether | None:
         length_m=settings.tether.length_m,
         density_kg_m3=settings.density_kg_m3,
     )
+
+
+def _swell(ambient: AmbientSum, laws: SiltLaws) -> Swell | None:
+    """The ambient water's wave over this bed, if there is one."""
+    for part in ambient.parts:
+        if isinstance(part, AiryWave):
+            return Swell(wave=part, grain_m=laws.grain_m, density_kg_m3=laws.water_density_kg_m3)
+    return None
 
 
 def _say_when_it_clears(settings: TankSettings, laws: SiltLaws) -> None:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wakewise.interfaces import BodyState, Plant, ScalarGrid, Truth, WaterTruth, Witness
+from wakewise.geometry import Pose
+from wakewise.interfaces import BodyState, FlakeCloud, Plant, ScalarGrid, Truth, WaterTruth, Witness
 from wakewise.tank.settings import TankSettings
 from wakewise.tank.tank import Tank
 from wakewise.targets import Target
@@ -38,6 +39,10 @@ class TankWitness:
     def silt(self) -> ScalarGrid:
         """Silt around the target now."""
         return self.tank.concentration_grid()
+
+    def flakes(self, X_WC: Pose) -> FlakeCloud:
+        """Visible flakes before a camera now."""
+        return self.tank.flakes(X_WC)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

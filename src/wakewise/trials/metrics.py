@@ -62,6 +62,8 @@ _FIGURES: dict[str, tuple[str, str, Better]] = {
     "ray_optical_depth": ("", "beam attenuation by silt along the rays from camera to target, end to end, mean over "
                           "rays and time", "less"),
     "exposure_optical_depth": ("", "ray_optical_depth while the shutter is open", "less"),
+    "silt_lifted_g": ("g", "what the bed gave up by the end of the flight, settled again or not", "less"),
+    "silt_suspended_max_g": ("g", "most silt in the water at any time of the flight", "less"),
     "disturbance": ("m2/s2", "D as the controller's wake model sees it, over the points that its method watches, mean "
                     "over time; methods that watch other points cannot be compared by it", "none"),
     "disturbance_flown": ("m2/s2", "D of the commanded thrusts at the estimated poses, by the settings' wake model "
