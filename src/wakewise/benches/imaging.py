@@ -36,7 +36,7 @@ from wakewise.imaging.sensor import expose
 from wakewise.imaging.settings import FLAKES_PER_KG
 from wakewise.interfaces import ScalarGrid
 from wakewise.missions import MissionSettings, plan_route
-from wakewise.targets import coral, stony_kinds, place_on_bed
+from wakewise.targets import coral, place_on_bed, stony_kinds
 from wakewise.trials.timing import BenchOptions
 
 FRAMES = 6

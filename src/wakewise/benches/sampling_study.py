@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from wakewise.arrays import Array
 from wakewise.geometry import Pose
 from wakewise.interfaces import WakeModel
-from wakewise.targets import Target, coral, stony_kinds, place_on_bed, region_measure, sample_region
+from wakewise.targets import Target, coral, place_on_bed, region_measure, sample_region, stony_kinds
 from wakewise.targets.region import SHELL_M
 from wakewise.targets.sampling import NEGLIGIBLE
 from wakewise.targets.sampling import sampling_error_pct as error_by_case_pct

@@ -26,7 +26,8 @@ from wakewise.operation.surroundings import surroundings_of, tank_bounds
 from wakewise.operation.worlds import make_world
 from wakewise.planning import Surroundings
 from wakewise.tank.ambient import mean_current_m_s
-from wakewise.targets import Region, Target, delicacy, find_target, sample_region
+from wakewise.tank.swaying import DRAG, Loose, Yielding
+from wakewise.targets import Region, Sway, Target, delicacy, find_target, sample_region
 from wakewise.vehicles import Vehicle
 from wakewise.wake import wake_model
 
@@ -133,6 +134,19 @@ class Parts:
         """What is looked at, standing on the bed."""
         settings = self.scenario.target
         return find_target(settings.kind, self.scenario.tank.size_m[2], settings.seed, settings.size_m)
+
+    @cached_property
+    def yielding(self) -> Yielding | None:
+        """How the target gives way to the water; None of one that nothing moves."""
+        settings = self.scenario.target
+        tissue = settings.tissue
+        if tissue is None and settings.loose is None:
+            return None
+        lies = settings.loose
+        loose = None if lies is None else Loose(weight_N=lies.weight_N, friction=lies.friction)
+        drag = tissue.drag if tissue is not None else settings.drag or DRAG
+        sway = None if tissue is None else Sway.of(self.target, tissue, self.scenario.tank.density_kg_m3)
+        return Yielding(drag=drag, sway=sway, loose=loose)
 
     @part
     def region(self) -> Region:

@@ -17,17 +17,21 @@ import polars as pl
 from wakewise.arrays import Array
 from wakewise.files import whole_file
 from wakewise.geometry import Pose, quat_integrate
-from wakewise.interfaces import BodyState, ScalarGrid, WaterTruth, Witness
+from wakewise.interfaces import BodyState, Posture, ScalarGrid, WaterTruth, Witness
 from wakewise.missions import Route
 from wakewise.operation.loop import Step
 
 _STATE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "u_m_s", "v_m_s", "w_m_s", "p_rad_s", "q_rad_s", "r_rad_s")
 _WRENCH = ("wrench_X_N", "wrench_Y_N", "wrench_Z_N", "wrench_K_Nm", "wrench_M_Nm", "wrench_N_Nm")
 _WATER = tuple(figure.name for figure in fields(WaterTruth))
+_POSTURE = ("sway_m", "sway_peak_m", "sway_x_m", "sway_y_m", "sway_z_m", "target_stress_Pa", "shifted_m")
 
 
-def step_columns(thrusters: int) -> list[str]:
-    """Names of the numeric columns of steps.parquet, in order, for a vehicle with this many thrusters."""
+def step_columns(thrusters: int, yields: bool = False) -> list[str]:
+    """Names of the numeric columns of steps.parquet, in order, for a vehicle with this many thrusters.
+
+    Those of a target that `yields` (see `wakewise.interfaces.Posture`) come last.
+    """
     return [
         "time_s",
         *(f"{who}_{what}" for who in ("true", "est", "goal") for what in _STATE),
@@ -37,17 +41,28 @@ def step_columns(thrusters: int) -> list[str]:
         "disturbance",
         *_WATER,
         "power_W",
+        *(_POSTURE if yields else ()),
     ]
+
+
+_STANCE = ("tips_m", "tip_speeds_m_s", "shift_m")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ExposureRecord:
-    """One opening of the shutter: true camera poses across it, the estimate at its middle, the silt in the water."""
+    """One opening of the shutter: true camera poses across it, the estimate at its middle, the silt in the water.
+
+    Of a target that yields also, as in `wakewise.interfaces.Posture`, how it stood at its opening: `tips_m` and
+    `tip_speeds_m_s` (k, 2), `shift_m` (2,).
+    """
 
     time_s: float
     X_WC_true: tuple[Pose, ...]
     X_WC_est: Pose
     silt: ScalarGrid
+    tips_m: Array | None = None
+    tip_speeds_m_s: Array | None = None
+    shift_m: Array | None = None
 
 
 @dataclass(kw_only=True, eq=False)
@@ -91,6 +106,7 @@ class FlightRecorder:
     _collisions: list[bool] = field(default_factory=list)
     _solve_ms: list[float] = field(default_factory=list)
     _water: WaterTruth | None = None
+    _posture: Posture | None = None
     _water_time_s: float = -np.inf
 
     def __call__(self, step: Step) -> None:
@@ -100,6 +116,7 @@ class FlightRecorder:
         exposing = bool(k < len(opens_s) and opens_s[k] < step.time_s + self.dt_s)
         if self.witness is not None and (exposing or step.time_s >= self._water_time_s + self.water_every_s - 1e-9):
             self._water, self._water_time_s = self.witness.water(), step.time_s
+            self._posture = _posture_of(self.witness)
         water = [getattr(self._water, name) if self._water is not None else np.nan for name in _WATER]
         truth = step.truth
         lost = np.full(13, np.nan)
@@ -113,6 +130,7 @@ class FlightRecorder:
             step.command.wrench_B,
             np.array([np.nan if step.command.disturbance is None else step.command.disturbance, *water]),
             np.array([truth.power_W if truth else np.nan]),
+            _posture_row(self._posture),
         ]
         self._rows.append(np.concatenate(row))
         self._legs.append(self.route.leg_name(step.time_s))
@@ -131,6 +149,7 @@ class FlightRecorder:
                     ),
                     X_WC_est=_moved(step.estimate, float(opens_s[k]) - step.time_s + 0.5 * self.exposure_s) @ self.X_BC,
                     silt=self.witness.silt(),
+                    **_stance(self._posture),
                 )
             )
             if self.exposed is not None:
@@ -144,7 +163,8 @@ class FlightRecorder:
     def frame(self) -> pl.DataFrame:
         """The steps as a table."""
         table = np.array(self._rows).reshape(len(self._rows), -1)
-        columns = {name: table[:, i] for i, name in enumerate(step_columns(self.thrusters))}
+        names = step_columns(self.thrusters, yields=self._posture is not None)
+        columns = {name: table[:, i] for i, name in enumerate(names)}
         return pl.DataFrame(columns).with_columns(
             exposing=pl.Series(self._exposing, dtype=pl.Boolean),
             collision=pl.Series(self._collisions, dtype=pl.Boolean),
@@ -167,6 +187,27 @@ def state_vector(state: BodyState) -> Array:
     return np.concatenate([state.X_WB.p_m, state.X_WB.q, state.nu_B])
 
 
+def _posture_of(witness: Witness) -> Posture | None:
+    """How a target that yields stands now; None of one that does not, and where a witness knows of none."""
+    ask = getattr(witness, "posture", None)
+    posture: Posture | None = ask() if ask is not None else None
+    return posture
+
+
+def _posture_row(posture: Posture | None) -> Array:
+    """The values of the columns `_POSTURE`; none of a target that does not yield."""
+    if posture is None:
+        return np.zeros(0)
+    far = float(np.hypot(posture.shift_m[0], posture.shift_m[1]))
+    mean = posture.sway_mean_W_m
+    return np.array([posture.sway_m, posture.sway_peak_m, *mean, posture.target_stress_Pa, far])
+
+
+def _stance(posture: Posture | None) -> dict[str, Array]:
+    """The fields of an exposure that tell of a target that yields."""
+    return {} if posture is None else {name: getattr(posture, name) for name in _STANCE}
+
+
 def write_exposures(path: Path, exposures: list[ExposureRecord], exposure_s: float) -> None:
     """Write what each photograph needs to be rendered later."""
     with whole_file(path) as temporary, temporary.open("wb") as file:
@@ -175,7 +216,9 @@ def write_exposures(path: Path, exposures: list[ExposureRecord], exposure_s: flo
 
 def exposure_arrays(exposures: list[ExposureRecord]) -> dict[str, Any]:
     """What an exposure is, as the arrays that are kept of it; silt in single precision."""
+    stance = {name: [getattr(e, name) for e in exposures] for name in _STANCE}
     return {
+        **{name: np.array(values) for name, values in stance.items() if values[0] is not None},
         "time_s": np.array([e.time_s for e in exposures]),
         "X_WC_p_m": np.array([[X.p_m for X in e.X_WC_true] for e in exposures]),
         "X_WC_q": np.array([[X.q for X in e.X_WC_true] for e in exposures]),
@@ -193,12 +236,14 @@ def read_exposures(path: Path | IO[bytes]) -> list[ExposureRecord]:
         origin, spacing = data["silt_origin_W_m"], float(data["silt_spacing_m"])
         p, q, silt = data["X_WC_p_m"], data["X_WC_q"], data["silt_kg_m3"]
         est_p, est_q = data["X_WC_est_p_m"], data["X_WC_est_q"]
+        stance = {name: data[name] for name in _STANCE if name in data}
         return [
             ExposureRecord(
                 time_s=float(time_s),
                 X_WC_true=tuple(Pose(p[k, i], q[k, i]) for i in range(p.shape[1])),
                 X_WC_est=Pose(est_p[k], est_q[k]),
                 silt=ScalarGrid(origin_W_m=origin, spacing_m=spacing, values=silt[k]),
+                **{name: values[k] for name, values in stance.items()},
             )
             for k, time_s in enumerate(data["time_s"])
         ]

@@ -9,7 +9,7 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
-from wakewise.interfaces import BodyState, Measurement, ScalarGrid, WaterTruth
+from wakewise.interfaces import BodyState, Measurement, Posture, ScalarGrid, WaterTruth
 from wakewise.tank.ambient import build_ambient
 from wakewise.tank.grains import speed_at_stress_m_s
 from wakewise.tank.lane import Lane
@@ -19,6 +19,7 @@ from wakewise.tank.probes import surface_points
 from wakewise.tank.sediment import SHEAR_HEIGHT_M, Silt, SiltLaws
 from wakewise.tank.sensors import Sensors
 from wakewise.tank.settings import MAX_PARCELS, MAX_SILT_PARTICLES, TankSettings
+from wakewise.tank.swaying import Swaying, Yielding
 from wakewise.tank.tether import Tether
 from wakewise.targets import Target
 from wakewise.thrusters import electrical_power_W
@@ -56,6 +57,8 @@ class Tank:
     start : BodyState
     rng : numpy Generator
         Its children serve water, silt, sensors and probes.
+    yielding : Yielding, optional
+        How the target gives way to the water; None of one that nothing moves.
 
     Raises
     ------
@@ -65,7 +68,13 @@ class Tank:
     """
 
     def __init__(
-        self, vehicle: Vehicle, target: Target, settings: TankSettings, start: BodyState, rng: np.random.Generator
+        self,
+        vehicle: Vehicle,
+        target: Target,
+        settings: TankSettings,
+        start: BodyState,
+        rng: np.random.Generator,
+        yielding: Yielding | None = None,
     ) -> None:
         length, width, depth = settings.size_m
         if abs(target.bed_z_m - depth) > 1e-6:
@@ -116,6 +125,9 @@ class Tank:
         )
         self._sensors = Sensors(settings.sensors, sensor_rng)
         self._probes = TargetProbes(target, probe_rng)
+        self._swaying = None
+        if yielding is not None:
+            self._swaying = Swaying(target, yielding, settings.density_kg_m3, self.ambient)
         self._time = 0.0
         self._flow_steps = 0
         self._silt_every = max(1, math.floor(_SILT_STEP_S / settings.flow_step_s + 1e-9))
@@ -223,6 +235,11 @@ class Tank:
             self._measured = self._probes.measure(self.water, self.silt.laws, grid, X_WC.p_m, density)
         return self._measured
 
+    def posture(self) -> Posture | None:
+        """How a soft or a loose target stands after the water's last step; None of one that nothing moves."""
+        self._catch_up()
+        return None if self._swaying is None else self._swaying.posture()
+
     def _silt_grid(self) -> ScalarGrid | None:
         return self.concentration_grid() if len(self.silt.mass_kg) else None
 
@@ -256,6 +273,8 @@ class Tank:
 
         def move() -> None:
             self._water.step(dt_s, before, origins, axes, impulse_N_s)
+            if self._swaying is not None:
+                self._swaying.step(self._water.now, dt_s)
             if silt_too:
                 now = self._water.now
                 self._silt_lane.do(lambda: self._move_silt(now))

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wakewise.interfaces import BodyState, Plant, ScalarGrid, Truth, WaterTruth, Witness
+from wakewise.interfaces import BodyState, Plant, Posture, ScalarGrid, Truth, WaterTruth, Witness
 from wakewise.tank.settings import TankSettings
+from wakewise.tank.swaying import Yielding
 from wakewise.tank.tank import Tank
 from wakewise.targets import Target
 from wakewise.vehicles import Vehicle
@@ -33,6 +34,10 @@ class TankWitness:
         """Silt around the target now."""
         return self.tank.concentration_grid()
 
+    def posture(self) -> Posture | None:
+        """How a soft or a loose target stands now; None of one that nothing moves."""
+        return self.tank.posture()
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TankWorld:
@@ -48,6 +53,8 @@ class TankWorld:
         Where the vehicle really is when the flight begins.
     draw : callable
         Gives the generator of all draws, a fresh one of the same seed at each call.
+    yielding : Yielding, optional
+        How the target gives way; None of one that nothing moves.
     """
 
     vehicle: Vehicle
@@ -56,10 +63,11 @@ class TankWorld:
     start: BodyState
     draw: Callable[[], np.random.Generator]
     name: str = "tank"
+    yielding: Yielding | None = None
 
     def tank(self) -> Tank:
         """A fresh tank at its start, with all that it knows."""
-        return Tank(self.vehicle, self.target, self.settings, self.start, self.draw())
+        return Tank(self.vehicle, self.target, self.settings, self.start, self.draw(), self.yielding)
 
     def begin(self) -> tuple[Plant, Witness | None]:
         """A fresh tank at its start, as plant and witness."""

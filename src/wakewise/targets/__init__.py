@@ -4,8 +4,8 @@ Delicate features are found from the mesh or marked by a person, and may count m
 
 Start reading in `target.py` (a mesh on its bed), `find.py` (a target by name) and `region.py` (points that stand for
 its water). `corals.py` and `soft.py` with `fields.py` grow corals, `mesh.py` reads files, `sampling.py` spreads points,
-`distance.py` and `rays.py` measure, `delicate.py` and `marks.py` say what is delicate. `sway.py` with `sections.py` says
-how a soft one bends, `tissues.py` what it is made of.
+`distance.py` and `rays.py` measure, `delicate.py` and `marks.py` say what is delicate. `sway.py` with `sections.py`
+says how a soft one bends, `tissues.py` what it is made of.
 """
 
 from wakewise.targets.corals import coral, coral_kinds, soft_kinds, stony_kinds

@@ -58,6 +58,8 @@ def coral(kind: str, seed: int = 0) -> Mesh:
     if seed < 0:
         raise InputError(f"coral seed {seed}: must be 0 or greater")
     rng = np.random.default_rng(seed)
+    if kind == "seagrass":
+        return _SOFT[kind](rng)  # drawn to size: how a blade bends goes with the fourth power of its length
     return _to_size(zero_surface(_STONY[kind](rng)) if kind in _STONY else _SOFT[kind](rng))
 
 

@@ -16,10 +16,10 @@ class Sections:
     """Level sections through a body, which may consist of several loops (branches, fingers, tentacles).
 
     `area_m2` (n,) is that of all loops. `second_m4` (n, 2, 2) is the sum over loops of the integral of r r^T over the
-    loop, r from its own middle: times Young's modulus the stiffness against bending of branches that bend side by
-    side. `displaced_m2` (n, 2, 2) times the water's density is the added mass per height of loops that move sideways,
-    each taken as the ellipse of its second moments: pi b^2 across a half axis b (J. N. Newman, Marine Hydrodynamics,
-    MIT Press 1977, table 4.3). `reach_m2` (n, 2, 2) is that of the thickest loop: e . reach . e is the square of half its
+    loop, r from its own middle: times Young's modulus the stiffness against bending of branches that bend side by side.
+    `displaced_m2` (n, 2, 2) times the water's density is the added mass per height of loops that move sideways, each
+    taken as the ellipse of its second moments: pi b^2 across a half axis b (J. N. Newman, Marine Hydrodynamics, MIT
+    Press 1977, table 4.3). `reach_m2` (n, 2, 2) is that of the thickest loop: e . reach . e is the square of half its
     width along e.
     """
 
@@ -77,9 +77,7 @@ def sections(places_m: Array, faces: IntArray, heights_m: Array) -> Sections:
     return Sections(area_m2=area, second_m4=second, displaced_m2=displaced, reach_m2=reach)
 
 
-def _loops(
-    plan: Array, height: Array, faces: IntArray, edge: IntArray, level: float
-) -> tuple[Array, Array, IntArray]:
+def _loops(plan: Array, height: Array, faces: IntArray, edge: IntArray, level: float) -> tuple[Array, Array, IntArray]:
     """Segments in which faces are cut, start and end (m, 2) with the body on one side, and the loop of each (m,)."""
     here = height[faces]
     above = here > level
@@ -107,7 +105,7 @@ def _loops(
 
 
 def _moments(start: Array, end: Array, loop: IntArray) -> tuple[Array, Array]:
-    """Signed area (l,) of each loop, and its signed second moments about its own middle (l, 2, 2), by Green's theorem."""
+    """Signed area (l,) of each loop and signed second moments about its middle (l, 2, 2), by Green's theorem."""
     count = int(loop.max()) + 1
 
     def total(values: Array) -> Array:

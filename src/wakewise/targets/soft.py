@@ -41,7 +41,7 @@ def gorgonian(rng: np.random.Generator) -> Mesh:
 
 
 def soft_coral(rng: np.random.Generator) -> Mesh:
-    """Finger leather coral (Sinularia): some thirty fingers of 7 to 10 mm that rise from a low, fleshy crust."""
+    """Finger leather coral (Sinularia): thirty slender fingers of 6 to 8 mm that rise from a low, fleshy crust."""
     segments: list[Segment] = []
     count = 30
     for k in range(count):
@@ -51,12 +51,12 @@ def soft_coral(rng: np.random.Generator) -> Mesh:
         place = 0.030 * share * out - BURIED_M * UP
         lean = 0.85 * share * rng.uniform(0.75, 1.1)
         length = rng.uniform(0.105, 0.135) * (1.0 - 0.25 * share)
-        radius = rng.uniform(0.0042, 0.0052)
+        radius = rng.uniform(0.0033, 0.0040)
         pieces = 4
-        for piece in range(pieces):
+        for _ in range(pieces):
             heading = np.sin(lean) * out + np.cos(lean) * UP
             after = place + length / pieces * heading
-            thin = radius * 0.94
+            thin = radius * 0.95
             segments.append((place, after, radius, thin))
             place, radius, lean = after, thin, 0.8 * lean + rng.uniform(-0.08, 0.08)
     segments.append((-BURIED_M * UP, 0.008 * UP, 0.040, 0.028))
@@ -72,7 +72,9 @@ def anemone(rng: np.random.Generator) -> Mesh:
         (0.055 * UP, height * UP, 0.017, 0.021),
         (height * UP, (height + 0.006) * UP, 0.021, 0.026),
     ]
-    for ring, (radius, count, lean) in enumerate(((0.028, 22, 1.15), (0.023, 18, 0.85), (0.017, 13, 0.5), (0.009, 7, 0.2))):
+    for ring, (radius, count, lean) in enumerate(
+        ((0.028, 22, 1.15), (0.023, 18, 0.85), (0.017, 13, 0.5), (0.009, 7, 0.2))
+    ):
         for k in range(count):
             azimuth = 2 * np.pi * (k + 0.5 * (ring % 2)) / count + rng.uniform(-0.1, 0.1)
             out = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
@@ -93,9 +95,7 @@ def seagrass(rng: np.random.Generator) -> Mesh:
         azimuth, share = 2.399963 * k, np.sqrt((k + 0.5) / 16)
         foot = 0.045 * share * np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
         bow = np.array([rng.uniform(-0.012, 0.012), rng.uniform(-0.012, 0.012), 0.0])
-        blades.append(
-            _blade(foot, rng.uniform(0.105, 0.150), bow, rng.uniform(0.0, 2 * np.pi), rng.uniform(-0.5, 0.5))
-        )
+        blades.append(_blade(foot, rng.uniform(0.085, 0.120), bow, rng.uniform(0.0, 2 * np.pi), rng.uniform(-0.5, 0.5)))
     offsets = np.cumsum([0] + [len(blade.vertices_m) for blade in blades])
     faces = [blade.faces + first for blade, first in zip(blades, offsets[:-1], strict=True)]
     return Mesh(np.concatenate([blade.vertices_m for blade in blades]), np.concatenate(faces))
@@ -123,7 +123,10 @@ def _blade(foot: Array, height_m: float, bow_m: Array, turn: float, twist: float
     sides = np.concatenate([np.stack([a, b, b + around], axis=-1), np.stack([a, b + around, a + around], axis=-1)])
     k, following = np.arange(around), (np.arange(around) + 1) % around
     last, below, above = (levels - 1) * around, levels * around, levels * around + 1
-    lids = [np.stack([np.full(around, below), following, k], 1), np.stack([np.full(around, above), last + k, last + following], 1)]
+    lids = [
+        np.stack([np.full(around, below), following, k], 1),
+        np.stack([np.full(around, above), last + k, last + following], 1),
+    ]
     return Mesh(np.concatenate([rings, ends]), np.concatenate([sides.reshape(-1, 3), *lids]))
 
 

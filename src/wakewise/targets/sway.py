@@ -1,11 +1,11 @@
 """How a soft target bends: cantilevers that stand on the bed, each in the two shapes into which a stream bends it.
 
 Every piece of the mesh that stands on the bed by itself is a cantilever, a *stem*: a whole colony, or one blade of
-grass. Its stiffness against bending follows from Young's modulus and the level sections of the mesh, section by section;
-branches cut by one section bend side by side. Each stem has two modes, along the axes in which it is softest and
-stiffest, whose shape is that into which a uniform stream bends it, so that the static deflection in a stream is that of
-beam theory and the natural frequency (Rayleigh's quotient) is 0.4 % high for an even beam. The mass is that of the
-tissue and of the water that moves along.
+grass. Its stiffness against bending follows from Young's modulus and the level sections of the mesh, section by
+section; branches cut by one section bend side by side. Each stem has two modes, along the axes in which it is softest
+and stiffest, whose shape is that into which a uniform stream bends it, so that the static deflection in a stream is
+that of beam theory and the natural frequency (Rayleigh's quotient) is 0.4 % high for an even beam. The mass is that of
+the tissue and of the water that moves along.
 
 Bending keeps the length of the axis: what moves aside comes down, and the stiffness grows with the slope, to the third
 order (M. R. M. Crespo da Silva and C. C. Glynn 1978, J. Struct. Mech. 6, 437). Sections stay level. That holds while a
@@ -106,7 +106,9 @@ class Sway:
         """
         mesh = target.mesh
         if not mesh.is_closed:
-            raise InputError(f"target.sway: {target.name} has an open mesh, which has no sections; a closed one is needed")
+            raise InputError(
+                f"target.sway: {target.name} has an open mesh, which has no sections; a closed one is needed"
+            )
         places = mesh.vertices_m * [1.0, 1.0, -1.0] + [0.0, 0.0, target.bed_z_m]
         stem, heights = _stems(places, mesh.faces)
         parts = []
@@ -216,7 +218,6 @@ def _modes(places: Array, faces: IntArray, height: float, tissue: Tissue, water_
 
     give = np.einsum("n,nij->ij", (height - middles) * moment(width(None)), softness)
     axes = np.linalg.eigh(0.5 * (give + give.T))[1].T[::-1]  # softest first
-    nodes = np.linspace(0.0, height, NODES + 1)
     columns: dict[str, list[Array | float]] = {name: [] for name in _COLUMNS}
     for axis in axes:
         bend = np.einsum("i,nij,j->n", axis, softness, axis)
@@ -225,7 +226,10 @@ def _modes(places: Array, faces: IntArray, height: float, tissue: Tissue, water_
         # Within a step the curvature is even, so the axis is a parabola there.
         way = np.concatenate([[0.0], np.cumsum(slope[:-1] * step + 0.5 * curvature * step**2)])
         curvature, slope, way = curvature / way[-1], slope / way[-1], way / way[-1]
-        mid_slope, mid_way = 0.5 * (slope[1:] + slope[:-1]), way[:-1] + 0.5 * step * slope[:-1] + curvature * step**2 / 8
+        mid_slope, mid_way = (
+            0.5 * (slope[1:] + slope[:-1]),
+            way[:-1] + 0.5 * step * slope[:-1] + curvature * step**2 / 8,
+        )
         drop = 0.5 * np.concatenate([[0.0], np.cumsum((slope[1:] ** 2 + slope[1:] * slope[:-1] + slope[:-1] ** 2) / 3)])
         drop *= step
         mid_drop = 0.5 * (drop[1:] + drop[:-1])
