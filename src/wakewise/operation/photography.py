@@ -6,6 +6,7 @@ import csv
 import hashlib
 import io
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,13 +15,19 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from wakewise.arrays import Array
 from wakewise.files import whole_file, write_text
 from wakewise.geometry import Pose
-from wakewise.imaging import SiltOptics, calibrate, photograph
+from wakewise.imaging import Scene, SiltOptics, calibrate, photograph
 from wakewise.interfaces import no_progress
 from wakewise.operation.parts import Parts
 from wakewise.operation.recorder import ExposureRecord, read_exposures
 from wakewise.operation.scenario import Scenario
+from wakewise.targets import turned_normals
+
+SMEAR_PX = 0.5
+"""Way of the fastest tip across the picture from one scene of an exposure to the next."""
+MOST_FRAMES, NEAREST_M = 15, 0.05
 
 IMAGE_COLUMNS = (
     "name",
@@ -83,11 +90,41 @@ def take_photograph(parts: Parts, folder: Path, number: int, exposure: ExposureR
     rng = parts.seeds.imaging().spawn(len(names))[number]
     grains = SiltOptics(diameter_m=scenario.tank.silt.grain_m, density_kg_m3=scenario.tank.silt.grain_density_kg_m3)
     silt = exposure.silt if float(exposure.silt.values.max(initial=0.0)) > 0.0 else None
-    photo = photograph(parts.scene, parts.camera, exposure.X_WC_true, silt, scenario.imaging, rng, grains)
+    photo = photograph(
+        scenes_of(parts, exposure), parts.camera, exposure.X_WC_true, silt, scenario.imaging, rng, grains
+    )
     write_image(image, photo.image, scenario.imaging.jpeg_quality)
     noted = {"exposure": mark, "sharpness": photo.sharpness, "turbidity_per_m": photo.turbidity_per_m}
     write_text(note, json.dumps(noted))
     return noted
+
+
+def scenes_of(parts: Parts, exposure: ExposureRecord) -> list[Scene]:
+    """What stands before the camera during an exposure: one scene, or an odd number where the target's motion shows.
+
+    A tip that goes less than half a pixel while the shutter is open, as seen from the nearest camera there may be, is
+    shown where it is in the middle of the exposure.
+    """
+    tips, speeds, shift = exposure.tips_m, exposure.tip_speeds_m_s, exposure.shift_m
+    if tips is None or speeds is None or shift is None:
+        return [parts.scene]
+    open_s = parts.scenario.imaging.exposure_s
+    middle = exposure.X_WC_true[len(exposure.X_WC_true) // 2]
+    away_m = float(np.linalg.norm(middle.p_m - parts.target.centre_W_m)) - parts.target.radius_m
+    fastest = float(np.linalg.norm(speeds, axis=1).max(initial=0.0))
+    pixels = fastest * open_s / max(away_m, NEAREST_M) * float(parts.camera.row[1])
+    frames = min(2 * math.ceil(0.5 * (pixels / SMEAR_PX - 1.0)) + 1, MOST_FRAMES) if pixels > SMEAR_PX else 1
+    return [_posed(parts, tips + speeds * (open_s * (k + 0.5) / frames), shift) for k in range(max(frames, 1))]
+
+
+def _posed(parts: Parts, tips_m: Array, shift_m: Array) -> Scene:
+    """The scene with its target's tips moved and the whole of it shifted."""
+    yielding, scene = parts.yielding, parts.scene
+    moved, normals = np.zeros((scene.first_bed_vertex, 3)), scene.target_normals.astype(np.float64)
+    if yielding is not None and yielding.sway is not None:
+        moved, tilt = yielding.sway.bent(parts.target, tips_m)
+        normals = turned_normals(normals, tilt)
+    return scene.posed(moved + np.append(shift_m, 0.0), normals)
 
 
 def fingerprint(exposure: ExposureRecord) -> str:
@@ -97,6 +134,9 @@ def fingerprint(exposure: ExposureRecord) -> str:
         digest.update(X_WC.p_m.tobytes() + X_WC.q.tobytes())
     silt = exposure.silt
     digest.update(np.array([silt.spacing_m, *silt.origin_W_m, *silt.values.shape]).tobytes() + silt.values.tobytes())
+    for stance in (exposure.tips_m, exposure.tip_speeds_m_s, exposure.shift_m):
+        if stance is not None:
+            digest.update(np.array(stance.shape).tobytes() + stance.tobytes())
     return digest.hexdigest()
 
 

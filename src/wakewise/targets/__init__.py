@@ -16,7 +16,7 @@ from wakewise.targets.marks import Marks, read_marks, read_vertex_scores
 from wakewise.targets.mesh import Mesh, load_mesh, read_mesh, write_mesh
 from wakewise.targets.region import Measure, Region, region_measure, sample_region
 from wakewise.targets.sampling import sampling_error_pct
-from wakewise.targets.sway import Sway, Tissue
+from wakewise.targets.sway import Sway, Tissue, turned_normals
 from wakewise.targets.target import Target, place_on_bed
 from wakewise.targets.tissues import TISSUES
 
@@ -45,5 +45,6 @@ __all__ = [
     "sampling_error_pct",
     "soft_kinds",
     "stony_kinds",
+    "turned_normals",
     "write_mesh",
 ]
