@@ -117,6 +117,17 @@ def scenes_of(parts: Parts, exposure: ExposureRecord) -> list[Scene]:
     return [_posed(parts, tips + speeds * (open_s * (k + 0.5) / frames), shift) for k in range(max(frames, 1))]
 
 
+def moved_m(parts: Parts, exposure: ExposureRecord) -> Array:
+    """How far each vertex of a target that yields was from its place at rest when the shutter opened, shape (n, 3)."""
+    yielding, mesh = parts.yielding, parts.target.mesh
+    moved = np.zeros_like(mesh.vertices_m)
+    if exposure.shift_m is not None:
+        moved += np.append(exposure.shift_m, 0.0)
+    if yielding is not None and yielding.sway is not None and exposure.tips_m is not None:
+        moved += yielding.sway.moved(yielding.sway.stem, mesh.vertices_m, exposure.tips_m)
+    return moved
+
+
 def _posed(parts: Parts, tips_m: Array, shift_m: Array) -> Scene:
     """The scene with its target's tips moved and the whole of it shifted."""
     yielding, scene = parts.yielding, parts.scene
