@@ -296,6 +296,30 @@ class Truth:
     tilt_rad: float = 0.0
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Posture:
+    """How a soft or a loose target stands at one instant, for the record only.
+
+    `tips_m` and `tip_speeds_m_s`, shape (k, 2), are the way and the speed of its k stems' tips along their two axes
+    (see `wakewise.targets.Sway`), and `shift_m`, shape (2,), how far it has slid north and east. Of the surface above
+    the bed, against its shape at rest in still water and without the sliding: `sway_m` is the root mean square
+    distance, `sway_peak_m` the largest, and `sway_mean_W_m`, shape (3,), the mean way. `target_stress_Pa` is the
+    largest bending stress.
+    """
+
+    tips_m: Array
+    tip_speeds_m_s: Array
+    shift_m: Array
+    sway_m: float
+    sway_peak_m: float
+    sway_mean_W_m: Array
+    target_stress_Pa: float
+
+    def __post_init__(self) -> None:
+        k = len(self.tips_m)
+        freeze(self, tips_m=(k, 2), tip_speeds_m_s=(k, 2), shift_m=(2,), sway_mean_W_m=(3,))
+
+
 class Witness(Protocol):
     """Knows the truth of a simulated world; there is none at sea."""
 

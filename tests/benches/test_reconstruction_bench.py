@@ -22,7 +22,7 @@ SMALL = {
 def test_the_bench_has_every_figure_at_the_top_and_per_coral(monkeypatch: pytest.MonkeyPatch) -> None:
     """Accuracy, completeness, times and memory, none missing in clear water; the way without poses beside it."""
     small = load_scenario("quick", None, SMALL)
-    monkeypatch.setattr(reconstruction, "coral_kinds", lambda: ("brain",))
+    monkeypatch.setattr(reconstruction, "stony_kinds", lambda: ("brain",))
     monkeypatch.setattr(reconstruction, "load_scenario", lambda *_: small)
     monkeypatch.setattr(reconstruction.imaging, "run", lambda _: {"frame_s": 0.1})
     assert "reconstruction" in BENCHES

@@ -9,7 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from wakewise.errors import InputError
-from wakewise.targets import coral, coral_kinds
+from wakewise.targets import coral, coral_kinds, soft_kinds, stony_kinds
 from wakewise.targets.fields import add_cones, labyrinth, noise
 
 
@@ -20,12 +20,14 @@ def surface_samples(mesh, count):
     return points[points[:, 2] > 0.001], normals[points[:, 2] > 0.001]
 
 
-def test_the_kinds_are_the_three_promised():
-    """Branching, brain and plate."""
-    assert coral_kinds() == ["brain", "branching", "plate"]
+def test_the_kinds_are_those_promised():
+    """Branching, brain and plate are stony; four are soft."""
+    assert stony_kinds() == ["brain", "branching", "plate"]
+    assert soft_kinds() == ["anemone", "gorgonian", "seagrass", "soft-coral"]
+    assert coral_kinds() == stony_kinds() + soft_kinds()
 
 
-@pytest.mark.parametrize("kind", coral_kinds())
+@pytest.mark.parametrize("kind", stony_kinds())
 def test_a_coral_is_one_closed_piece_of_the_stated_size(kind):
     """Closed, in one piece, outward, 12 to 18 cm, standing through z = 0, fine enough and not too fine."""
     mesh = coral(kind)
@@ -41,7 +43,7 @@ def test_a_coral_is_one_closed_piece_of_the_stated_size(kind):
     assert -0.02 < mesh.vertices_m[:, 2].min() < -0.005
 
 
-@pytest.mark.parametrize("kind", coral_kinds())
+@pytest.mark.parametrize("kind", stony_kinds())
 def test_most_of_a_coral_can_be_seen_from_the_orbits(kind):
     """At least 90 % of the surface above the bed faces three or more of 36 views at 20, 40 and 60 degrees."""
     mesh = coral(kind)

@@ -36,7 +36,7 @@ from wakewise.imaging.sensor import expose
 from wakewise.imaging.settings import FLAKES_PER_KG
 from wakewise.interfaces import ScalarGrid
 from wakewise.missions import MissionSettings, plan_route
-from wakewise.targets import coral, coral_kinds, place_on_bed
+from wakewise.targets import coral, place_on_bed, stony_kinds
 from wakewise.trials.timing import BenchOptions
 
 FRAMES = 6
@@ -74,7 +74,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
         "memory_4k_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
         **surface_figures(scene, views),
         "flat_port": {str(fov): port_figures(fov) for fov in (60, 75, 90)},
-        "features": {kind: feature_counts(kind) for kind in coral_kinds()},
+        "features": {kind: feature_counts(kind) for kind in stony_kinds()},
         "paper_features": {"A": 2847, "B": 1856, "C": 982},
     }
 

@@ -23,7 +23,7 @@ from wakewise.operation import Scenario, load_scenario
 from wakewise.reconstruction import ReconstructionSettings
 from wakewise.studies.photo_model import judge
 from wakewise.studies.photo_sets import planned_views, read_photo_set, write_photos
-from wakewise.targets import coral_kinds
+from wakewise.targets import stony_kinds
 from wakewise.trials.timing import BenchOptions
 
 PRESET, SEED = "standard", 1
@@ -37,7 +37,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
     corals: dict[str, dict[str, Any]] = {}
     why: dict[str, str] = {}
     with tempfile.TemporaryDirectory(prefix="wakewise-bench-") as scratch:
-        for kind in coral_kinds():
+        for kind in stony_kinds():
             scenario = load_scenario(PRESET, None, {"target.kind": kind, "tank.silt.load_kg_m2": 0.0, "seed": SEED})
             found = model_coral(scenario, Path(scratch) / kind, options)
             if found["failure"] is not None:

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from wakewise.arrays import Array
 from wakewise.geometry import Pose
 from wakewise.interfaces import WakeModel
-from wakewise.targets import Target, coral, coral_kinds, place_on_bed, region_measure, sample_region
+from wakewise.targets import Target, coral, place_on_bed, region_measure, sample_region, stony_kinds
 from wakewise.targets.region import SHELL_M
 from wakewise.targets.sampling import NEGLIGIBLE
 from wakewise.targets.sampling import sampling_error_pct as error_by_case_pct
@@ -49,7 +49,7 @@ def sampling_errors(seed: int = 0, models: tuple[str, ...] = ("paper", "jet"), p
     """
     vehicle = load_vehicle("paper")
     result: dict[str, Any] = {name: {} for name in models}
-    for kind in coral_kinds():
+    for kind in stony_kinds():
         draw, poses, many = np.random.default_rng(seed).spawn(3)
         target = place_on_bed(kind, coral(kind), BED_Z_M)
         region = sample_region(target, points, draw)
@@ -65,7 +65,7 @@ def sampling_errors(seed: int = 0, models: tuple[str, ...] = ("paper", "jet"), p
             result[name][kind] = _summary(error_by_case_pct(D, truth), truth)
     for name in models:
         result[name]["worst"] = {
-            key: max(result[name][kind][key] for kind in coral_kinds())
+            key: max(result[name][kind][key] for kind in stony_kinds())
             for key in ("median_pct", "p95_pct", "touched_median_pct", "touched_p95_pct")
         }
     return result

@@ -36,7 +36,11 @@ World = Annotated[
 ]
 TargetName = Annotated[
     str | None,
-    typer.Option("--target", help="branching, brain, plate, or a mesh file.", show_default=False),
+    typer.Option(
+        "--target",
+        help="anemone, brain, branching, gorgonian, plate, seagrass, soft-coral, or a mesh file.",
+        show_default=False,
+    ),
 ]
 TargetSize = Annotated[
     float | None,

@@ -49,7 +49,7 @@ TargetMesh = Annotated[
     typer.Option(
         "--target",
         metavar="MESH",
-        help="A mesh file in m, or branching, brain, plate: stands on the floor at x = y = 0.",
+        help="A mesh file in m, or a coral (branching, gorgonian, ...): stands on the floor at x = y = 0.",
         show_default=False,
     ),
 ]

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from wakewise.cli.console import print_json
 from wakewise.cli.options import Json, TargetSize
 
+if TYPE_CHECKING:
+    from wakewise.targets import Target
+
+STREAMS_M_S = (0.004, 0.036, 0.06, 0.18)
+"""Streams in which a soft target is shown: what a gentle method leaves, the tank's current, and the paper's washes."""
+
 app = typer.Typer(help="What Wakewise makes of a target.", no_args_is_help=False, rich_markup_mode=None)
 
-Kind = Annotated[str, typer.Argument(help="branching, brain, plate, or a mesh file.")]
+Kind = Annotated[
+    str, typer.Argument(help="anemone, brain, branching, gorgonian, plate, seagrass, soft-coral, or a mesh file.")
+]
 Out = Annotated[
     Path | None,
     typer.Option(help="Also write a page (.html), a picture (.svg) or a coloured mesh (.ply).", show_default=False),
@@ -102,6 +110,7 @@ def show(
         "region_points": len(region.weights),
         "region_on_surface": int(np.sum(region.distance_m == 0.0)),
         "region_weight": float(region.weights.sum()),
+        "sway": _sway(standing),
         "out": None if out is None else str(out),
     }
     if json:
@@ -117,5 +126,29 @@ def show(
     if given is not None:
         typer.echo(f"marked: {len(given.weights)} places, {facts['marked_share_pct']:.1f} % of the vertices")
     typer.echo(f"region: {facts['region_on_surface']} points on the surface, {points} in all")
+    if isinstance(sway := facts["sway"], dict):
+        bends = ", ".join(f"{way:.2g} at {speed}" for speed, way in sway["tip_mm"].items())
+        typer.echo(f"sways: {sway['stems']} of its own, from {sway['frequency_Hz']:.2g} Hz; tip (mm, at m/s): {bends}")
     if out is not None:
         typer.echo(f"written: {out}")
+
+
+def _sway(target: Target) -> dict[str, object] | None:
+    """How a soft procedural target bends; None of one that is rigid by its kind."""
+    import numpy as np
+
+    from wakewise.physics import TRIM_WATER_KG_M3
+    from wakewise.tank.swaying import Pieces, standing_m
+    from wakewise.targets import TISSUES, Sway
+
+    if target.name not in TISSUES:
+        return None
+    tissue = TISSUES[target.name]
+    sway = Sway.of(target, tissue, TRIM_WATER_KG_M3)
+    pieces = Pieces.of(target, sway)
+    tips = {}
+    for speed in STREAMS_M_S:
+        streams = speed * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+        ways = [standing_m(pieces, sway, tissue.drag * TRIM_WATER_KG_M3, stream) for stream in streams]
+        tips[f"{speed:g}"] = 1e3 * float(np.linalg.norm(ways, axis=2).max())
+    return {"stems": len(sway.height_m), "frequency_Hz": float(sway.frequency_Hz.min()), "tip_mm": tips}

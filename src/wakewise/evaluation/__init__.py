@@ -19,7 +19,7 @@ if TYPE_CHECKING:
         compare_depths,
         read_depth_views,
     )
-    from wakewise.evaluation.flight import flight_figures
+    from wakewise.evaluation.flight import SWAY_FIGURES, flight_figures
     from wakewise.evaluation.surface import (
         Comparison,
         Crop,
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 __all__ = [
     "DEPTH_DEFINITIONS",
     "SURFACE_DEFINITIONS",
+    "SWAY_FIGURES",
     "Comparison",
     "Crop",
     "DepthScore",

@@ -18,6 +18,15 @@ REVERSAL_N = 0.1
 
 PATH_WINDOW_S = 5.0
 
+SWAY_FIGURES = (
+    "sway_rms_mm",
+    "sway_peak_mm",
+    "sway_mean_mm",
+    "sway_about_mean_mm",
+    "target_stress_peak_Pa",
+    "shifted_mm",
+)
+
 
 def rms(values: Array) -> float:
     """Root mean square."""
@@ -103,6 +112,8 @@ def flight_figures(steps: pl.DataFrame) -> dict[str, float | int | None]:
     estimate_rmse_mm: estimated against true position. velocity_deviation_pct, roll_pitch_rms_deg: see the functions.
     energy_kJ: electrical. sign_flips_per_s: reversals of all thrusters together per second. fallbacks: steps on which
     the controller fell back. collisions: times that the vehicle touched something. duration_s: length of the flight.
+    Of a target that yields: sway_rms_mm, sway_mean_mm, sway_about_mean_mm (see `sway_figures`), sway_peak_mm and
+    target_stress_peak_Pa, the largest at any time, and shifted_mm, how far it has slid in the end.
 
     Raises
     ------
@@ -143,6 +154,7 @@ def flight_figures(steps: pl.DataFrame) -> dict[str, float | int | None]:
     out["silt_lifted_g"] = None if lifted is None else float(lifted[-1])
     suspended = _finite(steps, "silt_suspended_g")
     out["silt_suspended_max_g"] = None if suspended is None else float(suspended.max())
+    out |= sway_figures(steps, exposing)
     out |= _tracking(steps, time)
     power = _maybe(steps, "power_W")
     out["energy_kJ"] = None if power is None else 1e-3 * float(power[:, 0] @ lasts)
@@ -155,6 +167,29 @@ def flight_figures(steps: pl.DataFrame) -> dict[str, float | int | None]:
     if "fallback" in steps.columns:
         fell = int(steps["fallback"].fill_null("").cast(pl.String).str.len_chars().gt(0).sum())
     out["fallbacks"] = fell
+    return out
+
+
+def sway_figures(steps: pl.DataFrame, exposing: BoolArray | None) -> dict[str, float | None]:
+    """How far water moved a target that yields; all None of one that nothing moves.
+
+    While the shutter is open, over all exposures alike: sway_rms_mm is the root mean square way of the surface from its
+    shape at rest, sway_mean_mm how far the mean shape is from that at rest (the way of the surface's mean), and
+    sway_about_mean_mm the root mean square of how far that mean way is from its own mean.
+    """
+    out: dict[str, float | None] = dict.fromkeys(SWAY_FIGURES)
+    mean = _maybe(steps, "sway_x_m", "sway_y_m", "sway_z_m")
+    values = _maybe(steps, "sway_m", "sway_peak_m", "target_stress_Pa", "shifted_m")
+    if mean is None or values is None:
+        return out
+    out["sway_peak_mm"] = 1e3 * float(values[:, 1].max())
+    out["target_stress_peak_Pa"] = float(values[:, 2].max())
+    out["shifted_mm"] = 1e3 * float(values[-1, 3])
+    if exposing is not None and exposing.any():
+        seen = mean[exposing]
+        out["sway_rms_mm"] = 1e3 * rms(values[exposing, 0])
+        out["sway_mean_mm"] = 1e3 * float(np.linalg.norm(seen.mean(axis=0)))
+        out["sway_about_mean_mm"] = 1e3 * rms(np.linalg.norm(seen - seen.mean(axis=0), axis=1))
     return out
 
 

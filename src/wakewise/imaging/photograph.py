@@ -44,7 +44,7 @@ class Photo:
 
 
 def photograph(
-    scene: Scene,
+    scene: Scene | Sequence[Scene],
     camera: Camera,
     poses: Sequence[Pose],
     silt: ScalarGrid | None,
@@ -58,7 +58,8 @@ def photograph(
 
     Parameters
     ----------
-    scene : Scene
+    scene : Scene or sequence of Scene
+        Several show a target that moves: how it stands at instants evenly spaced over the exposure, an odd number.
     camera : Camera
         `settings.camera()`, or another one.
     poses : sequence of Pose
@@ -82,12 +83,14 @@ def photograph(
     InputError
         If there is no pose, or the silt is negative somewhere.
     """
-    view = render(scene, camera, pose_at(poses, 0.5), settings.lights(), settings.samples)
+    scenes = [scene] if isinstance(scene, Scene) else list(scene)
+    views = [render(each, camera, pose_at(poses, 0.5), settings.lights(), settings.samples) for each in scenes]
+    view = views[0] if len(views) == 1 else mean_view(views)
     chosen = None
     if settings.auto_exposure:
         balance = white_balance(settings)
-        views = before or (pose_at(poses, 0.5),)
-        chosen = automatic(scene, views, silt, settings, grains or SiltOptics(), balance)
+        metered = before or (pose_at(poses, 0.5),)
+        chosen = automatic(scenes[0], metered, silt, settings, grains or SiltOptics(), balance)
     return photograph_of(view, camera, poses, silt, settings, rng, grains, chosen, drifting)
 
 
@@ -133,6 +136,16 @@ def photograph_of(
         turbidity_per_m=float(np.mean(silt_per_m[on_target] if on_target.any() else silt_per_m)),
         exposure_s=taken.exposure_s,
         gain=taken.gain,
+    )
+
+
+def mean_view(views: Sequence[Render]) -> Render:
+    """Light of views of a moving scene from one place, in the mean; depth is that of the middle one."""
+    return Render(
+        radiance=np.mean([view.radiance for view in views], axis=0, dtype=np.float32),
+        lamp_radiance=np.mean([view.lamp_radiance for view in views], axis=0, dtype=np.float32),
+        depth_m=views[len(views) // 2].depth_m,
+        target_fraction=np.mean([view.target_fraction for view in views], axis=0, dtype=np.float32),
     )
 
 

@@ -126,7 +126,7 @@ def render(scene: Scene, camera: Camera, X_WC: Pose, lights: Lights, samples: in
         hits = scene.solids.run(starts[:count], ways[:count], output=True)
         return (
             which, starts, ways, spreads, hits["geomID"], hits["primID"], hits["u"], hits["v"], hits["tfar"],
-            scene.faces, scene.first_face, scene.normals, light, scene.seed,
+            scene.faces, scene.first_face, scene.normals, light, scene.moved_m, scene.seed,
         )  # fmt: skip
 
     rows = max(TILE_PX, BAND_RAYS // w // TILE_PX * TILE_PX)

@@ -7,7 +7,8 @@ Everything here is fixed in the world and independent of the view. The scene kee
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,8 @@ class Scene:
     the down-welling light on the outer and the inner side, relative to a level open surface, and `panel_light` (n, 2)
     that of the tank's panels, relative to a level open surface at the foot; `bed_maps` the baked sand; `top_m` the
     least z of all vertices. The bed is a height field, `bed`, whose crossings are the vertices from `first_bed_vertex`
-    on; `solids` is target and stones for ray casting, and `spheres_F_m` (k, 4) holds them.
+    on; `solids` is target and stones for ray casting, and `spheres_F_m` (k, 4) holds them. `moved_m` (n, 3) is how far
+    the target's vertices are from their places at rest, which its colours keep; of a target at rest it is empty.
     """
 
     foot_W_m: Array
@@ -57,6 +59,46 @@ class Scene:
     first_bed_vertex: int
     spheres_F_m: Array
     solids: Any
+    moved_m: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 3), np.float32))
+
+    def posed(self, moved_m: Array, target_normals: Array) -> Scene:
+        """The same scene with its target's vertices moved from rest; colours and light from above move along.
+
+        Parameters
+        ----------
+        moved_m : ndarray, shape (n, 3)
+            One row for each vertex of the target.
+        target_normals : ndarray, shape (n, 3)
+            Unit normals of the moved surface, outward.
+
+        Raises
+        ------
+        InputError
+            If there is not one row for each vertex.
+        """
+        n = self.first_bed_vertex
+        if moved_m.shape != (n, 3) or target_normals.shape != (n, 3):
+            raise InputError(f"scene: {moved_m.shape} moves and {target_normals.shape} normals, needs ({n}, 3) of both")
+        rest = self.vertices_F_m[:n] - (self.moved_m if len(self.moved_m) else np.float32(0.0))
+        vertices, normals = self.vertices_F_m.copy(), self.normals.copy()
+        vertices[:n], normals[:n] = rest + moved_m.astype(np.float32), target_normals
+        own, stones = self.faces[: self.first_face[1]], self.faces[self.first_face[2] :]
+        crossings = len(self.bed.lines_m) ** 2
+        parts = [(vertices[:n], own), (vertices[n + crossings :], stones - (n + crossings))]
+        return replace(
+            self,
+            vertices_F_m=vertices,
+            normals=normals,
+            top_m=float(min(v[:, 2].min(initial=np.inf) for v in (vertices[:n], vertices[n:]))),
+            spheres_F_m=bounding_spheres([(v.astype(np.float64), f.astype(np.int64)) for v, f in parts]),
+            solids=_embree(parts),
+            moved_m=np.ascontiguousarray(moved_m, np.float32),
+        )
+
+    @property
+    def target_normals(self) -> NDArray[np.float32]:
+        """Normals of the target's vertices, shape (n, 3)."""
+        return self.normals[: self.first_bed_vertex]
 
     @classmethod
     def build(
@@ -107,10 +149,6 @@ class Scene:
         daylight, panel_light = bake_light(parts, normals, clear_m + 0.4, panels, foot_W)
 
         offsets = np.cumsum([0] + [len(v) for v, _ in parts])
-        solids = EmbreeScene()
-        for v, f in (parts[0], parts[2]):
-            if len(f):
-                TriangleMesh(solids, np.ascontiguousarray(v, np.float32), np.ascontiguousarray(f, np.int32))
         bed_z = bed_vertices[:, 2].astype(np.float32).reshape(len(lines), len(lines))
         return cls(
             foot_W_m=foot_W,
@@ -126,8 +164,17 @@ class Scene:
             bed=height_field(lines, bed_z),
             first_bed_vertex=len(vertices),
             spheres_F_m=bounding_spheres([parts[0], parts[2]]),
-            solids=solids,
+            solids=_embree([parts[0], parts[2]]),
         )
+
+
+def _embree(parts: Sequence[tuple[NDArray[Any], NDArray[Any]]]) -> Any:
+    """Surfaces, given as vertices and faces, ready for rays; those without faces are left out."""
+    solids = EmbreeScene()
+    for vertices, faces in parts:
+        if len(faces):
+            TriangleMesh(solids, np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int32))
+    return solids
 
 
 def vertex_normals(vertices_m: Array, faces: IntArray) -> Array:

@@ -86,12 +86,14 @@ def needs_more(kind: Any, depth_m: Any, first: int, last: int, out: Any) -> None
 @njit(nogil=True)
 def _solid_colour(
     what: int, triangle: int, u: float, v: float, x: float, y: float, z: float, wx: float, wy: float, wz: float,
-    footprint: float, faces: Any, first_face: Any, normals: Any, light: Any, seed: int, ax: float, ay: float, az: float,
-    power: float, lamps: Any,
+    footprint: float, faces: Any, first_face: Any, normals: Any, light: Any, moved: Any, seed: int, ax: float,
+    ay: float, az: float, power: float, lamps: Any,
 ) -> tuple[float, float, float, float, float]:  # fmt: skip
     """Albedo (r, g, b), irradiance from above, and from the lamps, where a ray meets the target or a stone.
 
     (x, y, z) is the place, (wx, wy, wz) the ray's direction, (ax, ay, az) the lamps'. Surfaces are matt (Lambert).
+    `moved` is how far the target's vertices are from their places at rest, where its colours are, shape (n, 3); of a
+    target at rest it is empty.
     """
     face = np.uint64(first_face[what] + triangle)
     # Unsigned: an index that may be negative costs a check at every use.
@@ -107,7 +109,12 @@ def _solid_colour(
     if inner == 1:
         scale = -scale
     if what == TARGET:
-        red, green, blue = coral_albedo(x, y, z, footprint, seed)
+        rx, ry, rz = x, y, z
+        if moved.shape[0] > 0:
+            rx -= wa * moved[a, 0] + u * moved[b, 0] + v * moved[c, 0]
+            ry -= wa * moved[a, 1] + u * moved[b, 1] + v * moved[c, 1]
+            rz -= wa * moved[a, 2] + u * moved[b, 2] + v * moved[c, 2]
+        red, green, blue = coral_albedo(rx, ry, rz, footprint, seed)
     else:
         red, green, blue = stone_albedo(x, y, z, footprint, seed)
     day = wa * light[a, inner] + u * light[b, inner] + v * light[c, inner]
@@ -118,9 +125,9 @@ def _solid_colour(
 @njit(nogil=True)
 def overlay(
     pixels: Any, row: Any, width: int, which: Any, starts: Any, ways: Any, spreads: Any, solids: Any, triangle: Any,
-    u: Any, v: Any, distance: Any, faces: Any, first_face: Any, normals: Any, light: Any, seed: int, R_WC: Any,
-    power: float, lamps: Any, coloured: bool, kind: Any, depth_m: Any, radiance: Any, lamp_radiance: Any,
-    fraction: Any,
+    u: Any, v: Any, distance: Any, faces: Any, first_face: Any, normals: Any, light: Any, moved: Any, seed: int,
+    R_WC: Any, power: float, lamps: Any, coloured: bool, kind: Any, depth_m: Any, radiance: Any,
+    lamp_radiance: Any, fraction: Any,
 ) -> None:  # fmt: skip
     """Lay what the centres' rays met of target and stones over the image of the bed, where it is nearer.
 
@@ -143,7 +150,7 @@ def overlay(
         wx, wy, wz = ways[i, 0], ways[i, 1], ways[i, 2]
         red, green, blue, day, night = _solid_colour(
             what, triangle[i], u[i], v[i], starts[i, 0] + t * wx, starts[i, 1] + t * wy, starts[i, 2] + t * wz,
-            wx, wy, wz, t * spreads[i], faces, first_face, normals, light, seed, ax, ay, az, power, lamps,
+            wx, wy, wz, t * spreads[i], faces, first_face, normals, light, moved, seed, ax, ay, az, power, lamps,
         )  # fmt: skip
         fraction[pixel] = 1.0 if what == TARGET else 0.0
         radiance[pixel, 0], lamp_radiance[pixel, 0] = red * (day + night), red * night
@@ -154,8 +161,9 @@ def overlay(
 @njit(nogil=True)
 def average(
     pixels: Any, across: int, which: Any, starts: Any, ways: Any, spreads: Any, solids: Any, triangle: Any, u: Any,
-    v: Any, distance: Any, faces: Any, first_face: Any, normals: Any, light: Any, seed: int, bed: Any, attributes: Any,
-    maps: Any, R_WC: Any, power: float, lamps: Any, radiance: Any, lamp_radiance: Any, fraction: Any,
+    v: Any, distance: Any, faces: Any, first_face: Any, normals: Any, light: Any, moved: Any, seed: int, bed: Any,
+    attributes: Any, maps: Any, R_WC: Any, power: float, lamps: Any, radiance: Any, lamp_radiance: Any,
+    fraction: Any,
 ) -> None:  # fmt: skip
     """Write each pixel's mean over its samples: radiance, the lamps' part of it, and the target's share.
 
@@ -190,7 +198,7 @@ def average(
             t = most
             red, green, blue, day, night = _solid_colour(
                 what, triangle[i], u[i], v[i], ox + t * wx, oy + t * wy, oz + t * wz,
-                wx, wy, wz, t * spreads[i], faces, first_face, normals, light, seed, ax, ay, az, power, lamps,
+                wx, wy, wz, t * spreads[i], faces, first_face, normals, light, moved, seed, ax, ay, az, power, lamps,
             )  # fmt: skip
             if what == TARGET:
                 fraction[pixel] += share

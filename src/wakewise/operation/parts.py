@@ -26,7 +26,8 @@ from wakewise.operation.surroundings import surroundings_of, tank_bounds
 from wakewise.operation.survey import found_target
 from wakewise.operation.worlds.makers import make_world
 from wakewise.planning import Surroundings
-from wakewise.targets import Region, Target, delicacy, find_target, sample_region
+from wakewise.tank.swaying import DRAG, Loose, Yielding
+from wakewise.targets import Region, Sway, Target, delicacy, find_target, sample_region
 from wakewise.vehicles import Vehicle
 from wakewise.wake import wake_model
 
@@ -143,6 +144,19 @@ class Parts:
         """The target where mission, controller and reconstruction take it to be (see `operation.survey`)."""
         place_rng, _ = self.seeds.survey()
         return found_target(self.target, self.scenario.survey, place_rng)
+
+    @cached_property
+    def yielding(self) -> Yielding | None:
+        """How the target gives way to the water; None of one that nothing moves."""
+        settings = self.scenario.target
+        tissue = settings.tissue
+        if tissue is None and settings.loose is None:
+            return None
+        lies = settings.loose
+        loose = None if lies is None else Loose(weight_N=lies.weight_N, friction=lies.friction)
+        drag = tissue.drag if tissue is not None else settings.drag or DRAG
+        sway = None if tissue is None else Sway.of(self.target, tissue, self.scenario.tank.density_kg_m3)
+        return Yielding(drag=drag, sway=sway, loose=loose)
 
     @part
     def region(self) -> Region:

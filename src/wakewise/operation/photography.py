@@ -6,6 +6,7 @@ import csv
 import hashlib
 import io
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,14 +15,20 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from wakewise.arrays import Array
 from wakewise.files import whole_file, write_text
 from wakewise.geometry import Pose
-from wakewise.imaging import SiltOptics, calibrate, photograph
+from wakewise.imaging import Scene, SiltOptics, calibrate, photograph
 from wakewise.interfaces import no_progress
 from wakewise.operation.parts import Parts
 from wakewise.operation.recorder import ExposureRecord, read_exposures
 from wakewise.operation.scenario import Scenario
 from wakewise.operation.survey import known_calibration
+from wakewise.targets import turned_normals
+
+SMEAR_PX = 0.5
+"""Way of the fastest tip across the picture from one scene of an exposure to the next."""
+MOST_FRAMES, NEAREST_M = 15, 0.05
 
 IMAGE_COLUMNS = (
     "name",
@@ -87,7 +94,7 @@ def take_photograph(parts: Parts, folder: Path, number: int, exposure: ExposureR
     grains = SiltOptics(diameter_m=scenario.tank.silt.grain_m, density_kg_m3=scenario.tank.silt.grain_density_kg_m3)
     silt = exposure.silt if exposure.silt.largest > 0.0 else None
     photo = photograph(
-        parts.scene,
+        scenes_of(parts, exposure),
         parts.camera,
         exposure.X_WC_true,
         silt,
@@ -103,6 +110,45 @@ def take_photograph(parts: Parts, folder: Path, number: int, exposure: ExposureR
     return noted
 
 
+def scenes_of(parts: Parts, exposure: ExposureRecord) -> list[Scene]:
+    """What stands before the camera during an exposure: one scene, or an odd number where the target's motion shows.
+
+    A tip that goes less than half a pixel while the shutter is open, as seen from the nearest camera there may be, is
+    shown where it is in the middle of the exposure.
+    """
+    tips, speeds, shift = exposure.tips_m, exposure.tip_speeds_m_s, exposure.shift_m
+    if tips is None or speeds is None or shift is None:
+        return [parts.scene]
+    open_s = parts.scenario.imaging.exposure_s
+    middle = exposure.X_WC_true[len(exposure.X_WC_true) // 2]
+    away_m = float(np.linalg.norm(middle.p_m - parts.target.centre_W_m)) - parts.target.radius_m
+    fastest = float(np.linalg.norm(speeds, axis=1).max(initial=0.0))
+    pixels = fastest * open_s / max(away_m, NEAREST_M) * float(parts.camera.row[1])
+    frames = min(2 * math.ceil(0.5 * (pixels / SMEAR_PX - 1.0)) + 1, MOST_FRAMES) if pixels > SMEAR_PX else 1
+    return [_posed(parts, tips + speeds * (open_s * (k + 0.5) / frames), shift) for k in range(max(frames, 1))]
+
+
+def moved_m(parts: Parts, exposure: ExposureRecord) -> Array:
+    """How far each vertex of a target that yields was from its place at rest when the shutter opened, shape (n, 3)."""
+    yielding, mesh = parts.yielding, parts.target.mesh
+    moved = np.zeros_like(mesh.vertices_m)
+    if exposure.shift_m is not None:
+        moved += np.append(exposure.shift_m, 0.0)
+    if yielding is not None and yielding.sway is not None and exposure.tips_m is not None:
+        moved += yielding.sway.moved(yielding.sway.stem, mesh.vertices_m, exposure.tips_m)
+    return moved
+
+
+def _posed(parts: Parts, tips_m: Array, shift_m: Array) -> Scene:
+    """The scene with its target's tips moved and the whole of it shifted."""
+    yielding, scene = parts.yielding, parts.scene
+    moved, normals = np.zeros((scene.first_bed_vertex, 3)), scene.target_normals.astype(np.float64)
+    if yielding is not None and yielding.sway is not None:
+        moved, tilt = yielding.sway.bent(parts.target, tips_m)
+        normals = turned_normals(normals, tilt)
+    return scene.posed(moved + np.append(shift_m, 0.0), normals)
+
+
 def fingerprint(exposure: ExposureRecord) -> str:
     """Digest of all that a photograph's pixels hang on."""
     digest = hashlib.blake2b(digest_size=16)
@@ -115,6 +161,9 @@ def fingerprint(exposure: ExposureRecord) -> str:
     if exposure.flakes is not None:
         for part in (exposure.flakes.p_W_m, exposure.flakes.v_W_m_s, exposure.flakes.looks):
             digest.update(part.tobytes())
+    for stance in (exposure.tips_m, exposure.tip_speeds_m_s, exposure.shift_m):
+        if stance is not None:
+            digest.update(np.array(stance.shape).tobytes() + stance.tobytes())
     return digest.hexdigest()
 
 

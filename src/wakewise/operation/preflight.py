@@ -13,6 +13,7 @@ from wakewise.operation.surroundings import surroundings_of
 from wakewise.planning import check_start, state_of
 from wakewise.tank import Holding, holding, tank_ambient
 from wakewise.tank.preflight import check_fit
+from wakewise.tank.swaying import check_sway
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
@@ -46,9 +47,29 @@ def preflight(parts: Parts) -> Preflight:
         scenario.mission.clearance_m,
     )
     check_way(parts)
+    check_target(parts)
     times_s = np.linspace(0.0, route.duration_s, 400)
     check_fit(scenario.tank, vehicle, [(float(t), route.body(float(t), parts.aim).X_WB) for t in times_s])
     return Preflight(clearance_m=clearance_m, holding=check_current(parts))
+
+
+def check_target(parts: Parts, looks: int = 200) -> None:
+    """Refuse a soft target that cannot be moved by the water's steps, or that lies down in its current.
+
+    Raises
+    ------
+    InputError
+        See `wakewise.tank.swaying.check_sway`.
+    """
+    yielding, tank, target = parts.yielding, parts.scenario.tank, parts.target
+    if yielding is None or yielding.sway is None:
+        return
+    ambient = tank_ambient(tank, parts.seeds.tank())
+    top = np.array([[target.centre_W_m[0], target.centre_W_m[1], target.mesh.vertices_m[:, 2].min()]])
+    times_s = np.linspace(0.0, min(parts.route.duration_s, ambient.end_s), looks)
+    passing = np.array([ambient.velocity(top, float(time_s))[0] for time_s in times_s])
+    fastest = passing[np.argmax(np.linalg.norm(passing, axis=1))]
+    check_sway(target, yielding.sway, yielding.drag, fastest, tank.density_kg_m3, tank.flow_step_s)
 
 
 def check_way(parts: Parts) -> None:

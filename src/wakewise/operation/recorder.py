@@ -19,7 +19,7 @@ from wakewise.arrays import Array
 from wakewise.files import whole_file
 from wakewise.geometry import Pose, quat_integrate
 from wakewise.imaging.settings import METERED_EVERY_S
-from wakewise.interfaces import BodyState, FlakeCloud, ScalarGrid, WaterTruth, Witness
+from wakewise.interfaces import BodyState, FlakeCloud, Posture, ScalarGrid, WaterTruth, Witness
 from wakewise.missions import Route
 from wakewise.operation.loop import Step
 from wakewise.vehicles.tilt import TiltJoint
@@ -27,10 +27,14 @@ from wakewise.vehicles.tilt import TiltJoint
 _STATE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "u_m_s", "v_m_s", "w_m_s", "p_rad_s", "q_rad_s", "r_rad_s")
 _WRENCH = ("wrench_X_N", "wrench_Y_N", "wrench_Z_N", "wrench_K_Nm", "wrench_M_Nm", "wrench_N_Nm")
 _WATER = tuple(figure.name for figure in fields(WaterTruth))
+_POSTURE = ("sway_m", "sway_peak_m", "sway_x_m", "sway_y_m", "sway_z_m", "target_stress_Pa", "shifted_m")
 
 
-def step_columns(thrusters: int) -> list[str]:
-    """Names of the numeric columns of steps.parquet, in order, for a vehicle with this many thrusters."""
+def step_columns(thrusters: int, yields: bool = False) -> list[str]:
+    """Names of the numeric columns of steps.parquet, in order, for a vehicle with this many thrusters.
+
+    Those of a target that `yields` (see `wakewise.interfaces.Posture`) come last.
+    """
     return [
         "time_s",
         *(f"{who}_{what}" for who in ("true", "est", "goal") for what in _STATE),
@@ -40,8 +44,12 @@ def step_columns(thrusters: int) -> list[str]:
         "disturbance",
         *_WATER,
         "power_W",
+        *(_POSTURE if yields else ()),
         *(f"{who}_tilt_deg" for who in ("true", "est", "goal")),
     ]
+
+
+_STANCE = ("tips_m", "tip_speeds_m_s", "shift_m")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,6 +59,8 @@ class ExposureRecord:
     `X_WC_before` are true poses of the camera before, oldest first, which automatic exposure goes by; else none.
     `flakes` are those that drift before the camera; None where nobody knows, so that they are drawn for each
     photograph.
+    Of a target that yields also, as in `wakewise.interfaces.Posture`, how it stood at its opening: `tips_m` and
+    `tip_speeds_m_s` (k, 2), `shift_m` (2,).
     """
 
     time_s: float
@@ -59,6 +69,9 @@ class ExposureRecord:
     silt: ScalarGrid
     X_WC_before: tuple[Pose, ...] = ()
     flakes: FlakeCloud | None = None
+    tips_m: Array | None = None
+    tip_speeds_m_s: Array | None = None
+    shift_m: Array | None = None
 
 
 @dataclass(kw_only=True, eq=False)
@@ -108,6 +121,7 @@ class FlightRecorder:
     _collisions: list[bool] = field(default_factory=list)
     _solve_ms: list[float] = field(default_factory=list)
     _water: WaterTruth | None = None
+    _posture: Posture | None = None
     _water_time_s: float = -np.inf
 
     def __call__(self, step: Step) -> None:
@@ -117,6 +131,7 @@ class FlightRecorder:
         exposing = bool(k < len(opens_s) and opens_s[k] < step.time_s + self.dt_s)
         if self.witness is not None and (exposing or step.time_s >= self._water_time_s + self.water_every_s - 1e-9):
             self._water, self._water_time_s = self.witness.water(), step.time_s
+            self._posture = _posture_of(self.witness)
         water = [getattr(self._water, name) if self._water is not None else np.nan for name in _WATER]
         truth = step.truth
         lost = np.full(13, np.nan)
@@ -130,6 +145,7 @@ class FlightRecorder:
             step.command.wrench_B,
             np.array([np.nan if step.command.disturbance is None else step.command.disturbance, *water]),
             np.array([truth.power_W if truth else np.nan]),
+            _posture_row(self._posture),
             np.degrees([truth.tilt_rad if truth else np.nan, step.tilt_rad, step.goal.tilt_rad]),
         ]
         self._rows.append(np.concatenate(row))
@@ -152,6 +168,7 @@ class FlightRecorder:
                     silt=self.witness.silt(),
                     X_WC_before=self._before(),
                     flakes=_flakes_before(self.witness, truth.state.X_WB @ self._mount(truth.tilt_rad)),
+                    **_stance(self._posture),
                 )
             )
             if self.exposed is not None:
@@ -175,7 +192,8 @@ class FlightRecorder:
     def frame(self) -> pl.DataFrame:
         """The steps as a table."""
         table = np.array(self._rows).reshape(len(self._rows), -1)
-        columns = {name: table[:, i] for i, name in enumerate(step_columns(self.thrusters))}
+        names = step_columns(self.thrusters, yields=self._posture is not None)
+        columns = {name: table[:, i] for i, name in enumerate(names)}
         return pl.DataFrame(columns).with_columns(
             exposing=pl.Series(self._exposing, dtype=pl.Boolean),
             collision=pl.Series(self._collisions, dtype=pl.Boolean),
@@ -198,6 +216,27 @@ def state_vector(state: BodyState) -> Array:
     return np.concatenate([state.X_WB.p_m, state.X_WB.q, state.nu_B])
 
 
+def _posture_of(witness: Witness) -> Posture | None:
+    """How a target that yields stands now; None of one that does not, and where a witness knows of none."""
+    ask = getattr(witness, "posture", None)
+    posture: Posture | None = ask() if ask is not None else None
+    return posture
+
+
+def _posture_row(posture: Posture | None) -> Array:
+    """The values of the columns `_POSTURE`; none of a target that does not yield."""
+    if posture is None:
+        return np.zeros(0)
+    far = float(np.hypot(posture.shift_m[0], posture.shift_m[1]))
+    mean = posture.sway_mean_W_m
+    return np.array([posture.sway_m, posture.sway_peak_m, *mean, posture.target_stress_Pa, far])
+
+
+def _stance(posture: Posture | None) -> dict[str, Array]:
+    """The fields of an exposure that tell of a target that yields."""
+    return {} if posture is None else {name: getattr(posture, name) for name in _STANCE}
+
+
 def write_exposures(path: Path, exposures: list[ExposureRecord], exposure_s: float) -> None:
     """Write what each photograph needs to be rendered later."""
     with whole_file(path) as temporary, temporary.open("wb") as file:
@@ -208,7 +247,9 @@ def exposure_arrays(exposures: list[ExposureRecord]) -> dict[str, Any]:
     """What an exposure is, as the arrays that are kept of it; silt in single precision."""
     before = [[X.p_m for X in e.X_WC_before] for e in exposures], [[X.q for X in e.X_WC_before] for e in exposures]
     metered = {"X_WC_before_p_m": np.array(before[0]), "X_WC_before_q": np.array(before[1])}
+    stance = {name: [getattr(e, name) for e in exposures] for name in _STANCE}
     return (metered if exposures[0].X_WC_before else {}) | {
+        **{name: np.array(values) for name, values in stance.items() if values[0] is not None},
         "time_s": np.array([e.time_s for e in exposures]),
         "X_WC_p_m": np.array([[X.p_m for X in e.X_WC_true] for e in exposures]),
         "X_WC_q": np.array([[X.q for X in e.X_WC_true] for e in exposures]),
@@ -287,6 +328,7 @@ def read_exposures(path: Path | IO[bytes]) -> list[ExposureRecord]:
         if "silt_outer_kg_m3" in data:  # not in files of before there was one
             far, coarse = data["silt_outer_origin_W_m"], float(data["silt_outer_spacing_m"])
             outers = [ScalarGrid(origin_W_m=far, spacing_m=coarse, values=v) for v in data["silt_outer_kg_m3"]]
+        stance = {name: data[name] for name in _STANCE if name in data}
         return [
             ExposureRecord(
                 time_s=float(time_s),
@@ -295,6 +337,7 @@ def read_exposures(path: Path | IO[bytes]) -> list[ExposureRecord]:
                 silt=ScalarGrid(origin_W_m=origin, spacing_m=spacing, values=silt[k], outer=outers[k]),
                 X_WC_before=tuple(Pose(*X) for X in zip(before_p[k], before_q[k], strict=True)),
                 flakes=flakes[k],
+                **{name: values[k] for name, values in stance.items()},
             )
             for k, time_s in enumerate(data["time_s"])
         ]

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from wakewise.arrays import Array
+from wakewise.arrays import Array, IntArray
 from wakewise.targets import Target
 
 _BED_HEIGHTS_M = (0.010, 0.015, 0.020)
@@ -19,6 +19,11 @@ def surface_points(target: Target, count: int, rng: np.random.Generator) -> Arra
 
     One point is drawn in each of `count` equal shares of the area, faces in the order of the mesh.
     """
+    return surface_samples(target, count, rng)[0]
+
+
+def surface_samples(target: Target, count: int, rng: np.random.Generator) -> tuple[Array, Array, IntArray]:
+    """As `surface_points`, with the area vector that each point stands for, outward, (count, 3), and its face."""
     corners = target.mesh.vertices_m[target.mesh.faces]
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     # Faces with their middle in the bed are buried, or the foot that stands on it: no water passes there.
@@ -32,7 +37,9 @@ def surface_points(target: Target, count: int, rng: np.random.Generator) -> Arra
     one, two, three = (corners[face, k] for k in range(3))
     points: Array = one + a[:, None] * (two - one) + b[:, None] * (three - one)
     points[:, 2] = np.minimum(points[:, 2], target.bed_z_m)
-    return points
+    normals = np.cross(two - one, three - one)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return points, float(sums[-1]) / count * normals, face
 
 
 def bed_points(centre_W_m: Array, bed_z_m: float, radius_m: float) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
-from wakewise.interfaces import BodyState, FlakeCloud, Measurement, ScalarGrid, WaterTruth
+from wakewise.interfaces import BodyState, FlakeCloud, Measurement, Posture, ScalarGrid, WaterTruth
 from wakewise.tank.ambient import build_ambient
 from wakewise.tank.camera_joint import CameraJoint
 from wakewise.tank.flakes import Flakes
@@ -23,6 +23,7 @@ from wakewise.tank.probes import surface_points
 from wakewise.tank.sediment import SHEAR_HEIGHT_M, Silt, SiltLaws
 from wakewise.tank.sensors import Sensors
 from wakewise.tank.settings import MAX_PARCELS, MAX_SILT_PARTICLES, TankSettings
+from wakewise.tank.swaying import Swaying, Yielding
 from wakewise.tank.swell import Swell
 from wakewise.tank.tether import Tether
 from wakewise.targets import Target
@@ -64,6 +65,8 @@ class Tank:
         Its children serve water, silt, sensors and probes.
     tilt_rad : float
         Where the joint of the camera, if it has one, stands at the start.
+    yielding : Yielding, optional
+        How the target gives way to the water; None of one that nothing moves.
 
     Raises
     ------
@@ -80,6 +83,7 @@ class Tank:
         start: BodyState,
         rng: np.random.Generator,
         tilt_rad: float = 0.0,
+        yielding: Yielding | None = None,
     ) -> None:
         length, width, depth = settings.size_m
         if abs(target.bed_z_m - depth) > 1e-6:
@@ -138,6 +142,9 @@ class Tank:
         self._probes = TargetProbes(target, probe_rng)
         self._flakes: Flakes | None = None  # drawn when first asked for
         self._flake_rng = probe_rng.spawn(1)[0]
+        self._swaying = None
+        if yielding is not None:
+            self._swaying = Swaying(target, yielding, settings.density_kg_m3, self.ambient)
         self._time = 0.0
         self._flow_steps = 0
         self._silt_every = max(1, math.floor(_SILT_STEP_S / settings.flow_step_s + 1e-9))
@@ -277,6 +284,11 @@ class Tank:
             )
         return self._measured
 
+    def posture(self) -> Posture | None:
+        """How a soft or a loose target stands after the water's last step; None of one that nothing moves."""
+        self._catch_up()
+        return None if self._swaying is None else self._swaying.posture()
+
     def _silt_grid(self) -> ScalarGrid | None:
         return self.concentration_grid() if len(self.silt.mass_kg) else None
 
@@ -310,6 +322,8 @@ class Tank:
 
         def move() -> None:
             self._water.step(dt_s, before, origins, axes, impulse_N_s)
+            if self._swaying is not None:
+                self._swaying.step(self._water.now, dt_s)
             if silt_too:
                 now = self._water.now
                 self._silt_lane.do(lambda: self._move_silt(now))

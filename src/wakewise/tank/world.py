@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from wakewise.geometry import Pose
-from wakewise.interfaces import BodyState, FlakeCloud, Plant, ScalarGrid, Truth, WaterTruth, Witness
+from wakewise.interfaces import BodyState, FlakeCloud, Plant, Posture, ScalarGrid, Truth, WaterTruth, Witness
 from wakewise.tank.settings import TankSettings
+from wakewise.tank.swaying import Yielding
 from wakewise.tank.tank import Tank
 from wakewise.targets import Target
 from wakewise.vehicles import Vehicle
@@ -44,6 +45,10 @@ class TankWitness:
         """Visible flakes before a camera now."""
         return self.tank.flakes(X_WC)
 
+    def posture(self) -> Posture | None:
+        """How a soft or a loose target stands now; None of one that nothing moves."""
+        return self.tank.posture()
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TankWorld:
@@ -61,6 +66,8 @@ class TankWorld:
         Gives the generator of all draws, a fresh one of the same seed at each call.
     tilt_rad : float
         Where the camera's joint stands when the flight begins.
+    yielding : Yielding, optional
+        How the target gives way; None of one that nothing moves.
     """
 
     vehicle: Vehicle
@@ -70,10 +77,11 @@ class TankWorld:
     draw: Callable[[], np.random.Generator]
     name: str = "tank"
     tilt_rad: float = 0.0
+    yielding: Yielding | None = None
 
     def tank(self) -> Tank:
         """A fresh tank at its start, with all that it knows."""
-        return Tank(self.vehicle, self.target, self.settings, self.start, self.draw(), self.tilt_rad)
+        return Tank(self.vehicle, self.target, self.settings, self.start, self.draw(), self.tilt_rad, self.yielding)
 
     def begin(self) -> tuple[Plant, Witness | None]:
         """A fresh tank at its start, as plant and witness."""

@@ -3,11 +3,12 @@
 Delicate features are found from the mesh or marked by a person, and may count more in the region than the rest.
 
 Start reading in `target.py` (a mesh on its bed), `find.py` (a target by name) and `region.py` (points that stand for
-its water). `corals.py` with `fields.py` grows corals, `mesh.py` reads files, `sampling.py` spreads points,
-`distance.py` and `rays.py` measure, `delicate.py` and `marks.py` say what is delicate.
+its water). `corals.py` and `soft.py` with `fields.py` grow corals, `mesh.py` reads files, `sampling.py` spreads points,
+`distance.py` and `rays.py` measure, `delicate.py` and `marks.py` say what is delicate. `sway.py` with `sections.py`
+says how a soft one bends, `tissues.py` what it is made of.
 """
 
-from wakewise.targets.corals import coral, coral_kinds
+from wakewise.targets.corals import coral, coral_kinds, soft_kinds, stony_kinds
 from wakewise.targets.delicate import Delicacy, delicacy
 from wakewise.targets.distance import MeshDistance
 from wakewise.targets.find import find_target
@@ -15,16 +16,21 @@ from wakewise.targets.marks import Marks, read_marks, read_vertex_scores
 from wakewise.targets.mesh import Mesh, load_mesh, read_mesh, write_mesh
 from wakewise.targets.region import Measure, Region, region_measure, sample_region
 from wakewise.targets.sampling import sampling_error_pct
+from wakewise.targets.sway import Sway, Tissue, turned_normals
 from wakewise.targets.target import Target, place_on_bed
+from wakewise.targets.tissues import TISSUES
 
 __all__ = [
+    "TISSUES",
     "Delicacy",
     "Marks",
     "Measure",
     "Mesh",
     "MeshDistance",
     "Region",
+    "Sway",
     "Target",
+    "Tissue",
     "coral",
     "coral_kinds",
     "delicacy",
@@ -37,5 +43,8 @@ __all__ = [
     "region_measure",
     "sample_region",
     "sampling_error_pct",
+    "soft_kinds",
+    "stony_kinds",
+    "turned_normals",
     "write_mesh",
 ]

@@ -1,4 +1,4 @@
-"""Procedural corals: branching, brain and plate.
+"""Procedural corals: branching, brain and plate, which are stony; the soft targets are in `soft.py`.
 
 Each is a closed mesh in a local frame with z up, in metres, 15 cm in its largest dimension above z = 0, and reaches a
 little below z = 0 so that no gap opens where it stands on the bed. The same kind and seed give the same bytes.
@@ -13,46 +13,69 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
-from wakewise.targets.fields import Grid, add_cones, add_dome, add_plates, cut_below, labyrinth, roughen, zero_surface
+from wakewise.targets.fields import (
+    BURIED_M,
+    Grid,
+    add_cones,
+    add_dome,
+    add_plates,
+    cut_below,
+    labyrinth,
+    roughen,
+    zero_surface,
+)
 from wakewise.targets.mesh import Mesh
+from wakewise.targets.soft import anemone, gorgonian, seagrass, soft_coral
 
 LARGEST_DIMENSION_M = 0.15
-BURIED_M = 0.01
-"""How far the foot of a coral reaches below the bed."""
 
 Segment = tuple[Array, Array, float, float]
 
 
 @lru_cache(maxsize=8)
 def coral(kind: str, seed: int = 0) -> Mesh:
-    """Procedural coral of one of three kinds.
+    """Procedural coral or soft target of one of the kinds.
 
     Parameters
     ----------
-    kind : {"branching", "brain", "plate"}
+    kind : str
+        "branching", "brain" or "plate", which are stony, or one of `soft_kinds`.
     seed : int
         Which colony of that kind.
 
     Returns
     -------
     Mesh
-        Closed, one piece, z up, standing through z = 0; kept in memory, so asking again costs nothing.
+        Closed, one piece (seagrass: one a blade), z up, standing through z = 0; kept in memory.
 
     Raises
     ------
     InputError
         If the kind is unknown or the seed negative.
     """
-    if kind not in _KINDS:
-        raise InputError(f"coral '{kind}': unknown, allowed: {', '.join(sorted(_KINDS))}")
+    if kind not in coral_kinds():
+        raise InputError(f"coral '{kind}': unknown, allowed: {', '.join(coral_kinds())}")
     if seed < 0:
         raise InputError(f"coral seed {seed}: must be 0 or greater")
-    return _to_size(zero_surface(_KINDS[kind](np.random.default_rng(seed))))
+    rng = np.random.default_rng(seed)
+    if kind == "seagrass":
+        return _SOFT[kind](rng)  # drawn to size: how a blade bends goes with the fourth power of its length
+    return _to_size(zero_surface(_STONY[kind](rng)) if kind in _STONY else _SOFT[kind](rng))
 
 
 def coral_kinds() -> list[str]:
-    """Kinds of coral that `coral` makes."""
-    return sorted(_KINDS)
+    """Kinds that `coral` makes."""
+    return [*stony_kinds(), *soft_kinds()]
+
+
+def stony_kinds() -> list[str]:
+    """Kinds of stony coral, which no water bends."""
+    return sorted(_STONY)
+
+
+def soft_kinds() -> list[str]:
+    """Kinds that bend in flow; see `wakewise.targets.tissues`."""
+    return sorted(_SOFT)
 
 
 def _to_size(mesh: Mesh) -> Mesh:
@@ -146,4 +169,10 @@ def _plate(rng: np.random.Generator) -> Grid:
     return grid
 
 
-_KINDS: dict[str, Callable[[np.random.Generator], Grid]] = {"branching": _branching, "brain": _brain, "plate": _plate}
+_STONY: dict[str, Callable[[np.random.Generator], Grid]] = {"branching": _branching, "brain": _brain, "plate": _plate}
+_SOFT: dict[str, Callable[[np.random.Generator], Mesh]] = {
+    "anemone": anemone,
+    "gorgonian": gorgonian,
+    "seagrass": seagrass,
+    "soft-coral": soft_coral,
+}

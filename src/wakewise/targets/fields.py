@@ -17,6 +17,8 @@ from wakewise.targets.mesh import Mesh
 
 OUTSIDE_M = 1.0
 """Value of a field far from every solid."""
+BURIED_M = 0.01
+"""How far the foot of a procedural target reaches below the bed."""
 
 
 @dataclass(frozen=True, eq=False)

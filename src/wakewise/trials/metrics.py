@@ -31,6 +31,8 @@ _FIGURES: dict[str, tuple[str, str, Better]] = {
     "completeness_visible_pct": ("%", "the same, over surface seen by at least three photographs", "more"),
     "completeness_1mm_pct": ("%", "share of the true surface with a cloud point within 1 mm", "more"),
     "completeness_2mm_pct": ("%", "share of the true surface with a cloud point within 2 mm", "more"),
+    "rmse_mean_shape_mm": ("mm", "rmse_mm against the mean over the exposures of the shapes in which a target that "
+                           "yields was photographed, instead of its shape at rest in still water", "less"),
     "f_score": ("%", "harmonic mean of precision and recall at 3 mm (Tanks and Temples), 0 to 100", "more"),
     **{key: (*SURFACE_DEFINITIONS[key], better) for key, better in _SURFACE_BETTER.items()},
     "images": ("", "photographs taken", "none"),
@@ -64,6 +66,15 @@ _FIGURES: dict[str, tuple[str, str, Better]] = {
     "exposure_optical_depth": ("", "ray_optical_depth while the shutter is open", "less"),
     "silt_lifted_g": ("g", "what the bed gave up by the end of the flight, settled again or not", "less"),
     "silt_suspended_max_g": ("g", "most silt in the water at any time of the flight", "less"),
+    "sway_rms_mm": ("mm", "rms way of the target's surface from its shape at rest in still water, sliding not counted, "
+                    "while the shutter is open", "less"),
+    "sway_peak_mm": ("mm", "largest way of any place of the surface from there at any time", "less"),
+    "sway_mean_mm": ("mm", "how far the mean of the surface is from its place at rest, mean over the exposures: the "
+                     "steady part of the sway", "less"),
+    "sway_about_mean_mm": ("mm", "rms over the exposures of how far the mean of the surface is from that mean place: "
+                           "the part by which photographs disagree", "less"),
+    "target_stress_peak_Pa": ("Pa", "largest stress in the target's tissue by bending, at any time", "less"),
+    "shifted_mm": ("mm", "how far a target that lies loose has slid by the end of the flight", "less"),
     "disturbance": ("m2/s2", "D as the controller's wake model sees it, over the points that its method watches, mean "
                     "over time; methods that watch other points cannot be compared by it", "none"),
     "disturbance_flown": ("m2/s2", "D of the commanded thrusts at the estimated poses, by the settings' wake model "

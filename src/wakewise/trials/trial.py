@@ -16,7 +16,7 @@ import numpy as np
 import polars as pl
 
 from wakewise.errors import InputError, StageError
-from wakewise.evaluation import Crop, evaluate_surface, flight_figures
+from wakewise.evaluation import SWAY_FIGURES, Crop, evaluate_surface, flight_figures
 from wakewise.extras import need
 from wakewise.files import write_json, write_text
 from wakewise.geometry import matrix_from_quat
@@ -30,13 +30,15 @@ from wakewise.operation import (
     fly_trial,
     photo_name,
     photograph_flight,
+    read_exposures,
     read_scenario,
     write_scenario,
 )
 from wakewise.operation.flying import FLIGHT_JOBS
+from wakewise.operation.photography import moved_m
 from wakewise.processes import alone
 from wakewise.reconstruction import mesh_model, read_cloud, read_lens, reconstruct
-from wakewise.targets import write_mesh
+from wakewise.targets import Mesh, write_mesh
 from wakewise.trials.metrics import Figures, Gathering, comparison
 from wakewise.trials.stages import Ledger, Quiet, Watch, of_the_computer
 from wakewise.trials.yardstick import add_yardsticks
@@ -291,9 +293,29 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
                 camera_centres_W_m=photos.select("true_x_m", "true_y_m", "true_z_m").to_numpy(),
             )
             gathering.add({key: getattr(score, key) for key in (*_SURFACE_FIGURES, "success")})
+            gathering.add({"rmse_mean_shape_mm": _rmse_mean_shape_mm(parts, folder)})
         except StageError as fault:
             failure = str(fault)
+    if parts.yielding is None:
+        gathering.missing((*SWAY_FIGURES, "rmse_mean_shape_mm"), "the target is rigid and held")
+    elif failure is not None:
+        gathering.missing(("rmse_mean_shape_mm",), f"no model: {failure}")
     if failure is not None:
         gathering.add({"success": False})
         gathering.missing((*_SURFACE_FIGURES, *_MODEL_FIGURES), f"no model: {failure}")
     return {"figures": gathering.figures, "reasons": gathering.reasons}
+
+
+def _rmse_mean_shape_mm(parts: Parts, folder: Path) -> float | None:
+    """`rmse_mm` against the mean of the shapes that were photographed; None of a target that does not yield."""
+    if parts.yielding is None:
+        return None
+    exposures = read_exposures(folder / "exposures.npz")
+    moved = np.mean([moved_m(parts, exposure) for exposure in exposures], axis=0)
+    mesh = parts.target.mesh
+    score = evaluate_surface(
+        read_cloud(folder / "dense.ply").points_m,
+        Mesh(mesh.vertices_m + moved, mesh.faces),
+        crop=Crop(bed_z_m=parts.target.bed_z_m),
+    )
+    return score.rmse_mm

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_from_rotvec, quat_multiply
 from wakewise.interfaces import BodyState, World
 from wakewise.operation.instant_water import InstantWorld, Jets, free_jet_field, lattice_jets, paper_jets
@@ -60,11 +61,16 @@ def tank_world(parts: Parts) -> TankWorld:
         start=true_start(parts),
         draw=parts.seeds.tank,
         tilt_rad=parts.start_tilt_rad,
+        yielding=parts.yielding,
     )
 
 
 def _instant(name: str, jets: Callable[[float], Jets], parts: Parts) -> InstantWorld:
     seed = parts.scenario.seed
+    if parts.yielding is not None:
+        raise InputError(
+            f"world: '{name}' holds its target still, target.sway and target.loose move it; in the tank they can"
+        )
     return InstantWorld(
         name=name,
         jets=jets(parts.scenario.tank.density_kg_m3),
