@@ -203,6 +203,7 @@ class TankSettings(Settings):
     waves: WaveSettings = WaveSettings()
     pump: PumpSettings = PumpSettings()
     jets: JetSettings = JetSettings()
+    hull_wake: bool = Field(True, description="whether the hull gives back to the water what its drag takes from it")
     silt: SiltSettings = SiltSettings()
     tether: TetherSettings = TetherSettings()
     sensors: SensorSettings = SensorSettings()

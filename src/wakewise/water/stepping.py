@@ -36,8 +36,10 @@ class Laws(NamedTuple):
 
     Parameters
     ----------
-    drift : ndarray, shape (4,)
-        As in `drift.drift`; its last is the time step in s.
+    drift : ndarray, shape (5,)
+        As in `drift.drift`; the fourth is the time step in s.
+    wake_stream : int
+        Of the hull's wake: one more than the jets' own.
     rest_speed : float
         In m/s.
     gusty : bool
@@ -49,6 +51,7 @@ class Laws(NamedTuple):
     """
 
     drift: Array
+    wake_stream: int
     rest_speed: float
     gusty: bool
     bed_z: float
@@ -220,6 +223,8 @@ def _drift(
         jets.disk[:n],
         jets.flow[:n],
         ambient[:n],
+        jets.start[:n],
+        jets.stream[:n] == laws.wake_stream,
         laws.drift,
         planes.walls,
     )
