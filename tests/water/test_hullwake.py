@@ -50,7 +50,7 @@ def test_a_towed_hull_leaves_its_drag_times_the_time(drag_W_N):
 
 
 def test_a_wake_spreads_and_fades_as_measured():
-    """Behind a towed hull sigma is 1.14 theta (x/theta)^(1/3), the deficit 0.77 U (x/theta)^(-2/3), within 15 %.
+    """Behind a towed hull sigma is 1.14 theta (x/theta)^(1/3), the deficit 0.77 U (x/theta)^(-2/3), within 8 %.
 
     Johansson, George and Gourlay 2003. x is from where a wake of no width would have begun; from 30 theta on.
     """
@@ -63,18 +63,18 @@ def test_a_wake_spreads_and_fades_as_measured():
         at = hull - [0.5 * SIZE_M[0] + behind, 0.0, 0.0]
         sigma = 1.14 * theta * (x / theta) ** (1 / 3)
         near = water.parcels.take(np.abs(water.parcels.position_m[:, 0] - at[0]) < 0.3)
-        assert np.mean(near.sigma_m) == pytest.approx(sigma, rel=0.15)
+        assert np.mean(near.sigma_m) == pytest.approx(sigma, rel=0.08)
         along = water.velocity(at + np.array([[0.0, 0.0, 0.0], [0.0, sigma, 0.0]]))[:, 0]
-        assert along[0] == pytest.approx(0.77 * SPEED_M_S * (x / theta) ** (-2 / 3), rel=0.15)
+        assert along[0] == pytest.approx(0.77 * SPEED_M_S * (x / theta) ** (-2 / 3), rel=0.08)
         assert along[1] / along[0] == pytest.approx(math.exp(-0.5), abs=0.06)
 
 
 def test_a_wake_begins_at_the_lee():
-    """The youngest parcel lies behind the hull's stern, less than one spacing from it, and ahead the water is still."""
+    """The youngest parcel stands for a stretch of way that has just passed the stern, and ahead the water is still."""
     water, hull = _towed(10.0)
     stern = hull[0] - 0.5 * SIZE_M[0]
     youngest = water.parcels.position_m[:, 0].max()
-    assert stern - 0.6 * 0.13 < youngest < stern
+    assert stern - 2 * 0.6 * 0.125 < youngest < stern
     ahead, behind = water.velocity(hull + np.array([[1.0, 0, 0], [-1.0, 0, 0]]))
     assert abs(ahead[0]) < 0.1 * behind[0]
 

@@ -14,7 +14,7 @@ is what an added mass borrows from the water and gives back.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -117,7 +117,7 @@ class HullWake:
         self.waiting_m4_s = self.waiting_m4_s * (1.0 - share)
         self._way, self._time = self._way * (1.0 - share), self._time * (1.0 - share)
         same = np.ones(count)
-        return Parcels.sent(
+        sent = Parcels.sent(
             push.p_WB_m - behind[:, None] * ahead,
             np.tile(each, (count, 1)),
             sigma * same,
@@ -128,3 +128,5 @@ class HullWake:
             np.tile(push.velocity_W_m_s, (count, 1)),
             deficit * same,
         )
+        # None of its water came through a disk: the deficit itself is all that it has of the hull's motion.
+        return replace(sent, share=np.zeros(count))
