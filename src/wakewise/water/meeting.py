@@ -1,7 +1,8 @@
 """Jets that meet head-on: they turn aside and run out in the plane where they met.
 
 By symmetry two equal jets that blow at each other are each a jet that strikes a wall without friction, so what they
-lose on meeting becomes rings of a radial jet (`wakewise.water.bedjets`) on both sides of that plane. Of unequal jets
+lose on meeting becomes rings of a radial jet (`wakewise.water.bedjets`) on both sides of that plane (those that cross
+at 20 to 120 degrees: `wakewise.water.fans`). Of unequal jets
 the weaker one's share turns aside and the rest goes on. The radial jet of two that strike each other spreads about
 three times as fast as one that is led out between walls: P. O. Witze and H. A. Dwyer 1976, J. Fluid Mech. 75, 401, doi
 10.1017/S0022112076000293 (from memory, not looked up again).
@@ -20,11 +21,10 @@ import numpy as np
 from wakewise.arrays import Array, IntArray
 from wakewise.compiled import assign, njit
 from wakewise.water.bedjets import STRIKE_HEIGHT, Layers
+from wakewise.water.fans import LEAST_SPEED_M_S, WIDEST
 from wakewise.water.parcels import CENTRE_SPEED, Jets, kept_only
 from wakewise.water.walljets import SPREADS_FASTER, Planes, start_ring
 
-_OPPOSED = -0.5  # cosine of 120 degrees; jets that cross at less merge
-_LEAST_SPEED_M_S = 0.03  # of a parcel alone at its centre; meetings of weaker ones are let be
 _SAME_PLACE = 1.0  # sheets of the same two jets closer than this many sigma are one
 _SAME_NORMAL = math.cos(math.radians(15))
 _MOST_SHEETS = 8  # that are remembered, so that the rings of one meeting add up
@@ -32,19 +32,20 @@ _MOST_SHEETS = 8  # that are remembered, so that the rings of one meeting add up
 
 @njit(nogil=True)
 def turn_aside(
-    jets: Jets, count: int, planes: Planes, faces: int, layers: Layers, rings: int
+    jets: Jets, count: int, streams: int, planes: Planes, faces: int, layers: Layers, rings: int
 ) -> tuple[int, int, float]:
     """Take from the first `count` parcels what meets head-on, and start its rings behind the first `rings`.
 
-    How many parcels and rings there are then, and the impulse taken in m4/s. The first `faces` planes are those of the
-    room; a meeting for which there is no plane left waits.
+    How many parcels and rings there are then, and the impulse taken in m4/s. Streams below `streams` are the thrusters'
+    own; only those meet. The first `faces` planes are those of the room; a meeting for which there is no plane left
+    waits.
     """
     X, m, sigma = jets.position, jets.impulse, jets.sigma
     strong = np.empty(count, np.int64)
     many = 0
     for i in range(count):
         size = math.sqrt(m[i, 0] ** 2 + m[i, 1] ** 2 + m[i, 2] ** 2)
-        if CENTRE_SPEED * size > _LEAST_SPEED_M_S * sigma[i] ** 3:
+        if jets.stream[i] < streams and CENTRE_SPEED * size > LEAST_SPEED_M_S * sigma[i] ** 3:
             strong[many] = i
             many += 1
     pairs = _meeting_pairs(X, m, sigma, jets.stream, strong[:many])
@@ -161,7 +162,7 @@ def _meeting_pairs(X: Array, m: Array, sigma: Array, stream: IntArray, strong: I
         i = strong[p]
         for q in range(p + 1, n):
             # First what most pairs fail by.
-            if unit[p, 0] * unit[q, 0] + unit[p, 1] * unit[q, 1] + unit[p, 2] * unit[q, 2] > _OPPOSED:
+            if unit[p, 0] * unit[q, 0] + unit[p, 1] * unit[q, 1] + unit[p, 2] * unit[q, 2] > WIDEST:
                 continue
             j = strong[q]
             dx, dy, dz = X[j, 0] - X[i, 0], X[j, 1] - X[i, 1], X[j, 2] - X[i, 2]

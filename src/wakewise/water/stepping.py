@@ -19,6 +19,7 @@ from wakewise.water.blockage import BodyRows, add_body, answer
 from wakewise.water.clusters import clustered, sum_field
 from wakewise.water.drift import drift, due, fade_gusts, send, slugs
 from wakewise.water.faces import mirrored
+from wakewise.water.fans import fan_out
 from wakewise.water.meeting import turn_aside
 from wakewise.water.parcels import MERGE_SPACING, Jets, kept_only, merge_across, merge_rows
 from wakewise.water.space_order import ordered
@@ -148,7 +149,7 @@ def advance(
     Parameters
     ----------
     jets, layers : Jets, Layers
-        With room for what is sent, and for a ring of each parcel.
+        With room for what is sent, for three of each that cross, and for a ring of each of those.
     planes : Planes
     body : BodyRows
     laws : Laws
@@ -178,7 +179,8 @@ def advance(
     )
     if sent[2].shape[0]:
         count = send(jets, count, sent, thrusters.areas, disks, ambient[n + r :], laws.drift, walls, noise[n:])
-    count, rings, met = turn_aside(jets, count, planes, walls.shape[0], layers, rings)
+    count = fan_out(jets, count, laws.wake_stream, tally.steps[0])
+    count, rings, met = turn_aside(jets, count, laws.wake_stream, planes, walls.shape[0], layers, rings)
     tally.gone[2] += met
     for face in range(walls.shape[0]):
         count, rings, struck = _strike(jets, count, planes, face, layers, rings)

@@ -29,6 +29,7 @@ from wakewise.water.blockage import Blockage, BodyRows
 from wakewise.water.closure import PLAIN, PUFF_SPREAD, Spreading, first_sigma_m
 from wakewise.water.drift import EMISSION_SPACING, count_sent
 from wakewise.water.faces import Room
+from wakewise.water.fans import RAYS
 from wakewise.water.hullwake import HullPush, HullWake
 from wakewise.water.induction import SINGLE
 from wakewise.water.instant import Instant
@@ -238,7 +239,7 @@ class Water:
         thrusters = self._thrusters
         sent = count_sent(impulses, dt_s, thrusters.areas, thrusters.spacing, thrusters.waiting_slug)
         known = int(self._tally.rows[0]) + sent
-        self._make_room(known)
+        self._make_room(known * RAYS // 2)
         places = places_of(self._jets, self._layers, self._planes, self._tally.rows, disks[0])
         ambient = self._ambient_velocity(places)
         noise = self._rng.standard_normal((known, 3)) if self._gust_scale > 0.0 else np.zeros((known, 3))
