@@ -77,6 +77,10 @@ def test_the_wake_does_not_feed_on_itself():
     tank = _tank()
     _, hull = _hover(tank, 60.0)
     through, drag = tank._plant.drag()
-    speed = np.array([*(-np.array(CURRENT_M_S)),])
+    speed = np.array(
+        [
+            *(-np.array(CURRENT_M_S)),
+        ]
+    )
     assert through == pytest.approx(speed, abs=2e-3)
     assert hull / 60.0 == pytest.approx(drag, rel=0.05, abs=0.005)

@@ -25,7 +25,7 @@ from wakewise.thrusters import electrical_power_W
 from wakewise.vehicles import Vehicle
 from wakewise.water import AmbientSum
 from wakewise.water.blockage import Blockage
-from wakewise.water.closure import PLAIN, SWIRLING
+from wakewise.water.closure import SWIRLING, Spreading
 from wakewise.water.hullwake import HullPush
 from wakewise.water.induction import impulse_velocity
 from wakewise.water.instant import Instant
@@ -97,8 +97,9 @@ class Tank:
             half_size_m=(length / 2, width / 2),
             turbulence=settings.jets.turbulence,
             max_parcels=MAX_PARCELS,
-            spreading=SWIRLING if settings.jets.swirl else PLAIN,
+            spreading=SWIRLING if settings.jets.swirl else Spreading.of_width(settings.jets.half_width_growth),
             body=Blockage.of(target),
+            wake_life=settings.jets.wake_life,
         )
         silt = settings.silt
         laws = SiltLaws.of(

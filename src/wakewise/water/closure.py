@@ -160,7 +160,9 @@ def travel(
     return path, after
 
 
-def lasting_spread(spread: float, sigma_m: Array, diameter_m: Array, speed_m_s: Array, start_m_s: Array, life: float) -> Array:
+def lasting_spread(
+    spread: float, sigma_m: Array, diameter_m: Array, speed_m_s: Array, start_m_s: Array, life: float
+) -> Array:
     """Growth of sigma with the path, shape (n,), of parcels of a row that may no longer be fed; see the top, *Life*."""
     fed = start_m_s * np.minimum(1.0, CORE_END_D * diameter_m / sigma_m)
     lost = np.maximum(1.0 - speed_m_s / np.where(fed > 0.0, fed, np.inf), 0.0) * (fed > 0.0)

@@ -1,21 +1,23 @@
 """Jets that cross: what of them is opposed turns into a fan across their plane.
 
-Where two jets meet at an angle, what they carry along the bisector of their directions adds up. What they carry against
-each other is stopped by the pressure between them, and that pressure drives water out of the plane that both lie in: by
-symmetry each jet strikes the plane midway between them at a slant, and runs out in it. Of two equal round jets that meet
-at the angle 2 alpha, free of friction, the azimuth phi from the bisector takes the share
+Where two jets meet at an angle, what they carry along the bisector of their directions adds up. What they carry
+against each other is stopped by the pressure between them, and that pressure drives water out of the plane that both lie
+in: by symmetry each jet strikes the plane midway between them at a slant, and runs out in it. Of two equal round jets
+that meet at the angle 2 alpha, free of friction, the azimuth phi from the bisector takes the share
 
     w(phi) = sin^3 alpha / (1 - cos alpha cos phi)^2        (its mean over all azimuths is 1)
 
-(D. Hasson and R. E. Peck 1964, AIChE J. 10, 752, doi 10.1002/aic.690100533, for sheets of colliding liquid jets, as G. I.
-Taylor 1960, Proc. R. Soc. A 259, 1, had measured them; from memory). Mass and momentum ask for it: its mean cosine is
-cos alpha, so what runs out has just the momentum of the two. That is for jets in air; a jet in water goes on to entrain,
-which the parcels' own closure does.
+(D. Hasson and R. E. Peck 1964, AIChE J. 10, 752, doi 10.1002/aic.690100533, for sheets of colliding liquid jets, as
+G. I. Taylor 1960, Proc. R. Soc. A 259, 1, had measured them; both from memory). Mass and momentum agree with it: its
+mean is 1 and its mean cosine cos alpha, so what runs out has just the momentum of the two. That is for jets in air; a
+jet in water goes on to entrain, which the parcels' own closure does.
 
-So two parcels of different thrusters that meet become `RAYS` parcels with equal shares of their impulse, in directions
-that each stand for one part of w; small corrections along the bisector keep momentum exact. Each ray is a row, a jet of
-its own, which spreads, bends, strikes and merges as any other. Equal shares of w are equal areas swept about the focus
-of an ellipse of eccentricity cos alpha: Kepler's equation gives the directions.
+So two parcels of different thrusters that meet become `RAYS` parcels with equal shares of their impulse. They begin as
+far from the place between the two as a wall jet does from where a jet strikes, each in a direction within its own equal
+share of w, another one at every meeting (steps of the golden section cover a share evenly), so that the mean is smooth;
+a correction along the bisector keeps momentum exact. Each ray is a jet of its own, which spreads, bends, strikes and
+merges as any other. Equal shares of w are equal areas swept about the focus of an ellipse of eccentricity cos alpha:
+Kepler's equation gives the directions.
 
 What it does not hold: of unequal jets the weaker one's share fans out, in the plane midway between both directions, and
 the rest of the stronger goes straight on. What has met once does not meet again. The two jets' plane does not sway.
@@ -32,8 +34,8 @@ from wakewise.compiled import njit
 from wakewise.water.bedjets import STRIKE_HEIGHT
 from wakewise.water.parcels import CENTRE_SPEED, Jets, kept_only
 
-RAYS = 6
-"""Into so many parcels two turn: at right angles neighbouring rays lie 14 to 45 degrees apart."""
+RAYS = 4
+"""Into so many parcels two turn."""
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 WIDEST = -0.5  # cosine of 120 degrees: wider ones meet head-on, see `wakewise.water.meeting`
 NARROWEST = math.cos(math.radians(20))  # jets that cross at less merge
@@ -59,10 +61,11 @@ def ray_azimuths(lean: float, phase: float, out: Array) -> None:
 
 
 @njit(nogil=True)
-def fan_out(jets: Jets, count: int, streams: int, steps: int) -> int:
-    """Turn what crosses among the first `count` parcels into rays behind them; how many parcels there are then.
+def fan_out(jets: Jets, count: int, streams: int, met: int) -> tuple[int, int]:
+    """Turn what crosses among the first `count` parcels into rays behind them; parcels and meetings there are then.
 
-    Streams below `streams` are the thrusters' own; only those meet. Without room for its rays a meeting waits.
+    Streams below `streams` are the thrusters' own; only those meet. `met` is how many meetings there were before.
+    Without room for its rays a meeting waits.
     """
     X, m, sigma = jets.position, jets.impulse, jets.sigma
     some, unit = np.empty(count, np.int64), np.empty((count, 3))
@@ -76,7 +79,7 @@ def fan_out(jets: Jets, count: int, streams: int, steps: int) -> int:
             many += 1
     pairs = _crossing_pairs(X, sigma, jets.stream, some[:many], unit)
     if pairs.shape[0] == 0:
-        return count
+        return count, met
     keep, azimuths = np.ones(jets.sigma.shape[0], np.bool_), np.empty((RAYS, 2))
     before = count
     for p in range(pairs.shape[0]):
@@ -88,14 +91,14 @@ def fan_out(jets: Jets, count: int, streams: int, steps: int) -> int:
             continue
         if count + RAYS > jets.sigma.shape[0]:
             break
-        _rays(jets, count, a, b, one, two, share, streams, (GOLDEN * (steps + p)) % 1.0, azimuths)
-        count += RAYS
+        _rays(jets, count, a, b, one, two, share, streams, (GOLDEN * met) % 1.0, azimuths)
+        count, met = count + RAYS, met + 1
         for k in range(3):
             m[a, k] *= 1.0 - share / one
             m[b, k] *= 1.0 - share / two
         # What is left of one that turned wholly is rounding.
         keep[a], keep[b] = one - share > 1e-6 * one, two - share > 1e-6 * two
-    return kept_only(jets, count, keep[:count]) if count > before else count
+    return kept_only(jets, count, keep[:count]) if count > before else count, met
 
 
 @njit(nogil=True)
@@ -141,8 +144,11 @@ def _rays(
         jets.start[n] = 0.5 * (jets.start[a] + jets.start[b]) * math.sqrt(2.0 / RAYS)
         like = a if r % 2 == 0 else b
         for k in range(3):
-            out = azimuths[r, 0] * along[k] + azimuths[r, 1] * across[k]
-            jets.position[n, k] = 0.5 * (jets.position[a, k] + jets.position[b, k]) + STRIKE_HEIGHT * jets.sigma[n] * out
+            out, middle = (
+                azimuths[r, 0] * along[k] + azimuths[r, 1] * across[k],
+                jets.position[a, k] + jets.position[b, k],
+            )
+            jets.position[n, k] = 0.5 * middle + STRIKE_HEIGHT * jets.sigma[n] * out
             jets.impulse[n, k] = each * (out + (lean - mean) * along[k])
             jets.gust[n, k] = jets.gust[like, (k + r // 2) % 3]
             jets.disk[n, k] = 0.5 * (jets.disk[a, k] + jets.disk[b, k])

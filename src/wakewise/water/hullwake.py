@@ -103,9 +103,7 @@ class HullWake:
             return Parcels.none()
         ahead = push.through_W_m_s / speed
         ahead_B = ahead @ push.R_WB
-        sigma, deficit = first_wake(
-            impulse / self._way, self._way / self._time, frontal_area_m2(push.size_m, ahead_B)
-        )
+        sigma, deficit = first_wake(impulse / self._way, self._way / self._time, frontal_area_m2(push.size_m, ahead_B))
         spacing = EMISSION_SPACING * sigma
         count = int(self._way / spacing)
         if count == 0:

@@ -76,9 +76,9 @@ class Thrusters(NamedTuple):
 class Tally(NamedTuple):
     """Counts, changed in place.
 
-    `rows`, shape (2,), is how many parcels and rings there are, `steps`, shape (2,), how many steps there were, and at
-    which of them the body's answer, `held`, shape (s,), was found; `gone`, shape (3,), the impulse retired, struck and
-    met, in m4/s.
+    `rows`, shape (2,), is how many parcels and rings there are, `steps`, shape (3,), how many steps there were, at
+    which of them the body's answer, `held`, shape (s,), was found, and how many crossings; `gone`, shape (3,), the
+    impulse retired, struck and met, in m4/s.
     """
 
     rows: IntArray
@@ -179,7 +179,7 @@ def advance(
     )
     if sent[2].shape[0]:
         count = send(jets, count, sent, thrusters.areas, disks, ambient[n + r :], laws.drift, walls, noise[n:])
-    count = fan_out(jets, count, laws.wake_stream, tally.steps[0])
+    count, tally.steps[2] = fan_out(jets, count, laws.wake_stream, tally.steps[2])
     count, rings, met = turn_aside(jets, count, laws.wake_stream, planes, walls.shape[0], layers, rings)
     tally.gone[2] += met
     for face in range(walls.shape[0]):

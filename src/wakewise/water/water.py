@@ -136,7 +136,7 @@ class Water:
         self._thrusters = Thrusters(areas, spacing, np.zeros(streams), np.zeros(streams))
         self._hull = HullWake(2 * len(areas), density_kg_m3)
         sources = self._body_rows.answers.shape[1]
-        self._tally = Tally(np.zeros(2, np.int64), np.array([0, -1]), np.zeros(sources), np.zeros(3))
+        self._tally = Tally(np.zeros(2, np.int64), np.array([0, -1, 0]), np.zeros(sources), np.zeros(3))
         self._forced_merges = 0
         self._now: Instant | None = None
         self._answer_to_steady: Array | None = None
@@ -239,7 +239,7 @@ class Water:
         thrusters = self._thrusters
         sent = count_sent(impulses, dt_s, thrusters.areas, thrusters.spacing, thrusters.waiting_slug)
         known = int(self._tally.rows[0]) + sent
-        self._make_room(known * RAYS // 2)
+        self._make_room(known * (1 + RAYS // 2))
         places = places_of(self._jets, self._layers, self._planes, self._tally.rows, disks[0])
         ambient = self._ambient_velocity(places)
         noise = self._rng.standard_normal((known, 3)) if self._gust_scale > 0.0 else np.zeros((known, 3))
