@@ -15,7 +15,7 @@ jet in water goes on to entrain, which the parcels' own closure does.
 So two parcels of different thrusters that meet become `RAYS` parcels with equal shares of their impulse. They begin as
 far from the place between the two as a wall jet does from where a jet strikes, each in a direction within its own equal
 share of w, another one at every meeting (steps of the golden section cover a share evenly), so that the mean is smooth;
-a correction along the bisector keeps momentum exact. Each ray is a jet of its own, which spreads, bends, strikes and
+a correction, the same for all, keeps momentum exact. Each ray is a jet of its own, which spreads, bends, strikes and
 merges as any other. Equal shares of w are equal areas swept about the focus of an ellipse of eccentricity cos alpha:
 Kepler's equation gives the directions.
 
@@ -129,9 +129,10 @@ def _rays(
     for k in range(3):
         across[k] = normal[(k + 1) % 3] * along[(k + 2) % 3] - normal[(k + 2) % 3] * along[(k + 1) % 3]
     ray_azimuths(lean, phase, azimuths)
-    mean = 0.0
+    # What the rays' mean lacks of the bisector's share, and has too much across it.
+    more, less = lean, 0.0
     for r in range(RAYS):
-        mean += azimuths[r, 0] / RAYS
+        more, less = more - azimuths[r, 0] / RAYS, less + azimuths[r, 1] / RAYS
     first, second = min(jets.stream[a], jets.stream[b]), max(jets.stream[a], jets.stream[b])
     each = 2.0 * share / RAYS
     for r in range(RAYS):
@@ -149,7 +150,7 @@ def _rays(
                 jets.position[a, k] + jets.position[b, k],
             )
             jets.position[n, k] = 0.5 * middle + STRIKE_HEIGHT * jets.sigma[n] * out
-            jets.impulse[n, k] = each * (out + (lean - mean) * along[k])
+            jets.impulse[n, k] = each * (out + more * along[k] - less * across[k])
             jets.gust[n, k] = jets.gust[like, (k + r // 2) % 3]
             jets.disk[n, k] = 0.5 * (jets.disk[a, k] + jets.disk[b, k])
             jets.flow[n, k] = 0.0
