@@ -17,7 +17,7 @@ from wakewise.arrays import Array, IntArray
 from wakewise.compiled import assign, njit
 
 
-@njit(inline="always")
+@njit(apart=True)
 def coordinates(null: Array, thrusts: Array) -> IntArray:
     """Thrusters, shape (k,), whose rows of `null` are independent, those of least |thrust| first."""
     n, k = null.shape

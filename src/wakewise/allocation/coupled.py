@@ -12,7 +12,7 @@ from wakewise.arrays import Array
 from wakewise.compiled import assign, njit
 
 
-@njit
+@njit(apart=True)
 def _move(
     G: Array, thrusts: Array, direction: Array, lower: Array, upper: Array, previous: Array, weights: Array
 ) -> float:
@@ -36,7 +36,7 @@ def _move(
     return 0.0
 
 
-@njit
+@njit(apart=True)
 def descend(
     G: Array, thrusts: Array, null: Array, lower: Array, upper: Array, previous: Array, weights: Array, sweeps: int
 ) -> float:
@@ -72,7 +72,7 @@ def descend(
     return cost(G, thrusts, previous, weights)
 
 
-@njit(inline="always")
+@njit(apart=True)
 def explore(
     G: Array, thrusts: Array, null: Array, lower: Array, upper: Array, previous: Array, weights: Array, rounds: int
 ) -> float:

@@ -29,7 +29,7 @@ _EVALUATIONS = 2000
 _STEEP = 1e300
 
 
-@njit
+@njit(apart=True)
 def cost(G: Array, thrusts: Array, previous: Array, weights: Array) -> float:
     """f(T) in the units of the weights; `weights` is (w_D, w_u, w_p)."""
     n = thrusts.size
@@ -139,7 +139,7 @@ def _bound(
     return t_best, best
 
 
-@njit
+@njit(apart=True)
 def line_minimum(
     G: Array,
     base: Array,
@@ -281,7 +281,7 @@ def line_minimum(
     return t_best, best, max(gap, TOLERANCE * abs(best))
 
 
-@njit
+@njit(apart=True)
 def coupling(G: Array, lines: Array) -> float:
     """Largest |G_ij| between thrusters of different lines, relative to the largest |G|; `lines` has shape (k, n)."""
     k, n = lines.shape
@@ -301,7 +301,7 @@ def coupling(G: Array, lines: Array) -> float:
     return between / largest if largest > 0.0 else 0.0
 
 
-@njit
+@njit(apart=True)
 def disjoint_search(
     G: Array, start: Array, lines: Array, lower: Array, upper: Array, previous: Array, weights: Array
 ) -> tuple[Array, float]:

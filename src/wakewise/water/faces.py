@@ -113,7 +113,7 @@ class Room:
         return images
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def mirrored(X: Array, m: Array, sigma: Array, walls: Array) -> tuple[Array, Array, Array]:
     """Append images in faces; a dipole m at distance h sends at most 2 m / (4 pi h^3) across a face."""
     n = sigma.shape[0]

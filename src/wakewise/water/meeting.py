@@ -30,7 +30,7 @@ _SAME_NORMAL = math.cos(math.radians(15))
 _MOST_SHEETS = 8  # that are remembered, so that the rings of one meeting add up
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def turn_aside(
     jets: Jets, count: int, planes: Planes, faces: int, layers: Layers, rings: int
 ) -> tuple[int, int, float]:
@@ -78,7 +78,7 @@ def turn_aside(
     return kept_only(jets, count, keep), rings, taken
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def _sheet(
     planes: Planes,
     faces: int,
@@ -142,7 +142,7 @@ def _forget_the_oldest(used: IntArray, faces: int) -> None:
         used[oldest] = 0
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def _meeting_pairs(X: Array, m: Array, sigma: Array, stream: IntArray, strong: IntArray) -> IntArray:
     """Pairs that blow at each other nearly on one line and are as near as a jet is to the wall that it strikes."""
     n = strong.shape[0]
