@@ -41,9 +41,16 @@ def njit(function: Callable[..., Any] | None = None, *, apart: bool = False, **o
 
     Numba copies a kernel's code into each that calls it, and optimises and emits it there again, at each level. One
     that is `apart` is compiled once and called by its name; meant for kernels that are long to compile and long to run.
+
+    Raises
+    ------
+    ValueError
+        If a kernel that is to be apart is no module's own, so that no other process would find it by its name.
     """
 
     def decorate(work: Callable[..., Any]) -> Any:
+        if apart and "<locals>" in work.__qualname__:
+            raise ValueError(f"kernel {work.__qualname__}: only a module's own kernel can stand apart")
         # No kernel is handed to C as a callback, and what that takes is a share of each compilation.
         kernel = numba.njit(**{"error_model": "numpy", "no_cfunc_wrapper": True} | options)(work)
         kernel._cache = KernelCache(work)  # as Dispatcher.enable_caching does it with Numba's own

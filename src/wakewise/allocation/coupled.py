@@ -90,12 +90,16 @@ def explore(
                 continue
             direction = null @ null[i]
             for kick in range(2):
-                goal = 0.0 if kick == 0 else -thrusts[i]
+                goal, size = 0.0 if kick == 0 else -thrusts[i], 0.0
+                for j in range(n):
+                    size += abs(thrusts[j])
                 if abs(thrusts[i]) < 1e-9:
-                    goal = np.mean(np.abs(thrusts)) * (1.0 if kick == 0 else -1.0)
+                    goal = size / n if kick == 0 else -size / n
                 low, high = box_range(thrusts, direction, lower, upper)
                 t = min(max((goal - thrusts[i]) / along, min(low, 0.0)), max(high, 0.0))
-                trial = np.minimum(np.maximum(thrusts + t * direction, lower), upper)
+                trial = np.empty(n)
+                for j in range(n):
+                    trial[j] = min(max(thrusts[j] + t * direction[j], lower[j]), upper[j])
                 found = descend(G, trial, null, lower, upper, previous, weights, 4)
                 if found < value * (1.0 - 1e-9):
                     value = found

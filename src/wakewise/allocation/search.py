@@ -171,8 +171,11 @@ def line_minimum(
         `value` (without the constant terms) exceeds the true minimum of the line by at most `gap`.
     """
     n = base.size
-    moving = np.flatnonzero(np.abs(direction) >= 1e-12)
-    m = moving.size
+    moving, m = np.empty(n, np.int64), 0
+    for i in range(n):
+        if abs(direction[i]) >= 1e-12:
+            moving[m] = i
+            m += 1
     slots = np.empty(m, np.int64)
     a, b, single, root = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
     cross = np.empty((m, m))
@@ -188,7 +191,12 @@ def line_minimum(
             count += 1
     breaks[count] = high
     count += 1
-    breaks[:count].sort()
+    for i in range(2, count):  # in order; a few, so that no sorting of NumPy's need be compiled
+        t, j = breaks[i], i
+        while j > 0 and breaks[j - 1] > t:
+            breaks[j] = breaks[j - 1]
+            j -= 1
+        breaks[j] = t
     square = 0.0
     square_linear = 0.0
     square_constant = 0.0

@@ -117,11 +117,11 @@ def _sheet(
             continue
         along = np.zeros(3)
         along[np.argmin(np.abs(normal))] = 1.0
-        first = np.cross(normal, along)
+        first = _cross(normal, along)
         first /= math.sqrt(first[0] ** 2 + first[1] ** 2 + first[2] ** 2)
         assign(frames[s, 0:3], middle)
         assign(frames[s, 3:6], first)
-        assign(frames[s, 6:9], np.cross(normal, first))
+        assign(frames[s, 6:9], _cross(normal, first))
         assign(frames[s, 9:12], normal)
         frames[s, 12], frames[s, 13] = 0.0, SPREADS_FASTER
         planes.thickness[s], planes.per_height[s], used[s] = sigma, 0.0, newest + 1
@@ -129,6 +129,15 @@ def _sheet(
         _forget_the_oldest(used, faces)
         return s
     return -1
+
+
+@njit(nogil=True)
+def _cross(a: Array, b: Array) -> Array:
+    out = np.empty(3)
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        out[k] = a[i] * b[j] - a[j] * b[i]
+    return out
 
 
 @njit(nogil=True)
