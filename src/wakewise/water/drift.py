@@ -22,7 +22,7 @@ GUST_MEMORY = 1.0  # integral time of the turbulence, in sigma over speed at the
 _HELD_SIGMA, HELD_S = 0.05, 0.2
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def due(flow: Array, held_s: Array, sigma: Array, dt_s: float) -> IntArray:
     """Parcels at which the water must be looked at before a step of dt_s; the times of the others go on."""
     found = np.empty(sigma.shape[0], np.int64)
@@ -37,7 +37,7 @@ def due(flow: Array, held_s: Array, sigma: Array, dt_s: float) -> IntArray:
     return found[:count]
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def drift(
     X: Array,
     sigma: Array,
@@ -108,7 +108,7 @@ def drift(
                 X[i, k] = 2 * walls[f, 1] - X[i, k]
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def slugs(
     impulses_m4_s: Array,
     dt_s: float,
@@ -194,7 +194,7 @@ def count_sent(impulses_m4_s: Array, dt_s: float, areas_m2: Array, spacing_m: Ar
     return many
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def send(
     jets: Jets,
     count: int,

@@ -30,7 +30,7 @@ _SAME_NORMAL = math.cos(math.radians(15))
 _MOST_SHEETS = 8  # that are remembered, so that the rings of one meeting add up
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def turn_aside(
     jets: Jets, count: int, streams: int, planes: Planes, faces: int, layers: Layers, rings: int
 ) -> tuple[int, int, float]:
@@ -79,7 +79,7 @@ def turn_aside(
     return kept_only(jets, count, keep), rings, taken
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def _sheet(
     planes: Planes,
     faces: int,
@@ -118,11 +118,11 @@ def _sheet(
             continue
         along = np.zeros(3)
         along[np.argmin(np.abs(normal))] = 1.0
-        first = np.cross(normal, along)
+        first = _cross(normal, along)
         first /= math.sqrt(first[0] ** 2 + first[1] ** 2 + first[2] ** 2)
         assign(frames[s, 0:3], middle)
         assign(frames[s, 3:6], first)
-        assign(frames[s, 6:9], np.cross(normal, first))
+        assign(frames[s, 6:9], _cross(normal, first))
         assign(frames[s, 9:12], normal)
         frames[s, 12], frames[s, 13] = 0.0, SPREADS_FASTER
         planes.thickness[s], planes.per_height[s], used[s] = sigma, 0.0, newest + 1
@@ -130,6 +130,15 @@ def _sheet(
         _forget_the_oldest(used, faces)
         return s
     return -1
+
+
+@njit(nogil=True)
+def _cross(a: Array, b: Array) -> Array:
+    out = np.empty(3)
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        out[k] = a[i] * b[j] - a[j] * b[i]
+    return out
 
 
 @njit(nogil=True)
@@ -143,7 +152,7 @@ def _forget_the_oldest(used: IntArray, faces: int) -> None:
         used[oldest] = 0
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def _meeting_pairs(X: Array, m: Array, sigma: Array, stream: IntArray, strong: IntArray) -> IntArray:
     """Pairs that blow at each other nearly on one line and are as near as a jet is to the wall that it strikes."""
     n = strong.shape[0]

@@ -200,7 +200,7 @@ def merged_across(parcels: Parcels, spacing: float) -> Parcels:
     return Parcels.of(jets, merge_across(jets, parcels.count, spacing))
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def kept_only(jets: Jets, count: int, keep: np.ndarray) -> int:
     """Close the ranks: of the first `count`, only those that a mask picks stay; how many they are."""
     left = 0
@@ -218,7 +218,7 @@ def kept_only(jets: Jets, count: int, keep: np.ndarray) -> int:
     return left
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def merge_rows(jets: Jets, count: int, spacing: float) -> int:
     """Pairs of successive parcels of one jet closer than `spacing` sigma made one; their impulse is conserved.
 
@@ -232,7 +232,7 @@ def merge_rows(jets: Jets, count: int, spacing: float) -> int:
     return _merge(jets, count, np.arange(count), jets.stream, spacing)
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def merge_across(jets: Jets, count: int, spacing: float) -> int:
     """Pairs of far-travelled parcels of different jets, alike in size and direction and very close, made one.
 
@@ -258,7 +258,7 @@ def merge_across(jets: Jets, count: int, spacing: float) -> int:
     return _merge(jets, count, old[order], labels, spacing)
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def _merge(jets: Jets, count: int, order: IntArray, label: IntArray, spacing: float) -> int:
     """Walk through parcels in an order; each may take up the one before it with the same label."""
     labels = 0

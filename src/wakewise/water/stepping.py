@@ -87,7 +87,7 @@ class Tally(NamedTuple):
     gone: Array
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def flow_at(
     points: Array,
     order: IntArray,
@@ -193,7 +193,7 @@ def advance(
     tally.steps[0] += 1
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def _drift(
     jets: Jets,
     n: int,
@@ -240,7 +240,7 @@ def _drift(
     return kept_only(jets, n, keep) if resting else n
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def _carrying(
     X: Array,
     impulse: Array,
@@ -269,7 +269,7 @@ def _carrying(
     return u
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def _strike(jets: Jets, count: int, planes: Planes, face: int, layers: Layers, rings: int) -> tuple[int, int, float]:
     """Hand parcels that come up to a face over to wall jets; parcels and rings left, and the impulse handed over."""
     axis, at, side = int(planes.walls[face, 0]), planes.walls[face, 1], planes.walls[face, 2]
