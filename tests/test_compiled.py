@@ -30,6 +30,23 @@ def _twice_and_thrice(x):
     return _scaled(x, 2) + _scaled(x, 3)
 
 
+@njit(apart=True)
+def _halved(pair, by):
+    if by > 100:
+        raise ValueError("too many")
+    out = np.empty(pair.count)
+    for i in range(pair.count):
+        out[i] = 0.5 * by * pair.row[i]
+    return out, pair.count
+
+
+@njit
+def _halves(row, by):
+    first, count = _halved(Pair(row, row.size), by)
+    second, _ = _halved(Pair(row, row.size), 4)
+    return first + second, count
+
+
 @njit
 def _copied(source):
     out = np.zeros(source.size + 1)
@@ -68,6 +85,34 @@ def test_a_change_far_below_a_kernel_compiles_it_anew(small_package: Path) -> No
     assert _run(small_package) == ["10.0", "1"]
     (small_package / "constants.py").write_text("STEP = 2.0\n")
     assert _run(small_package) == ["20.0", "0"]
+
+
+def test_a_kernel_apart_is_kept_and_compiled_anew_as_any(small_package: Path) -> None:
+    """Its caller is read from disk with it; where it alone is gone from there it is compiled; a change is heard."""
+    callee = small_package / "callee.py"
+    callee.write_text(callee.read_text().replace("@njit", "@njit(apart=True)"))
+    assert _run(small_package) == ["10.0", "0"]
+    assert _run(small_package) == ["10.0", "1"]
+    for file in (small_package.parent / "kept").rglob("callee*"):
+        file.unlink()
+    assert _run(small_package) == ["10.0", "1"]
+    (small_package / "constants.py").write_text("STEP = 2.0\n")
+    assert _run(small_package) == ["20.0", "0"]
+
+
+def test_a_kernel_apart_is_not_copied_into_its_caller() -> None:
+    """It takes and returns what others do, its errors reach Python, and the caller's code holds but its name."""
+    row = np.arange(3.0)
+    total, count = _halves(row, 2)
+    np.testing.assert_array_equal(total, 3.0 * row)
+    assert count == 3
+    with pytest.raises(ValueError, match="too many"):
+        _halves(row, 101)
+    code = _halves.overloads[_halves.signatures[0]].library.get_llvm_str()
+    assert code.count("test_compiled._halved.") > 0
+    assert not [line for line in code.splitlines() if line.startswith("define") and "_halved" in line]
+    with pytest.raises(ValueError, match="only a module's own"):
+        njit(apart=True)(lambda x: x)
 
 
 def test_imports_are_found_wherever_they_stand() -> None:

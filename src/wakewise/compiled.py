@@ -14,12 +14,14 @@ import os
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache
+from copy import copy
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numba
+from llvmlite.binding import add_symbol, parse_assembly
 from numba.core import caching
 
 PACKAGE = Path(__file__).resolve().parent
@@ -34,18 +36,75 @@ prange = numba.prange
 types: Any = numba.types
 
 
-def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
-    """`numba.njit`, kept on disk, with NumPy's rules for division by zero unless `options` say otherwise."""
+def njit(function: Callable[..., Any] | None = None, *, apart: bool = False, **options: Any) -> Any:
+    """`numba.njit`, kept on disk, with NumPy's rules for division by zero unless `options` say otherwise.
+
+    Numba copies a kernel's code into each that calls it, and optimises and emits it there again, at each level. One
+    that is `apart` is compiled once and called by its name; meant for kernels that are long to compile and long to run.
+
+    Raises
+    ------
+    ValueError
+        If a kernel that is to be apart is no module's own, so that no other process would find it by its name.
+    """
 
     def decorate(work: Callable[..., Any]) -> Any:
+        if apart and "<locals>" in work.__qualname__:
+            raise ValueError(f"kernel {work.__qualname__}: only a module's own kernel can stand apart")
         # No kernel is handed to C as a callback, and what that takes is a share of each compilation.
         kernel = numba.njit(**{"error_model": "numpy", "no_cfunc_wrapper": True} | options)(work)
         kernel._cache = KernelCache(work)  # as Dispatcher.enable_caching does it with Numba's own
         typed = kernel.get_call_template
-        kernel.get_call_template = lambda args, kws: typed(tuple(map(_widened, args)), kws)
+
+        def template(args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
+            answer = typed(tuple(map(_widened, args)), kws)
+            if apart:
+                for kinds in kernel.overloads:
+                    _call_by_name(kernel, kinds)
+            return answer
+
+        kernel.get_call_template = template
         return kernel
 
     return decorate if function is None else decorate(function)
+
+
+_named: dict[str, Any] = {}
+
+
+def _call_by_name(kernel: Any, kinds: tuple[Any, ...]) -> None:
+    """Let kernels that are compiled from now on call this one by a name, which is the same in every process."""
+    module, name = kernel.py_func.__module__, kernel.py_func.__qualname__
+    symbol = f"{module}.{name}.{hashlib.sha256(repr(kinds).encode()).hexdigest()[:16]}"
+    if symbol in _named:
+        return
+    made = _named[symbol] = kernel.overloads[kinds]
+    add_symbol(symbol, made.library.get_pointer_to_function(made.fndesc.llvm_func_name))
+    called = copy(made.fndesc)
+    called.mangled_name = symbol
+    context = made.target_context
+    context.remove_user_function(made.entry_point)
+    context.insert_user_function(made.entry_point, called, [_ByName(partial(_bring, module, name, kinds))])
+
+
+class _ByName:
+    """Linked to a caller in place of a kernel's code: only word of what must be there when the caller is loaded."""
+
+    def __init__(self, bring: Callable[[], None]) -> None:
+        self._reload_init = {bring}
+
+    def _ensure_finalized(self) -> None:
+        pass
+
+    def _get_module_for_linking(self) -> Any:
+        return parse_assembly("")
+
+
+def _bring(module: str, name: str, kinds: tuple[Any, ...]) -> None:
+    """Have a kernel there by its name: read from disk, or compiled where it is gone from there."""
+    kernel = getattr(import_module(module), name)
+    kernel.compile(kinds)
+    _call_by_name(kernel, kinds)
 
 
 def _widened(kind: Any) -> Any:

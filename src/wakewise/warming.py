@@ -6,6 +6,7 @@ what they call in turn is compiled with them. What is not listed is compiled whe
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import queue
@@ -28,6 +29,7 @@ LIST = Path(__file__).with_name("kernels.json")
 JOBS = ("plan", "fly", "photograph", "reconstruct", "more")
 """In the order in which a scan needs them; "more" is what other commands call."""
 
+_SELDOM = 100_000  # new objects, where Python's own figure is 700
 _DONE, _FAILED, _KILLED = "done", "failed", "its process ended"
 
 
@@ -277,6 +279,9 @@ def _compile_what_is_asked(asked: Iterable[str], answers: IO[str]) -> None:
     """Compile the kernels that lines of JSON name, and answer each line with one."""
     from wakewise.compiled import type_from
 
+    # Looking for garbage is a fifth of Numba's time in Python; done seldom, it costs memory that goes with the process.
+    gc.freeze()
+    gc.set_threshold(_SELDOM)
     for line in asked:
         task: dict[str, Any] = json.loads(line)
         module, _, name = task["name"].rpartition(".")

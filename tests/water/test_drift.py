@@ -37,7 +37,7 @@ def _parcels(rng, n=200):
 
 
 def _laws(spreading, dt_s):
-    return np.array([spreading.core_spread, spreading.spread, max(PUFF_SPREAD, spreading.spread), dt_s])
+    return np.array([spreading.core_spread, spreading.spread, max(PUFF_SPREAD, spreading.spread), dt_s, 1.0])
 
 
 def _drifted(parcels, u, ambient, dt_s, spreading, room):
@@ -45,7 +45,8 @@ def _drifted(parcels, u, ambient, dt_s, spreading, room):
     p = parcels.with_room(parcels.count)
     speed = np.empty(parcels.count)
     laws = _laws(spreading, dt_s)
-    drift(p.position, p.sigma, p.share, speed, p.diameter, p.disk, u, ambient, laws, room.walls)
+    wake = np.zeros(parcels.count, bool)
+    drift(p.position, p.sigma, p.share, speed, p.diameter, p.disk, u, ambient, p.start, wake, laws, room.walls)
     return p.position, p.sigma, p.share, speed
 
 

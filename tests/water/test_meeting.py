@@ -27,7 +27,7 @@ def _met(impulses, gap=0.1, sigma=0.05, planes=None, layers=None, rings=0):
     ).with_room(4)
     planes = planes or Planes.of(ROOM)
     layers = layers or Rings(np.zeros((8, 2)), np.ones(8), np.zeros(8), np.zeros((8, 2))).layers()
-    count, rings, taken = turn_aside(jets, 2, planes, len(ROOM.faces), layers, rings)
+    count, rings, taken = turn_aside(jets, 2, 4, planes, len(ROOM.faces), layers, rings)
     return Parcels.of(jets, count), layers, rings, taken, planes
 
 

@@ -17,7 +17,7 @@ from wakewise.arrays import Array, IntArray
 from wakewise.compiled import assign, njit
 
 
-@njit(inline="always")
+@njit(apart=True)
 def coordinates(null: Array, thrusts: Array) -> IntArray:
     """Thrusters, shape (k,), whose rows of `null` are independent, those of least |thrust| first."""
     n, k = null.shape
@@ -127,7 +127,9 @@ def box_search(
                         T[r, i] += along[i, c] * (highs[box, c] if (r >> c) & 1 else lows[box, c])
             bound, found, corner = examine(G, T, along, widths, lower, upper, previous, weights, trial, value)
             if found < value * (1.0 - 1e-12):
-                descent = np.minimum(np.maximum(trial, lower), upper)
+                descent = np.empty(n)
+                for i in range(n):
+                    descent[i] = min(max(trial[i], lower[i]), upper[i])
                 found = descend(G, descent, null, lower, upper, previous, weights, 4)
                 if found < value:
                     best, value = descent, found
@@ -156,7 +158,8 @@ def box_search(
         if low < 0.0 < high:
             level = 0.0
         for half in range(2):
-            lows[made], highs[made] = lows[box], highs[box]
+            assign(lows[made], lows[box])
+            assign(highs[made], highs[box])
             if half == 0:
                 highs[made, side] = level
             else:

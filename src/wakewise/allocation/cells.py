@@ -21,7 +21,7 @@ CLOSED = 1e-5
 _ROUNDING_N = 1e-9
 
 
-@njit
+@njit(apart=True)
 def _terms(
     G: Array,
     signs: Array,
@@ -63,7 +63,7 @@ def _terms(
             cross[i, j] = worst
 
 
-@njit(inline="always")
+@njit(apart=True)
 def _tangent(
     cross: Array, single: Array, linear: Array, square: float, at: Array, signs: Array, slope: Array, size_slope: Array
 ) -> float:
@@ -109,7 +109,7 @@ def _least_corner(
     return least, lowest
 
 
-@njit(inline="always")
+@njit(apart=True)
 def _gather(cross: Array, signs: Array, root: Array, roots: Array, count: int, single: Array, concave: Array) -> bool:
     """Join what hangs on the root of a thrust that comes close to zero into one term; False if nothing does.
 
@@ -144,7 +144,7 @@ def _gather(cross: Array, signs: Array, root: Array, roots: Array, count: int, s
     return True
 
 
-@njit(inline="always")
+@njit(apart=True)
 def _balance(
     concave: Array, linear: Array, square: float, along: Array, widths: Array, centre: Array, at: Array
 ) -> None:
@@ -175,7 +175,7 @@ def _balance(
             at[i] += along[i, c] * moved[c]
 
 
-@njit(inline="always")
+@njit(apart=True)
 def examine(
     G: Array,
     T: Array,

@@ -12,7 +12,7 @@ from wakewise.arrays import Array
 from wakewise.compiled import assign, njit
 
 
-@njit
+@njit(apart=True)
 def _move(
     G: Array, thrusts: Array, direction: Array, lower: Array, upper: Array, previous: Array, weights: Array
 ) -> float:
@@ -36,7 +36,7 @@ def _move(
     return 0.0
 
 
-@njit
+@njit(apart=True)
 def descend(
     G: Array, thrusts: Array, null: Array, lower: Array, upper: Array, previous: Array, weights: Array, sweeps: int
 ) -> float:
@@ -72,7 +72,7 @@ def descend(
     return cost(G, thrusts, previous, weights)
 
 
-@njit(inline="always")
+@njit(apart=True)
 def explore(
     G: Array, thrusts: Array, null: Array, lower: Array, upper: Array, previous: Array, weights: Array, rounds: int
 ) -> float:
@@ -90,12 +90,16 @@ def explore(
                 continue
             direction = null @ null[i]
             for kick in range(2):
-                goal = 0.0 if kick == 0 else -thrusts[i]
+                goal, size = 0.0 if kick == 0 else -thrusts[i], 0.0
+                for j in range(n):
+                    size += abs(thrusts[j])
                 if abs(thrusts[i]) < 1e-9:
-                    goal = np.mean(np.abs(thrusts)) * (1.0 if kick == 0 else -1.0)
+                    goal = size / n if kick == 0 else -size / n
                 low, high = box_range(thrusts, direction, lower, upper)
                 t = min(max((goal - thrusts[i]) / along, min(low, 0.0)), max(high, 0.0))
-                trial = np.minimum(np.maximum(thrusts + t * direction, lower), upper)
+                trial = np.empty(n)
+                for j in range(n):
+                    trial[j] = min(max(thrusts[j] + t * direction[j], lower[j]), upper[j])
                 found = descend(G, trial, null, lower, upper, previous, weights, 4)
                 if found < value * (1.0 - 1e-9):
                     value = found

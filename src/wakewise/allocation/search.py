@@ -29,7 +29,7 @@ _EVALUATIONS = 2000
 _STEEP = 1e300
 
 
-@njit
+@njit(apart=True)
 def cost(G: Array, thrusts: Array, previous: Array, weights: Array) -> float:
     """f(T) in the units of the weights; `weights` is (w_D, w_u, w_p)."""
     n = thrusts.size
@@ -139,7 +139,7 @@ def _bound(
     return t_best, best
 
 
-@njit
+@njit(apart=True)
 def line_minimum(
     G: Array,
     base: Array,
@@ -171,8 +171,11 @@ def line_minimum(
         `value` (without the constant terms) exceeds the true minimum of the line by at most `gap`.
     """
     n = base.size
-    moving = np.flatnonzero(np.abs(direction) >= 1e-12)
-    m = moving.size
+    moving, m = np.empty(n, np.int64), 0
+    for i in range(n):
+        if abs(direction[i]) >= 1e-12:
+            moving[m] = i
+            m += 1
     slots = np.empty(m, np.int64)
     a, b, single, root = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
     cross = np.empty((m, m))
@@ -188,7 +191,12 @@ def line_minimum(
             count += 1
     breaks[count] = high
     count += 1
-    breaks[:count].sort()
+    for i in range(2, count):  # in order; a few, so that no sorting of NumPy's need be compiled
+        t, j = breaks[i], i
+        while j > 0 and breaks[j - 1] > t:
+            breaks[j] = breaks[j - 1]
+            j -= 1
+        breaks[j] = t
     square = 0.0
     square_linear = 0.0
     square_constant = 0.0
@@ -281,7 +289,7 @@ def line_minimum(
     return t_best, best, max(gap, TOLERANCE * abs(best))
 
 
-@njit
+@njit(apart=True)
 def coupling(G: Array, lines: Array) -> float:
     """Largest |G_ij| between thrusters of different lines, relative to the largest |G|; `lines` has shape (k, n)."""
     k, n = lines.shape
@@ -301,7 +309,7 @@ def coupling(G: Array, lines: Array) -> float:
     return between / largest if largest > 0.0 else 0.0
 
 
-@njit
+@njit(apart=True)
 def disjoint_search(
     G: Array, start: Array, lines: Array, lower: Array, upper: Array, previous: Array, weights: Array
 ) -> tuple[Array, float]:

@@ -56,7 +56,7 @@ def turn_between(q: Array, other: Array) -> Array:
     return np.array([factor * x, factor * y, factor * z])
 
 
-@njit
+@njit(apart=True)
 def believed(packed: Array, mean: Array) -> Array:
     """The vehicle's packed numbers with the drag and the inertia that the mean now believes in, shape (20, 6)."""
     own = packed.copy()
@@ -72,7 +72,7 @@ def believed(packed: Array, mean: Array) -> Array:
     return own
 
 
-@njit
+@njit(apart=True)
 def pushed(own: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array) -> Array:
     """Wrench in B of thrusts, with the gains believed in, and of what the model does not explain, shape (6,)."""
     wrench = at_rest(own, mean, rest_q)
@@ -116,7 +116,7 @@ def _inputs(own: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q
     return inputs
 
 
-@njit(inline="always")
+@njit(apart=True)
 def _effects(own: Array, mean: Array, inputs: Array) -> Array:
     """Wrench, shape (6, 12), by the relative change of drag and of inertia in each degree of freedom."""
     rate = np.empty(13)
@@ -149,7 +149,7 @@ def _effects(own: Array, mean: Array, inputs: Array) -> Array:
     return effect
 
 
-@njit(inline="always")
+@njit(apart=True)
 def _add_current(F: Array, A: Array, mean: Array, dt_s: float) -> None:
     """Fill F's columns of the current: it acts as a velocity the other way, and turns in B."""
     q, w = mean[3:7], mean[10:13]

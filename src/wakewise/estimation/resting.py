@@ -37,7 +37,7 @@ def _past_at_rest(mean: Array, rest_q: Array) -> tuple[float, float, float, floa
     return -x, -y, -z, 0.0, 0.0, 0.0
 
 
-@njit
+@njit(apart=True)
 def at_rest(own: Array, mean: Array, rest_q: Array) -> Array:
     """Drag and Munk moment of the current on the vehicle at rest, as the equations of motion subtract them, shape (6,).
 
@@ -51,7 +51,7 @@ def at_rest(own: Array, mean: Array, rest_q: Array) -> Array:
     return wrench
 
 
-@njit
+@njit(apart=True)
 def rest_effects(own: Array, mean: Array, rest_q: Array) -> Array:
     """By what `at_rest`, with its force in B, changes with current (3), drag (6) and inertia (6), shape (6, 15)."""
     past, q = _past_at_rest(mean, rest_q), mean[3:7]

@@ -36,7 +36,7 @@ def barrier_value(h: float, reach: float, least: float) -> tuple[float, float, f
     return value, slope, curvature
 
 
-@njit
+@njit(apart=True)
 def plane_gap(p: Array, R: Array, half: Array, plane: Array, slope: Array) -> float:
     """Distance of the box's nearest corner to a plane (less up to 5 % of its half size); `slope`, (6,), by position
     in W and rotation vector in B.
@@ -59,7 +59,7 @@ def plane_gap(p: Array, R: Array, half: Array, plane: Array, slope: Array) -> fl
     return gap
 
 
-@njit
+@njit(apart=True)
 def sphere_gap(p: Array, R: Array, half: Array, sphere: Array, slope: Array) -> float:
     """Distance of the box to a sphere, negative when they meet; `slope` as in `plane_gap`."""
     d0, d1, d2 = sphere[0] - p[0], sphere[1] - p[1], sphere[2] - p[2]
@@ -90,7 +90,7 @@ def sphere_gap(p: Array, R: Array, half: Array, sphere: Array, slope: Array) -> 
     return distance - sphere[3]
 
 
-@njit(inline="always")
+@njit(apart=True)
 def add_barrier(  # type: ignore[no-untyped-def]
     p, R, half, planes, spheres, reach, least, weight, gradient, hessian
 ):
@@ -116,7 +116,7 @@ def add_barrier(  # type: ignore[no-untyped-def]
     return total, closest
 
 
-@njit(inline="always")
+@njit(apart=True)
 def least_gap(p: Array, R: Array, half: Array, planes: Array, spheres: Array) -> float:
     """Least clearance to planes and spheres; infinite where there are none."""
     closest, slope = np.inf, np.empty(6)

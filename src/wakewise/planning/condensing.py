@@ -45,7 +45,7 @@ def condensed_room(stages: int, thrusters: int) -> Condensed:
     )
 
 
-@njit(fastmath=FAST)
+@njit(apart=True, fastmath=FAST)
 def _mix6(out, c0, c1, c2, c3, c4, c5, X, first, count):  # type: ignore[no-untyped-def]
     """Add six multiples of rows of X, from row `first` on, to `out`."""
     a, b, c = X[first], X[first + 1], X[first + 2]
@@ -54,7 +54,7 @@ def _mix6(out, c0, c1, c2, c3, c4, c5, X, first, count):  # type: ignore[no-unty
         out[j] += c0 * a[j] + c1 * b[j] + c2 * c[j] + c3 * d[j] + c4 * e[j] + c5 * f[j]
 
 
-@njit(fastmath=FAST)
+@njit(apart=True, fastmath=FAST)
 def _mix3(out, c0, c1, c2, X, first, count):  # type: ignore[no-untyped-def]
     a, b, c = X[first], X[first + 1], X[first + 2]
     for j in range(count):
@@ -139,7 +139,7 @@ def condense(table, work, room):  # type: ignore[no-untyped-def]
     motion_gradient(table, work, room.g)
 
 
-@njit
+@njit(apart=True)
 def motion_gradient(table, work, g):  # type: ignore[no-untyped-def]
     """Exact gradient by the commands, backwards through motion and lag."""
     N, n = work.T.shape

@@ -117,7 +117,7 @@ def rotation(state, R):  # type: ignore[no-untyped-def]
     R[2, 0], R[2, 1], R[2, 2] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
 
 
-@njit(inline="always")
+@njit(apart=True)
 def attitude_cost(state, wished, weight, tolerance, g, H):  # type: ignore[no-untyped-def]
     """Add weight max(0, |e| - tolerance)^2, e = 2 vec(q_ref^-1 q), to gradient g and Gauss-Newton H by the turn."""
     w, x, y, z = state[3], state[4], state[5], state[6]

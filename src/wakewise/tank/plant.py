@@ -234,6 +234,13 @@ class VehiclePlant:
         self._hold()
         self._time += dt_s
 
+    def drag(self) -> tuple[Array, Array]:
+        """Velocity through the ambient water in m/s and the drag on the water in N, both shape (3,), in the world."""
+        body, nu = self._body, self._state[7:].copy()
+        nu[:3] -= self._water_W @ self._R
+        force_B = body.linear_damping[:3] @ nu + body.quadratic_damping[:3] * np.abs(nu[:3]) * nu[:3]
+        return self._R @ nu[:3], self._R @ force_B
+
     def disks(self) -> tuple[Array, Array]:
         """Where the disks are and which way positive thrust pushes, shapes (n, 3), in the world."""
         turn = self._R.T

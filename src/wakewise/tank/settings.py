@@ -90,12 +90,30 @@ class JetSettings(Settings):
     """What the thrusters' jets are like.
 
     A turbulence of 0.25 is that of round jets on the axis (0.24 to 0.28; Hussein, Capp and George 1994, doi
-    10.1017/S002211209400323X).
+    10.1017/S002211209400323X). A half width grows by 0.086 (Wygnanski and Fiedler 1969) to 0.096 of the distance
+    without swirl, 0.094 in Hussein's, and by up to 0.177 to 0.18 behind a propeller (Fuehrer and Roemisch 1977, Blaauw
+    and van de Kaa 1978): where a thruster with its duct lies between them is not known, so a world may draw it. What a
+    jet leaves in the water when it stops lives 1.2 (its speed's integral) to 1.7 times (its energy) as long in the
+    lattice.
     """
 
     turbulence: float = Field(0.25, ge=0.0, le=0.5, description="fluctuation on a jet's axis over its mean speed")
-    swirl: bool = Field(False, description="jets twice as wide, as a propeller's swirl makes them")
+    half_width_growth: float = Field(
+        0.094, ge=0.086, le=0.18, description="growth of a jet's half width per distance; 0.094 is a round jet's"
+    )
+    swirl: bool = Field(False, description="jets twice as wide, as a propeller's swirl makes them: a growth of 0.177")
+    wake_life: float = Field(
+        1.0, ge=1.0, le=1.7, description="how much longer what a jet leaves lives, once it is no longer fed"
+    )
     inflow_loss: bool = Field(False, description="thrust falls where water already runs through the disk")
+
+    @model_validator(mode="after")
+    def _one_width(self) -> JetSettings:
+        if self.swirl and self.half_width_growth != JetSettings.model_fields["half_width_growth"].default:
+            raise ValueError(
+                f"half_width_growth: {self.half_width_growth:g} and swirl both say how wide jets are, give one of them"
+            )
+        return self
 
 
 class SiltSettings(Settings):
@@ -279,6 +297,7 @@ class TankSettings(Settings):
     waves: WaveSettings = WaveSettings()
     pump: PumpSettings = PumpSettings()
     jets: JetSettings = JetSettings()
+    hull_wake: bool = Field(True, description="whether the hull gives back to the water what its drag takes from it")
     silt: SiltSettings = SiltSettings()
     tether: TetherSettings = TetherSettings()
     sensors: SensorSettings = SensorSettings()

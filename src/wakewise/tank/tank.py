@@ -31,7 +31,8 @@ from wakewise.thrusters import electrical_power_W
 from wakewise.vehicles import Vehicle
 from wakewise.water import AiryWave, AmbientSum
 from wakewise.water.blockage import Blockage
-from wakewise.water.closure import PLAIN, SWIRLING
+from wakewise.water.closure import SWIRLING, Spreading
+from wakewise.water.hullwake import HullPush
 from wakewise.water.induction import impulse_velocity
 from wakewise.water.instant import Instant
 from wakewise.water.water import Water
@@ -114,8 +115,9 @@ class Tank:
             half_size_m=(length / 2, width / 2),
             turbulence=settings.jets.turbulence,
             max_parcels=MAX_PARCELS,
-            spreading=SWIRLING if settings.jets.swirl else PLAIN,
+            spreading=SWIRLING if settings.jets.swirl else Spreading.of_width(settings.jets.half_width_growth),
             body=Blockage.of(target),
+            wake_life=settings.jets.wake_life,
         )
         silt = settings.silt
         laws = SiltLaws.of(
@@ -150,6 +152,7 @@ class Tank:
         self._silt_every = max(1, math.floor(_SILT_STEP_S / settings.flow_step_s + 1e-9))
         self._silt_middle = -(-self._silt_every // 2) % self._silt_every
         self._disks_before_m = self._plant.disks()[0]
+        self._drag_before_N = self._plant.drag()[1]
         # The water at the disks is looked at once for each of its own steps.
         self._inflow = self.ambient.velocity(self._disks_before_m, 0.0) if settings.jets.inflow_loss else None
         self._muddy = self._silt.total_kg > 0.0
@@ -316,12 +319,13 @@ class Tank:
         origins, axes = self._plant.disks()
         dt_s, before, impulse_N_s = self.settings.flow_step_s, self._disks_before_m, self._plant.take_impulse_N_s()
         self._disks_before_m = origins
+        hull = self._hull_push(dt_s) if self.settings.hull_wake else None
         self._flow_steps += 1
         self._measured = None
         silt_too = self._muddy and self._flow_steps % self._silt_every == self._silt_middle
 
         def move() -> None:
-            self._water.step(dt_s, before, origins, axes, impulse_N_s)
+            self._water.step(dt_s, before, origins, axes, impulse_N_s, hull)
             if self._swaying is not None:
                 self._swaying.step(self._water.now, dt_s)
             if silt_too:
@@ -333,6 +337,20 @@ class Tank:
             self._inflow = self._inflow_W_m_s()
         if self._muddy and self._flow_steps % round(_TURBIDITY_EVERY_S / dt_s) == 0:
             self._turbidity_per_m = self._probes.turbidity_per_m(self.silt.laws, self._silt_grid())
+
+    def _hull_push(self, dt_s: float) -> HullPush:
+        """What the hull's drag did to the water since the last step of the water: the mean of its ends."""
+        plant, before_N = self._plant, self._drag_before_N
+        through, self._drag_before_N = plant.drag()
+        state = plant.state
+        return HullPush(
+            p_WB_m=state.X_WB.p_m,
+            R_WB=state.X_WB.R,
+            size_m=np.array(plant.vehicle.size_m),
+            velocity_W_m_s=state.X_WB.R @ state.nu_B[:3],
+            through_W_m_s=through,
+            impulse_W_N_s=0.5 * dt_s * (before_N + self._drag_before_N),
+        )
 
     def _move_silt(self, now: Instant) -> None:
         """Move the silt by its whole step with the water of the step's middle, which makes the step of second order."""

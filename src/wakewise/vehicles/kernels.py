@@ -205,7 +205,7 @@ def _add_skew(N: Array, row: int, column: int, scale: float, a: float, b: float,
     N[row + 2, column + 1] += scale * a
 
 
-@njit
+@njit(apart=True)
 def rate_jacobian_kernel(packed: Array, state: Array, inputs: Array, F: Array, W: Array) -> None:
     """Write d rate / d (quaternion, twist) to F, shape (13, 12), and d wrench / d (...) to W, shape (6, 12).
 

@@ -16,7 +16,7 @@ from wakewise.vehicles.kernels import INVERSE, rate_jacobian_kernel, rate_kernel
 COLUMNS = 16
 
 
-@njit
+@njit(apart=True)
 def rk4_kernel(packed: Array, state: Array, inputs: Array, dt_s: float) -> None:
     """Advance `state`, shape (13,), in place by one classical Runge-Kutta step."""
     rk4_stages(packed, state, inputs, dt_s, np.empty((5, 13)))
@@ -45,7 +45,7 @@ def normalise(state: Array) -> float:
     return length
 
 
-@njit
+@njit(apart=True)
 def rk4_jacobian_kernel(packed: Array, state: Array, inputs: Array, dt_s: float, A: Array, B: Array) -> None:
     """Advance `state` as `rk4_kernel` does; write the derivatives by state, A (12, 12), and by wrench, B (12, 6)."""
     k = np.empty((5, 13))
@@ -83,7 +83,7 @@ def rk4_jacobian_kernel(packed: Array, state: Array, inputs: Array, dt_s: float,
     _to_error_state(state, total, normalise(state), K[1], A, B)
 
 
-@njit
+@njit(apart=True)
 def _propagate(packed: Array, F: Array, X: Array, K: Array) -> None:
     # Ten products written out: the compiler then works on neighbouring columns together, in a fixed order of sums.
     for i in range(13):

@@ -119,7 +119,7 @@ def wall_velocity(points, origins, directions, areas, floor):  # type: ignore[no
     return velocity
 
 
-@njit(inline="always")
+@njit(apart=True)
 def add_wall(block, count, p, origin, dx, dy, dz, area, floor, V, dV):  # type: ignore[no-untyped-def]
     """Add sqrt(w) u of the wall jet of a jet along (dx, dy, dz) to `V`, (3, BLOCK).
 
@@ -165,7 +165,7 @@ def add_wall(block, count, p, origin, dx, dy, dz, area, floor, V, dV):  # type: 
             dV[r, 1, j] += factor * (grown * y + y_moved)
 
 
-@njit(fastmath=FAST)
+@njit(apart=True, fastmath=FAST)
 def fill_velocities(  # type: ignore[no-untyped-def]
     block, count, p, origins, axes, areas, own, kind, numbers, floor, scratch, hits, rows, column, slope, V, dV
 ):

@@ -47,7 +47,7 @@ def floor_gram_sum(points, weights, p, q, positions_B, axes_B, areas, kind, para
     return G, dG, check
 
 
-@njit(inline="always", fastmath=FAST)
+@njit(apart=True, fastmath=FAST)
 def floor_stage_sum(  # type: ignore[no-untyped-def]
     points, weights, p, q, positions_B, axes_B, areas, kind, parameters, floor, thrusts, smooth, coherent, hessian
 ):
@@ -94,7 +94,7 @@ def floor_stage_sum(  # type: ignore[no-untyped-def]
     return D, gradient, H, check
 
 
-@njit(fastmath=FAST)
+@njit(apart=True, fastmath=FAST)
 def _add_products(J, m, count, gradient, H, hessian):  # type: ignore[no-untyped-def]
     """Add 2 J'r to the gradient and 2 J'J to the lower triangle of H, r being the last row of J; returns r'r."""
     square = 0.0

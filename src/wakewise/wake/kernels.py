@@ -80,7 +80,7 @@ def jet_parameters(
     )
 
 
-@njit
+@njit(apart=True)
 def own_constants(kind, parameters, areas):  # type: ignore[no-untyped-def]
     """What each disk adds, shape (m, 6): three constants of the kernel and three of its reach.
 

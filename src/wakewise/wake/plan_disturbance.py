@@ -115,7 +115,7 @@ def _any_jet(q, roots, count, tx, ty, tz, ax, ay, az, own, kind, numbers, f_row,
             g[2, j] = 0.0
 
 
-@njit(fastmath=FAST)
+@njit(apart=True, fastmath=FAST)
 def stage_disturbance(table, scratch, p, quat, R, thrusts, slopes, gradient, H):  # type: ignore[no-untyped-def]
     """D; with `slopes` also its gradient, (6 + n,), and 2 J'J, (6 + n, 6 + n), both overwritten.
 
@@ -147,7 +147,7 @@ def stage_disturbance(table, scratch, p, quat, R, thrusts, slopes, gradient, H):
     return _free_jets(table, scratch, p, R, thrusts, slopes, gradient, H)
 
 
-@njit(inline="always", fastmath=FAST)
+@njit(apart=True, fastmath=FAST)
 def _free_jets(table, scratch, p, R, thrusts, slopes, gradient, H):  # type: ignore[no-untyped-def]
     q, sums, S, jets, pose, active = scratch
     count, n = q.shape[1], thrusts.shape[0]
@@ -249,7 +249,7 @@ def _pose_rows(count, q, gx, gy, gz, out, x):  # type: ignore[no-untyped-def]
         out[5, x, j] = a * qy - b * qx
 
 
-@njit(inline="always", fastmath=FAST)
+@njit(apart=True, fastmath=FAST)
 def _products(axes, active, active_count, count, q, sums, S, jets, pose, gradient, H):  # type: ignore[no-untyped-def]
     for x in range(3):
         used = False
@@ -308,7 +308,7 @@ def _add_six(row, s0, s1, s2, s3, s4, s5, factor):  # type: ignore[no-untyped-de
     row[5] += factor * s5
 
 
-@njit(inline="always", fastmath=FAST)
+@njit(apart=True, fastmath=FAST)
 def _alone(  # type: ignore[no-untyped-def]
     i, count, q, f_row, g, ahead, ahead_slope, astern, astern_slope, slopes, gradient, H
 ):
@@ -346,7 +346,7 @@ def _alone(  # type: ignore[no-untyped-def]
     return D
 
 
-@njit(inline="always")
+@njit(apart=True)
 def _to_world(R, gradient, H):  # type: ignore[no-untyped-def]
     """Fill the upper triangle from the lower and take rows and columns 0 to 2 from B to W."""
     size = H.shape[0]

@@ -35,7 +35,7 @@ def smooth_root(thrust, smooth):  # type: ignore[no-untyped-def]
     return root, (above / length) / quarter - 0.5 * root * thrust / square
 
 
-@njit
+@njit(apart=True)
 def thrust_roots(thrusts, smooth):  # type: ignore[no-untyped-def]
     """Roots s of the 2 m split thrusts, and the derivative of each by its own signed thrust."""
     m = thrusts.shape[0]
@@ -124,7 +124,7 @@ def stage_sum(  # type: ignore[no-untyped-def]
     return D, gradient, H, check
 
 
-@njit
+@njit(apart=True)
 def turn_gradient(R, gradient):  # type: ignore[no-untyped-def]
     """Take elements 3 to 5 from W to B axes."""
     a, b, c = gradient[3], gradient[4], gradient[5]
@@ -132,7 +132,7 @@ def turn_gradient(R, gradient):  # type: ignore[no-untyped-def]
         gradient[3 + r] = R[0, r] * a + R[1, r] * b + R[2, r] * c
 
 
-@njit
+@njit(apart=True)
 def turn_hessian(R, H):  # type: ignore[no-untyped-def]
     """Fill the upper triangle of H from the lower, and take rows and columns 3 to 5 from W to B axes."""
     size = H.shape[0]

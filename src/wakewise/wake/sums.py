@@ -21,7 +21,7 @@ PERPENDICULAR = 1e-14
 """Cosine under which two jets count as perpendicular: rounding of unit vectors leaves up to some 1e-16."""
 
 
-@njit(fastmath=FAST)
+@njit(apart=True, fastmath=FAST)
 def load_block(points, weights, start, count, block):  # type: ignore[no-untyped-def]
     """Points x, y, z and roots of weights into rows 0 to 3 of `block`; returns NaN if any of them is not finite."""
     check = 0.0
@@ -35,7 +35,7 @@ def load_block(points, weights, start, count, block):  # type: ignore[no-untyped
     return check
 
 
-@njit
+@njit(apart=True)
 def check_jets(p, q, origins, axes, areas):  # type: ignore[no-untyped-def]
     """0 for a sound pose and sound thrusters; NaN if anything is not finite or an area is not more than 0."""
     check = 0.0
@@ -59,7 +59,7 @@ def dot(a, b, count):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit
+@njit(apart=True)
 def fill_rows(block, count, origins, axes, own, kind, numbers, slopes, scratch, hits, rows, column):  # type: ignore[no-untyped-def]
     """Rows of sqrt(w) times f, and if `slopes` alpha and beta, of the jets that reach one of the block's points.
 
@@ -154,7 +154,7 @@ def gram_sum(points, weights, origins, axes, areas, kind, parameters):  # type: 
     return G, check
 
 
-@njit
+@njit(apart=True)
 def place(p, q, positions_B, axes_B):  # type: ignore[no-untyped-def]
     """(R_WB, origins in W, axes in W) of thrusters on a body at p with unit quaternion q = (w, x, y, z)."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -173,7 +173,7 @@ def place(p, q, positions_B, axes_B):  # type: ignore[no-untyped-def]
     return R, origins, axes
 
 
-@njit(fastmath=FAST)
+@njit(apart=True, fastmath=FAST)
 def pose_slopes(block, count, p, origin, axis, sign, alpha, beta, slope):  # type: ignore[no-untyped-def]
     """Rows 0 to 5 of `slope`: derivatives of one jet's sqrt(w) f by the vehicle's position and by a turn, both in W.
 

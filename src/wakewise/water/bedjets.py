@@ -245,7 +245,7 @@ def coarsened(rings: Rings) -> Rings:
     return Rings.of(layers, merge_layers(layers, rings.count), 0)
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def kept_rings(layers: Layers, count: int, keep: np.ndarray) -> int:
     """Close the ranks: of the first `count`, only those that a mask picks stay; how many they are."""
     left = 0
@@ -258,7 +258,7 @@ def kept_rings(layers: Layers, count: int, keep: np.ndarray) -> int:
     return left
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def layer_speeds(layers: Layers, count: int) -> Array:
     """As `layer_speed`, each among those of its own plane."""
     out, per_L = np.empty(count), 1.0 / LOG_WIDTH
@@ -288,7 +288,7 @@ def layer_speeds(layers: Layers, count: int) -> Array:
     return out
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def grow_layers(
     layers: Layers, count: int, current_m_s: Array, least_m: Array, stretch: Array, dt_s: float, speed_m_s: Array
 ) -> None:
@@ -316,7 +316,7 @@ def grow_layers(
             layers.centre[j, k] += current_m_s[j, k] * dt_s
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def merge_layers(layers: Layers, count: int) -> int:
     """Rings of a plane that are near each other in centre, radius and direction made one; how many are left.
 

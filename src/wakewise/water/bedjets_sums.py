@@ -50,7 +50,7 @@ def _exp(x: Any) -> Any:
     return e * e
 
 
-@njit(nogil=True, fastmath=True)
+@njit(apart=True, nogil=True, fastmath=True)
 def sum_planes(points: Array, planes: Array, starts: IntArray, rings: Array, kind: Array, out: Array) -> None:
     """Sum over rings of several planes; arguments as in `planes_velocity`, `kind` of the precision of the sums."""
     work = np.zeros((6, _BLOCK), kind.dtype)
@@ -272,7 +272,7 @@ def _feel(
     return count
 
 
-@njit
+@njit(apart=True)
 def finish_rows(rows: Array) -> None:
     """Fill in the columns of packed rings that follow from centre, R, A, heading, kappa, thickness and height."""
     for j in range(rows.shape[0]):
@@ -301,7 +301,7 @@ def log_i0(x: float) -> float:
     return x + math.log(s / math.sqrt(x))
 
 
-@njit
+@njit(apart=True)
 def leaning(lean: Array) -> tuple[Array, Array]:
     """Heading, shape (n, 2), and concentration kappa, shape (n,), of mean direction vectors, shape (n, 2).
 
@@ -343,7 +343,7 @@ def log_overlap(
     return log_i0(0.5 * math.sqrt(x * x + y * y)) - 0.5 * (bessel_a + bessel_b)
 
 
-@njit
+@njit(apart=True)
 def with_images(packed: Array, walls: Array, least_m_s: float) -> Array:
     """Append images in one wall after another, so that corners hold too; rows as packed by `packed_rings`."""
     n = packed.shape[0]

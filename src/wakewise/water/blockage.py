@@ -138,7 +138,7 @@ class Blockage:
         return float(np.sqrt(np.mean(after**2) / max(np.mean(before**2), 1e-30)))
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def answer(body: BodyRows, undisturbed_m_s: Array) -> Array:
     """Strengths, shape (s,): see `Blockage.strengths_m3_s`. In one order, whatever the number of threads."""
     out = np.zeros(body.answers.shape[1])
@@ -152,7 +152,7 @@ def answer(body: BodyRows, undisturbed_m_s: Array) -> Array:
     return out
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def near_body(body: BodyRows, points: Array) -> IntArray:
     """Indices of the points, shape (n, 3), that feel the body."""
     found = np.empty(points.shape[0], np.int64)
@@ -165,7 +165,7 @@ def near_body(body: BodyRows, points: Array) -> IntArray:
     return found[:count]
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def add_body(body: BodyRows, points: Array, strengths_m3_s: Array, out: Array) -> None:
     """Add to `out` what the body's sources add at points, both shape (n, 3)."""
     near = near_body(body, points)

@@ -88,7 +88,7 @@ class ImpulseField:
         sum_field(points_W_m, self.rows, self.starts, SINGLE, out)
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def clustered(X: Array, m: Array, sigma: Array) -> tuple[np.ndarray, IntArray]:
     """Rows of an `ImpulseField`, and where each cluster starts."""
     n = sigma.shape[0]
@@ -137,7 +137,7 @@ def clustered(X: Array, m: Array, sigma: Array) -> tuple[np.ndarray, IntArray]:
     return rows, starts[: count + 1].copy()
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def _cells(X: Array, sigma: Array, key: np.ndarray) -> None:
     """Which cell each impulse is in; cells grow where there would be more than keys."""
     low, high = X[0].copy(), X[0].copy()
@@ -157,7 +157,7 @@ def _cells(X: Array, sigma: Array, key: np.ndarray) -> None:
         key[j] = 2 * at + (1 if sigma[j] > _SMALL_M else 0)
 
 
-@njit(nogil=True, fastmath=True)
+@njit(apart=True, nogil=True, fastmath=True)
 def sum_field(points: Array, rows: np.ndarray, starts: IntArray, K: np.ndarray, out: Array) -> None:
     """Write the velocity of clustered impulses at points, shape (n, 3), into `out`; of few, one by one."""
     many = starts.shape[0] - 1

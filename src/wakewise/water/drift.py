@@ -12,7 +12,7 @@ import numpy as np
 
 from wakewise.arrays import Array, IntArray
 from wakewise.compiled import njit
-from wakewise.water.closure import CORE_END_D, FIRST_D
+from wakewise.water.closure import CORE_END_D, FIRST_D, WAKE_ENTRAINMENT
 from wakewise.water.parcels import Jets
 
 EMISSION_SPACING = 0.6  # of the first sigma: Gaussians this close add up to a smooth row (ripple below 1e-6)
@@ -22,7 +22,7 @@ GUST_MEMORY = 1.0  # integral time of the turbulence, in sigma over speed at the
 _HELD_SIGMA, HELD_S = 0.05, 0.2
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def due(flow: Array, held_s: Array, sigma: Array, dt_s: float) -> IntArray:
     """Parcels at which the water must be looked at before a step of dt_s; the times of the others go on."""
     found = np.empty(sigma.shape[0], np.int64)
@@ -37,7 +37,7 @@ def due(flow: Array, held_s: Array, sigma: Array, dt_s: float) -> IntArray:
     return found[:count]
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def drift(
     X: Array,
     sigma: Array,
@@ -47,6 +47,8 @@ def drift(
     disk: Array,
     u: Array,
     ambient: Array,
+    start: Array,
+    wake: np.ndarray,
     laws: Array,
     walls: Array,
 ) -> None:
@@ -55,15 +57,17 @@ def drift(
     Parameters
     ----------
     X : ndarray, shape (n, 3)
-    sigma, share, speed, D : ndarray, shape (n,)
+    sigma, share, speed, D, start : ndarray, shape (n,)
     disk, u, ambient : ndarray, shape (n, 3)
         Velocity of the disk that sent them, of the jets' water and of the ambient water at the parcels.
-    laws : ndarray, shape (4,)
-        Growth of sigma with the path in the core, beyond it, and of a puff, and the time step in s.
+    wake : ndarray of bool, shape (n,)
+        Which are of the hull's wake.
+    laws : ndarray, shape (5,)
+        Growth of sigma with the path in the core, beyond it, and of a puff, the time step in s, and the wake's life.
     walls : ndarray, shape (k, 4)
         Of each face: axis, place, side, and what is not used here. A parcel that would end behind one is mirrored.
     """
-    core_spread, spread, puff, dt_s = laws[0], laws[1], laws[2], laws[3]
+    core_spread, puff, dt_s, shorter = laws[0], laws[2], laws[3], 1.0 - 1.0 / laws[4]
     for i in range(sigma.shape[0]):
         s, first, end = sigma[i], FIRST_D * D[i], CORE_END_D * D[i]
         speed[i] = math.sqrt(u[i, 0] ** 2 + u[i, 1] ** 2 + u[i, 2] ** 2)
@@ -76,8 +80,16 @@ def drift(
             rr, ro, oo = rr + row * row, ro + row * own, oo + own * own
             rp, pp = rp + row * past, pp + past * past
         sine2 = min(max(1.0 - ro * ro / max(rr * oo, 1e-30), 0.0), 1.0) if rr * oo > 1e-20 else 0.0
+        spread = laws[1]
+        if shorter > 0.0 and not wake[i] and start[i] > 0.0:
+            # `closure.lasting_spread`
+            spread *= 1.0 - shorter * max(1.0 - speed[i] / (start[i] * min(1.0, end / s)), 0.0)
         wide = spread * math.sqrt(1.0 - sine2) + puff * math.sqrt(sine2)
         path, after = travelled(s, D[i], speed[i], dt_s, core_spread, wide)
+        if wake[i]:
+            # `closure.wake_sigma_m`
+            rate = 3.0 * (WAKE_ENTRAINMENT - 0.5 * laws[1]) * start[i] * end * end
+            after = (after**3 + rate * dt_s) ** (1.0 / 3.0)
         # `closure.share_left`; the mean of the step's ends counts.
         before = min((first / s) ** 2 if s < end else 0.25 * D[i] / s, 1.0)
         grown = min((first / after) ** 2 if after < end else 0.25 * D[i] / after, 1.0)
@@ -96,7 +108,7 @@ def drift(
                 X[i, k] = 2 * walls[f, 1] - X[i, k]
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def slugs(
     impulses_m4_s: Array,
     dt_s: float,
@@ -182,7 +194,7 @@ def count_sent(impulses_m4_s: Array, dt_s: float, areas_m2: Array, spacing_m: Ar
     return many
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def send(
     jets: Jets,
     count: int,
@@ -219,7 +231,7 @@ def send(
         path, sigma = travelled(FIRST_D * D, D, exit_speed[j], age[j], laws[0], laws[1])
         disk_share = (FIRST_D * D / sigma) ** 2 if sigma < CORE_END_D * D else 0.25 * D / sigma
         jets.sigma[n], jets.diameter[n], jets.stream[n] = sigma, D, 2 * i + back[j]
-        jets.share[n], jets.held[n] = min(disk_share, 1.0), np.inf
+        jets.share[n], jets.held[n], jets.start[n] = min(disk_share, 1.0), np.inf, exit_speed[j]
         towards = 1.0 if back[j] == 1 else -1.0
         for k in range(3):
             axis, disk = towards * disks[2, i, k], disks[1, i, k]

@@ -113,7 +113,7 @@ class Room:
         return images
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def mirrored(X: Array, m: Array, sigma: Array, walls: Array) -> tuple[Array, Array, Array]:
     """Append images in faces; a dipole m at distance h sends at most 2 m / (4 pi h^3) across a face."""
     n = sigma.shape[0]
@@ -132,7 +132,8 @@ def mirrored(X: Array, m: Array, sigma: Array, walls: Array) -> tuple[Array, Arr
             if count + first > room:
                 room = 2 * (count + first)
                 places, impulses = longer(places, room), longer(impulses, room)
-                sizes = longer(sizes.reshape(-1, 1), room).ravel()
+                short, sizes = sizes, np.empty(room)
+                assign(sizes[:count], short[:count])
             for j in range(first):
                 gap = max(side * (at - places[j, axis]), 1e-6)
                 length2 = impulses[j, 0] ** 2 + impulses[j, 1] ** 2 + impulses[j, 2] ** 2

@@ -127,7 +127,7 @@ def impulse_sums(
         out[i, 0], out[i, 1], out[i, 2] = u, v, up
 
 
-@njit(nogil=True, fastmath=True)
+@njit(apart=True, nogil=True, fastmath=True)
 def sum_sources(points: Array, X: Array, Y: Array, Z: Array, Q: Array, S: Array, K: Array, out: Array) -> None:
     """Write the velocity of sources over sigma squared (Q), of sizes 1 / S, at each point into `out`."""
     p0, p1, p2, p3, p4, p5, p6, p7, p8, p9 = K[0], K[1], K[2], K[3], K[4], K[5], K[6], K[7], K[8], K[9]

@@ -1,7 +1,8 @@
 """Jets that meet head-on: they turn aside and run out in the plane where they met.
 
 By symmetry two equal jets that blow at each other are each a jet that strikes a wall without friction, so what they
-lose on meeting becomes rings of a radial jet (`wakewise.water.bedjets`) on both sides of that plane. Of unequal jets
+lose on meeting becomes rings of a radial jet (`wakewise.water.bedjets`) on both sides of that plane (those that cross
+at 20 to 120 degrees: `wakewise.water.fans`). Of unequal jets
 the weaker one's share turns aside and the rest goes on. The radial jet of two that strike each other spreads about
 three times as fast as one that is led out between walls: P. O. Witze and H. A. Dwyer 1976, J. Fluid Mech. 75, 401, doi
 10.1017/S0022112076000293 (from memory, not looked up again).
@@ -20,31 +21,31 @@ import numpy as np
 from wakewise.arrays import Array, IntArray
 from wakewise.compiled import assign, njit
 from wakewise.water.bedjets import STRIKE_HEIGHT, Layers
+from wakewise.water.fans import LEAST_SPEED_M_S, WIDEST
 from wakewise.water.parcels import CENTRE_SPEED, Jets, kept_only
 from wakewise.water.walljets import SPREADS_FASTER, Planes, start_ring
 
-_OPPOSED = -0.5  # cosine of 120 degrees; jets that cross at less merge
-_LEAST_SPEED_M_S = 0.03  # of a parcel alone at its centre; meetings of weaker ones are let be
 _SAME_PLACE = 1.0  # sheets of the same two jets closer than this many sigma are one
 _SAME_NORMAL = math.cos(math.radians(15))
 _MOST_SHEETS = 8  # that are remembered, so that the rings of one meeting add up
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def turn_aside(
-    jets: Jets, count: int, planes: Planes, faces: int, layers: Layers, rings: int
+    jets: Jets, count: int, streams: int, planes: Planes, faces: int, layers: Layers, rings: int
 ) -> tuple[int, int, float]:
     """Take from the first `count` parcels what meets head-on, and start its rings behind the first `rings`.
 
-    How many parcels and rings there are then, and the impulse taken in m4/s. The first `faces` planes are those of the
-    room; a meeting for which there is no plane left waits.
+    How many parcels and rings there are then, and the impulse taken in m4/s. Streams below `streams` are the thrusters'
+    own; only those meet. The first `faces` planes are those of the room; a meeting for which there is no plane left
+    waits.
     """
     X, m, sigma = jets.position, jets.impulse, jets.sigma
     strong = np.empty(count, np.int64)
     many = 0
     for i in range(count):
         size = math.sqrt(m[i, 0] ** 2 + m[i, 1] ** 2 + m[i, 2] ** 2)
-        if CENTRE_SPEED * size > _LEAST_SPEED_M_S * sigma[i] ** 3:
+        if jets.stream[i] < streams and CENTRE_SPEED * size > LEAST_SPEED_M_S * sigma[i] ** 3:
             strong[many] = i
             many += 1
     pairs = _meeting_pairs(X, m, sigma, jets.stream, strong[:many])
@@ -78,7 +79,7 @@ def turn_aside(
     return kept_only(jets, count, keep), rings, taken
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def _sheet(
     planes: Planes,
     faces: int,
@@ -117,11 +118,11 @@ def _sheet(
             continue
         along = np.zeros(3)
         along[np.argmin(np.abs(normal))] = 1.0
-        first = np.cross(normal, along)
+        first = _cross(normal, along)
         first /= math.sqrt(first[0] ** 2 + first[1] ** 2 + first[2] ** 2)
         assign(frames[s, 0:3], middle)
         assign(frames[s, 3:6], first)
-        assign(frames[s, 6:9], np.cross(normal, first))
+        assign(frames[s, 6:9], _cross(normal, first))
         assign(frames[s, 9:12], normal)
         frames[s, 12], frames[s, 13] = 0.0, SPREADS_FASTER
         planes.thickness[s], planes.per_height[s], used[s] = sigma, 0.0, newest + 1
@@ -129,6 +130,15 @@ def _sheet(
         _forget_the_oldest(used, faces)
         return s
     return -1
+
+
+@njit(nogil=True)
+def _cross(a: Array, b: Array) -> Array:
+    out = np.empty(3)
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        out[k] = a[i] * b[j] - a[j] * b[i]
+    return out
 
 
 @njit(nogil=True)
@@ -142,7 +152,7 @@ def _forget_the_oldest(used: IntArray, faces: int) -> None:
         used[oldest] = 0
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def _meeting_pairs(X: Array, m: Array, sigma: Array, stream: IntArray, strong: IntArray) -> IntArray:
     """Pairs that blow at each other nearly on one line and are as near as a jet is to the wall that it strikes."""
     n = strong.shape[0]
@@ -161,7 +171,7 @@ def _meeting_pairs(X: Array, m: Array, sigma: Array, stream: IntArray, strong: I
         i = strong[p]
         for q in range(p + 1, n):
             # First what most pairs fail by.
-            if unit[p, 0] * unit[q, 0] + unit[p, 1] * unit[q, 1] + unit[p, 2] * unit[q, 2] > _OPPOSED:
+            if unit[p, 0] * unit[q, 0] + unit[p, 1] * unit[q, 1] + unit[p, 2] * unit[q, 2] > WIDEST:
                 continue
             j = strong[q]
             dx, dy, dz = X[j, 0] - X[i, 0], X[j, 1] - X[i, 1], X[j, 2] - X[i, 2]

@@ -41,6 +41,7 @@ class Jets(NamedTuple):
     share: Array
     flow: Array
     held: Array
+    start: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +57,8 @@ class Parcels:
     diameter_m : ndarray, shape (n,)
         Disk diameter of the thruster that sent it.
     stream : ndarray of int, shape (n,)
-        Which jet it belongs to: twice the thruster's index, plus one for reverse thrust.
+        Which jet it belongs to: twice the thruster's index, plus one for reverse thrust; then the hull's wake, and then
+        the fans of jets that have met.
     gust : ndarray, shape (n, 3)
         Turbulent share of the impulse, a standard normal variable before scaling.
     disk_m_s : ndarray, shape (n, 3)
@@ -67,6 +69,8 @@ class Parcels:
         Velocity of the jets' water there when it was last looked at.
     held_s : ndarray, shape (n,)
         How long ago that was; infinite if never.
+    start_m_s : ndarray, shape (n,)
+        Speed on the axis of its row where that begins: a jet's exit speed, a wake's first deficit.
     """
 
     position_m: Array
@@ -79,13 +83,14 @@ class Parcels:
     share: Array
     flow_m_s: Array
     held_s: Array
+    start_m_s: Array
 
     @classmethod
     def none(cls) -> Parcels:
         """No parcels at all: still water."""
         v = np.zeros((0, 3))
         s = np.zeros(0)
-        return cls(v, v, s, s, np.zeros(0, dtype=np.int64), v, v, s, v, s)
+        return cls(v, v, s, s, np.zeros(0, dtype=np.int64), v, v, s, v, s, s)
 
     @classmethod
     def sent(
@@ -97,11 +102,12 @@ class Parcels:
         stream: IntArray,
         gust: Array,
         disk_m_s: Array,
+        start_m_s: Array | None = None,
     ) -> Parcels:
-        """New ones, at which the water has not been looked at yet."""
+        """New ones, at which the water has not been looked at yet; without `start_m_s` they count as ever fed."""
         never, flow = np.full(len(sigma_m), np.inf), np.zeros((len(sigma_m), 3))
-        share = disk_share(sigma_m, diameter_m)
-        return cls(position_m, impulse_m4_s, sigma_m, diameter_m, stream, gust, disk_m_s, share, flow, never)
+        share, start = disk_share(sigma_m, diameter_m), np.zeros(len(sigma_m)) if start_m_s is None else start_m_s
+        return cls(position_m, impulse_m4_s, sigma_m, diameter_m, stream, gust, disk_m_s, share, flow, never, start)
 
     @property
     def count(self) -> int:
@@ -194,7 +200,7 @@ def merged_across(parcels: Parcels, spacing: float) -> Parcels:
     return Parcels.of(jets, merge_across(jets, parcels.count, spacing))
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def kept_only(jets: Jets, count: int, keep: np.ndarray) -> int:
     """Close the ranks: of the first `count`, only those that a mask picks stay; how many they are."""
     left = 0
@@ -203,7 +209,7 @@ def kept_only(jets: Jets, count: int, keep: np.ndarray) -> int:
             continue
         if left < i:
             jets.sigma[left], jets.diameter[left], jets.stream[left] = jets.sigma[i], jets.diameter[i], jets.stream[i]
-            jets.share[left], jets.held[left] = jets.share[i], jets.held[i]
+            jets.share[left], jets.held[left], jets.start[left] = jets.share[i], jets.held[i], jets.start[i]
             for k in range(3):
                 jets.position[left, k], jets.impulse[left, k] = jets.position[i, k], jets.impulse[i, k]
                 jets.gust[left, k], jets.disk[left, k] = jets.gust[i, k], jets.disk[i, k]
@@ -212,7 +218,7 @@ def kept_only(jets: Jets, count: int, keep: np.ndarray) -> int:
     return left
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def merge_rows(jets: Jets, count: int, spacing: float) -> int:
     """Pairs of successive parcels of one jet closer than `spacing` sigma made one; their impulse is conserved.
 
@@ -226,7 +232,7 @@ def merge_rows(jets: Jets, count: int, spacing: float) -> int:
     return _merge(jets, count, np.arange(count), jets.stream, spacing)
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def merge_across(jets: Jets, count: int, spacing: float) -> int:
     """Pairs of far-travelled parcels of different jets, alike in size and direction and very close, made one.
 
@@ -252,7 +258,7 @@ def merge_across(jets: Jets, count: int, spacing: float) -> int:
     return _merge(jets, count, old[order], labels, spacing)
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def _merge(jets: Jets, count: int, order: IntArray, label: IntArray, spacing: float) -> int:
     """Walk through parcels in an order; each may take up the one before it with the same label."""
     labels = 0
@@ -278,7 +284,7 @@ def _merge(jets: Jets, count: int, order: IntArray, label: IntArray, spacing: fl
         p = a / (a + b)
         q = 1 - p
         sigma[j], share[j] = p * sigma[i] + q * sigma[j], p * share[i] + q * share[j]
-        held[j] = max(held[i], held[j])
+        held[j], jets.start[j] = max(held[i], held[j]), p * jets.start[i] + q * jets.start[j]
         for k in range(3):
             X[j, k] = p * X[i, k] + q * X[j, k]
             jets.disk[j, k] = p * jets.disk[i, k] + q * jets.disk[j, k]

@@ -51,7 +51,7 @@ def curve() -> np.ndarray:
     return place.astype(np.uint16)
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def ordered(points: Array, places: np.ndarray) -> IntArray:
     """Order of points, shape (n, 3), by the places of their cells on the curve."""
     n = points.shape[0]
@@ -68,7 +68,7 @@ def ordered(points: Array, places: np.ndarray) -> IntArray:
     return sorted_keys(key)
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def sorted_keys(key: np.ndarray) -> IntArray:
     """Order that sorts keys of two bytes, shape (n,): byte by byte, and like ones as they come."""
     n = key.shape[0]

@@ -19,6 +19,7 @@ from wakewise.water.blockage import BodyRows, add_body, answer
 from wakewise.water.clusters import clustered, sum_field
 from wakewise.water.drift import drift, due, fade_gusts, send, slugs
 from wakewise.water.faces import mirrored
+from wakewise.water.fans import fan_out
 from wakewise.water.meeting import turn_aside
 from wakewise.water.parcels import MERGE_SPACING, Jets, kept_only, merge_across, merge_rows
 from wakewise.water.space_order import ordered
@@ -36,8 +37,10 @@ class Laws(NamedTuple):
 
     Parameters
     ----------
-    drift : ndarray, shape (4,)
-        As in `drift.drift`; its last is the time step in s.
+    drift : ndarray, shape (5,)
+        As in `drift.drift`; the fourth is the time step in s.
+    wake_stream : int
+        Of the hull's wake: one more than the jets' own.
     rest_speed : float
         In m/s.
     gusty : bool
@@ -49,6 +52,7 @@ class Laws(NamedTuple):
     """
 
     drift: Array
+    wake_stream: int
     rest_speed: float
     gusty: bool
     bed_z: float
@@ -72,9 +76,9 @@ class Thrusters(NamedTuple):
 class Tally(NamedTuple):
     """Counts, changed in place.
 
-    `rows`, shape (2,), is how many parcels and rings there are, `steps`, shape (2,), how many steps there were, and at
-    which of them the body's answer, `held`, shape (s,), was found; `gone`, shape (3,), the impulse retired, struck and
-    met, in m4/s.
+    `rows`, shape (2,), is how many parcels and rings there are, `steps`, shape (3,), how many steps there were, at
+    which of them the body's answer, `held`, shape (s,), was found, and how many crossings; `gone`, shape (3,), the
+    impulse retired, struck and met, in m4/s.
     """
 
     rows: IntArray
@@ -83,7 +87,7 @@ class Tally(NamedTuple):
     gone: Array
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def flow_at(
     points: Array,
     order: IntArray,
@@ -145,7 +149,7 @@ def advance(
     Parameters
     ----------
     jets, layers : Jets, Layers
-        With room for what is sent, and for a ring of each parcel.
+        With room for what is sent, for three of each that cross, and for a ring of each of those.
     planes : Planes
     body : BodyRows
     laws : Laws
@@ -175,7 +179,8 @@ def advance(
     )
     if sent[2].shape[0]:
         count = send(jets, count, sent, thrusters.areas, disks, ambient[n + r :], laws.drift, walls, noise[n:])
-    count, rings, met = turn_aside(jets, count, planes, walls.shape[0], layers, rings)
+    count, tally.steps[2] = fan_out(jets, count, laws.wake_stream, tally.steps[2])
+    count, rings, met = turn_aside(jets, count, laws.wake_stream, planes, walls.shape[0], layers, rings)
     tally.gone[2] += met
     for face in range(walls.shape[0]):
         count, rings, struck = _strike(jets, count, planes, face, layers, rings)
@@ -188,7 +193,7 @@ def advance(
     tally.steps[0] += 1
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def _drift(
     jets: Jets,
     n: int,
@@ -220,6 +225,8 @@ def _drift(
         jets.disk[:n],
         jets.flow[:n],
         ambient[:n],
+        jets.start[:n],
+        jets.stream[:n] == laws.wake_stream,
         laws.drift,
         planes.walls,
     )
@@ -233,7 +240,7 @@ def _drift(
     return kept_only(jets, n, keep) if resting else n
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def _carrying(
     X: Array,
     impulse: Array,
@@ -262,7 +269,7 @@ def _carrying(
     return u
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def _strike(jets: Jets, count: int, planes: Planes, face: int, layers: Layers, rings: int) -> tuple[int, int, float]:
     """Hand parcels that come up to a face over to wall jets; parcels and rings left, and the impulse handed over."""
     axis, at, side = int(planes.walls[face, 0]), planes.walls[face, 1], planes.walls[face, 2]

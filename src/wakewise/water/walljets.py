@@ -84,7 +84,7 @@ def _per_height(face: Face, room: Room) -> float:
     return 1.0 / abs(opposite[0].at_m - face.at_m) if opposite else 0.0
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def start_ring(
     layers: Layers, count: int, planes: Planes, plane: int, position: Array, impulse: Array, sigma: float
 ) -> int:
@@ -101,7 +101,7 @@ def start_ring(
     return count + 1
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def ring_places(layers: Layers, count: int, planes: Planes) -> Array:
     """Centres of the first `count` rings in the world, shape (count, 3)."""
     out = np.empty((count, 3))
@@ -113,7 +113,7 @@ def ring_places(layers: Layers, count: int, planes: Planes) -> Array:
     return out
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def grow(
     layers: Layers, count: int, planes: Planes, places: Array, ambient: Array, dt_s: float, rest_speed_m_s: float
 ) -> int:
@@ -144,7 +144,7 @@ def grow(
     return kept_rings(layers, count, keep)
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def thin(layers: Layers, count: int) -> int:
     """Make neighbouring rings of a plane one; of too many, let the slowest go. How many are left."""
     count = merge_layers(layers, count)
@@ -155,7 +155,7 @@ def thin(layers: Layers, count: int) -> int:
     return count
 
 
-@njit(nogil=True)
+@njit(apart=True, nogil=True)
 def wall_rows(layers: Layers, count: int, planes: Planes) -> tuple[Array, IntArray, Array]:
     """Planes with rings, where each one's rings start, and the rings with their images, as `WallRows` has them."""
     heading, kappa = leaning(layers.lean[:count])

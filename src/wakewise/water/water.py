@@ -29,6 +29,8 @@ from wakewise.water.blockage import Blockage, BodyRows
 from wakewise.water.closure import PLAIN, PUFF_SPREAD, Spreading, first_sigma_m
 from wakewise.water.drift import EMISSION_SPACING, count_sent
 from wakewise.water.faces import Room
+from wakewise.water.fans import RAYS
+from wakewise.water.hullwake import HullPush, HullWake
 from wakewise.water.induction import SINGLE
 from wakewise.water.instant import Instant
 from wakewise.water.parcels import GUST_PER_TURBULENCE, MERGE_SPACING, Parcels, merged, merged_across
@@ -91,6 +93,8 @@ class Water:
         `closure.PLAIN`, or `closure.SWIRLING` for a propeller's wide jet.
     body : Blockage or None
         A solid body on the bed.
+    wake_life : float
+        How much longer what is left of a jet lives once it is no longer fed: see `closure`, *Life*.
     """
 
     def __init__(
@@ -108,6 +112,7 @@ class Water:
         max_parcels: int = 4096,
         spreading: Spreading = PLAIN,
         body: Blockage | None = None,
+        wake_life: float = 1.0,
     ) -> None:
         areas = np.array(disk_areas_m2, dtype=np.float64)
         self._density = density_kg_m3
@@ -118,6 +123,7 @@ class Water:
         self._rest_speed = rest_speed_m_s
         self._max_parcels = max_parcels
         self._spreading = spreading
+        self._wake_life = wake_life
         self._body = body
         self._body_rows = BodyRows.none() if body is None else body.rows
         self._rng = rng
@@ -128,8 +134,9 @@ class Water:
         spacing = EMISSION_SPACING * first_sigma_m(np.sqrt(4 * areas / math.pi))
         streams = (len(areas), 2)
         self._thrusters = Thrusters(areas, spacing, np.zeros(streams), np.zeros(streams))
+        self._hull = HullWake(2 * len(areas), density_kg_m3)
         sources = self._body_rows.answers.shape[1]
-        self._tally = Tally(np.zeros(2, np.int64), np.array([0, -1]), np.zeros(sources), np.zeros(3))
+        self._tally = Tally(np.zeros(2, np.int64), np.array([0, -1, 0]), np.zeros(sources), np.zeros(3))
         self._forced_merges = 0
         self._now: Instant | None = None
         self._answer_to_steady: Array | None = None
@@ -203,7 +210,15 @@ class Water:
         """Velocity less that of the same water without thrusters, shape (n, 3), at points, shape (n, 3)."""
         return self.now.excess_velocity(points_W_m)
 
-    def step(self, dt_s: float, origins_before_m: Array, origins_m: Array, axes_W: Array, impulses_N_s: Array) -> None:
+    def step(
+        self,
+        dt_s: float,
+        origins_before_m: Array,
+        origins_m: Array,
+        axes_W: Array,
+        impulses_N_s: Array,
+        hull: HullPush | None = None,
+    ) -> None:
         """Move the water on by dt_s and send what the thrusters pushed meanwhile.
 
         Parameters
@@ -215,6 +230,8 @@ class Water:
             Force axes: forward thrust sends its jet along the negative axis.
         impulses_N_s : ndarray, shape (n, 2)
             Integral over the step of forward and of reverse thrust, both positive.
+        hull : HullPush or None
+            What the hull did to the water meanwhile; None for no hull.
         """
         forward, back = np.asarray(origins_m, dtype=np.float64), np.asarray(origins_before_m, dtype=np.float64)
         disks = np.stack([forward, (forward - back) / dt_s, axes_W])
@@ -222,7 +239,7 @@ class Water:
         thrusters = self._thrusters
         sent = count_sent(impulses, dt_s, thrusters.areas, thrusters.spacing, thrusters.waiting_slug)
         known = int(self._tally.rows[0]) + sent
-        self._make_room(known)
+        self._make_room(known * (1 + RAYS // 2))
         places = places_of(self._jets, self._layers, self._planes, self._tally.rows, disks[0])
         ambient = self._ambient_velocity(places)
         noise = self._rng.standard_normal((known, 3)) if self._gust_scale > 0.0 else np.zeros((known, 3))
@@ -241,6 +258,8 @@ class Water:
             impulses,
             noise,
         )
+        if hull is not None:
+            self._append(self._hull.sent(dt_s, hull, self._rng))
         if self._tally.rows[0] > self._max_parcels:
             self._coarsen()
         self._time += dt_s
@@ -248,8 +267,9 @@ class Water:
 
     def _laws(self, dt_s: float) -> Laws:
         spread = self._spreading
-        drift = np.array([spread.core_spread, spread.spread, max(PUFF_SPREAD, spread.spread), dt_s])
-        return Laws(drift, self._rest_speed, self._gust_scale > 0.0, self._bed, curve(), SINGLE)
+        puff, wake_stream = max(PUFF_SPREAD, spread.spread), 2 * len(self._thrusters.areas)
+        drift = np.array([spread.core_spread, spread.spread, puff, dt_s, self._wake_life])
+        return Laws(drift, wake_stream, self._rest_speed, self._gust_scale > 0.0, self._bed, curve(), SINGLE)
 
     def _ambient_velocity(self, places_W_m: Array) -> Array:
         """Velocity of the ambient water at places, both shape (n, 3)."""
@@ -277,6 +297,20 @@ class Water:
         if int(self._tally.rows[1]) + parcels > len(self._layers.radius):
             room = 2 * (int(self._tally.rows[1]) + parcels)
             self._layers = Layers(*(_with_room(column, room) for column in self._layers))
+
+    def _append(self, parcels: Parcels) -> None:
+        """Add parcels behind those there are; those behind a face are set on it."""
+        if parcels.count == 0:
+            return
+        have = int(self._tally.rows[0])
+        self._make_room(have + parcels.count)
+        columns = parcels.with_room(parcels.count)
+        for axis, at, side in self._planes.walls[:, :3]:
+            beyond = side * (columns.position[:, int(axis)] - at) > 0.0
+            columns.position[beyond, int(axis)] = at
+        for column, new in zip(self._jets, columns, strict=True):
+            column[have : have + parcels.count] = new
+        self._tally.rows[0] += parcels.count
 
     def _coarsen(self) -> None:
         """Make rows coarser until there are no more parcels than there may be."""
