@@ -21,12 +21,13 @@ from wakewise.missions import Route, TankBounds, plan_route
 from wakewise.operation.foreign import described, from_outside, guarded
 from wakewise.operation.pilots import make_pilot
 from wakewise.operation.preflight import Preflight, preflight
+from wakewise.operation.regions import region_of
 from wakewise.operation.seeds import Seeds
 from wakewise.operation.surroundings import surroundings_of, tank_bounds
 from wakewise.operation.worlds import make_world
 from wakewise.planning import Surroundings
 from wakewise.tank.ambient import mean_current_m_s
-from wakewise.targets import Region, Target, delicacy, find_target, sample_region
+from wakewise.targets import Region, Target, find_target
 from wakewise.vehicles import Vehicle
 from wakewise.wake import wake_model
 
@@ -138,9 +139,7 @@ class Parts:
     def region(self) -> Region:
         """Points that stand for the water round the target."""
         settings = self.scenario.target
-        gain = settings.delicate_gain
-        marks = delicacy(self.target.mesh) if gain > 0.0 else None
-        return sample_region(self.target, settings.points, self.seeds.region(), marks, gain)
+        return region_of(self.target, settings.points, self.seeds, settings.delicate_gain)
 
     @part
     def route(self) -> Route:
