@@ -76,13 +76,14 @@ def trial(
     >>> scenario = ww.Scenario.preset("quick", **{"mission.views": [8, 6, 4]})
     >>> ww.trial(scenario, "runs/few")  # doctest: +SKIP
     """
-    from wakewise.reports import write_report
+    from wakewise.reports import begin_report, write_report
+    from wakewise.reports.draft import Draft
     from wakewise.trials import Quiet, run_trial
 
-    watch, place = watch or Quiet(), Path(folder)
-    figures = run_trial(flight, place, watch, told)
+    watch, place, draft = watch or Quiet(), Path(folder), Draft()
+    figures = run_trial(flight, place, watch, told, lambda missing: begin_report(place, draft, missing))
     with watch.stage("report") as progress:
-        report = write_report(place)
+        report = write_report(place, draft)
         progress(1, 1)
     return Result(place, figures, report)
 
