@@ -53,11 +53,7 @@ class SurfaceMaker:
         if process is None:
             return
         process.kill()
-        process.wait()
-        for pipe in (process.stdin, process.stdout):
-            if pipe is not None:
-                with suppress(OSError):
-                    pipe.close()
+        _close(process)
         sweep(self._folder)
 
     @property
@@ -137,7 +133,7 @@ class SurfaceMaker:
             else:
                 raise content
         self._process = None
-        _warn(f"its process ended with status {process.wait()}")
+        _warn(f"its process ended with status {_close(process)}")
         sweep(self._folder)
         return False
 
@@ -145,6 +141,15 @@ class SurfaceMaker:
 def uncoloured(folder: Path) -> bool:
     """Whether there is a mesh whose colours are not there or are those of an older one."""
     return (folder / "mesh.ply").exists() and not _newer(folder / "mesh.glb", folder / "mesh.ply")
+
+
+def _close(process: subprocess.Popen[bytes]) -> int:
+    """Wait for a process that ends, close what led to it, and give its exit status."""
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            with suppress(OSError):
+                pipe.close()
+    return process.wait()
 
 
 def _newer(product: Path, source: Path) -> bool:
