@@ -23,6 +23,7 @@ def run(name, folder, *arguments):
     out = io.StringIO()
     with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(out):
         patch.chdir(folder)
+        patch.setenv("MPLBACKEND", "Agg")
         patch.setattr(sys, "argv", [str(EXAMPLES / name), *arguments])
         runpy.run_path(str(EXAMPLES / name), run_name="__main__")
     if "matplotlib.pyplot" in sys.modules:

@@ -110,7 +110,8 @@ def compare(flights: Mapping[str, Parts | Scenario], folder: str | Path, watch: 
     >>> flights = {"dp": parts.replace(method="dp"), "ours": parts}
     >>> ww.compare(flights, "runs/both").figures["ratios"]["ours"]  # doctest: +SKIP
     """
-    from wakewise.reports import write_comparison, write_report
+    from wakewise.reports import begin_report, write_comparison, write_report
+    from wakewise.reports.draft import Draft
     from wakewise.trials import Quiet, compare_methods
 
     if not flights:
@@ -119,10 +120,13 @@ def compare(flights: Mapping[str, Parts | Scenario], folder: str | Path, watch: 
         if not name or "/" in name or "\\" in name or name.startswith("."):
             raise InputError(f"compare: '{name}' names a folder, it must hold no separator and not begin with a dot")
     watch, place = watch or Quiet(), Path(folder)
-    figures = compare_methods(flights, place, watch)
+    drafts = {name: Draft() for name in flights}
+    figures = compare_methods(
+        flights, place, watch, lambda name, lacks: begin_report(place / name, drafts[name], lacks)
+    )
     with watch.stage("report") as progress:
         for name in flights:
-            write_report(place / name)
+            write_report(place / name, drafts.pop(name))
         report = write_comparison({name: place / name for name in flights}, place)
         progress(1, 1)
     return Result(place, figures, report)

@@ -70,9 +70,9 @@ def test_the_other_process_makes_the_mesh_that_this_one_would(folder, monkeypatc
     assert dict(calls)["colours"] is True
     assert not list(folder.rglob(".*"))
     (folder / "mesh.ply").unlink()
-    monkeypatch.setattr(SurfaceMaker, "_begin", lambda _: False)
-    monkeypatch.setattr(SurfaceMaker, "ready", lambda _: None)
-    made(folder, lambda _: pytest.fail("nothing is made beside"))
+    monkeypatch.setattr(surface.subprocess, "Popen", lambda *_, **__: pytest.fail("a process was begun"))
+    with SurfaceMaker(folder, COARSE, 1.0) as maker:
+        maker.make(Stages())
     assert (folder / "mesh.ply").read_bytes() == beside
 
 

@@ -81,8 +81,10 @@ class SurfaceMaker:
         except OSError as fault:
             _warn(str(fault))
 
-    def make(self, watch: Watch, meanwhile: Callable[[str], None] = lambda _: None) -> None:
+    def make(self, watch: Watch, meanwhile: Callable[[str], None] | None = None) -> None:
         """Make what is missing, and call `meanwhile("mesh")` beside the mesh and `meanwhile("colours")` beside these.
+
+        Without anything to do meanwhile it is made in this process, which costs no second loading of libraries.
 
         Raises
         ------
@@ -91,23 +93,25 @@ class SurfaceMaker:
         """
         if not self._wanted:
             return
+        beside = False
         if self._meshed:
             watch.skipped("mesh")
         else:
-            beside = self._begin()
+            beside = meanwhile is not None and self._begin()
             with watch.stage("mesh") as progress:
-                if beside:
+                if beside and meanwhile is not None:
                     meanwhile("mesh")
-                if not beside or not self._await(progress):
+                beside = beside and self._await(progress)
+                if not beside:
                     _mesh(self._folder, self._settings, progress)
         if not uncoloured(self._folder):
             if (self._folder / "mesh.ply").exists():
                 watch.skipped("colours")
             return
         with watch.stage("colours") as progress:
-            if self._process is not None:
+            if beside and meanwhile is not None:
                 meanwhile("colours")
-            if self._process is None or not self._await(progress):
+            if not (beside and self._await(progress)):
                 _colours(self._folder, self._bed_z_m, progress)
 
     def _begin(self) -> bool:

@@ -7,6 +7,7 @@ import io
 import json
 import platform
 from collections.abc import Callable, Mapping
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -76,7 +77,7 @@ def run_trial(
     folder: Path,
     watch: Watch | None = None,
     told: Callable[[Figures], None] | None = None,
-    meanwhile: Callable[[str], None] = lambda _: None,
+    meanwhile: Callable[[str], None] | None = None,
 ) -> Figures:
     """Run what is left of a trial and return its figures, which are the content of metrics.json.
 
@@ -85,8 +86,8 @@ def run_trial(
     told : callable, optional
         Called with the figures as soon as they are known and written, before the mesh and its colours are made.
     meanwhile : callable, optional
-        Called with "mesh" while another process makes the mesh, and with "colours" while it makes its colours; not
-        called where they are there already or there is no such process.
+        With it another process makes them: called with "mesh" while that makes the mesh, and with "colours" while it
+        makes its colours; not called where they are there already or there is no such process.
 
     Raises
     ------
@@ -107,7 +108,7 @@ def run_trial(
     _ = parts.preflight
     claim(folder, scenario)
     with alone(folder), SurfaceMaker(folder, scenario.reconstruction, parts.target.bed_z_m) as surface:
-        result = _figures(parts, scenario, folder, watch, surface.ready)
+        result = _figures(parts, scenario, folder, watch, surface.ready if meanwhile is not None else lambda: None)
         if told is not None:
             told(result)
         surface.make(watch, meanwhile)
@@ -150,11 +151,24 @@ def _photograph(parts: Parts, folder: Path, darkroom: Darkroom, progress: Callab
     photograph_flight(parts, folder, progress)
 
 
-def compare_methods(flights: Mapping[str, Parts | Scenario], folder: Path, watch: Watch | None = None) -> Figures:
-    """Run one trial per method, each in its own folder, and set their figures side by side (comparison.json)."""
+def compare_methods(
+    flights: Mapping[str, Parts | Scenario],
+    folder: Path,
+    watch: Watch | None = None,
+    meanwhile: Callable[[str, str], None] | None = None,
+) -> Figures:
+    """Run one trial per method, each in its own folder, and set their figures side by side (comparison.json).
+
+    `meanwhile` is that of `run_trial`, with the method's name before.
+    """
     for flight in flights.values():  # what does not fit is refused before the first of them flies
         _ = (flight if isinstance(flight, Parts) else flight.parts()).preflight
-    result = comparison({name: run_trial(flight, folder / name, watch) for name, flight in flights.items()})
+    result = comparison(
+        {
+            name: run_trial(flight, folder / name, watch, None, None if meanwhile is None else partial(meanwhile, name))
+            for name, flight in flights.items()
+        }
+    )
     write_json(folder / "comparison.json", result)
     return result
 
