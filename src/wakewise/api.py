@@ -76,8 +76,7 @@ def trial(
     >>> scenario = ww.Scenario.preset("quick", **{"mission.views": [8, 6, 4]})
     >>> ww.trial(scenario, "runs/few")  # doctest: +SKIP
     """
-    from wakewise.reports import begin_report, write_report
-    from wakewise.reports.draft import Draft
+    from wakewise.reports import Draft, begin_report, write_report
     from wakewise.trials import Quiet, run_trial
 
     watch, place, draft = watch or Quiet(), Path(folder), Draft()
@@ -110,8 +109,7 @@ def compare(flights: Mapping[str, Parts | Scenario], folder: str | Path, watch: 
     >>> flights = {"dp": parts.replace(method="dp"), "ours": parts}
     >>> ww.compare(flights, "runs/both").figures["ratios"]["ours"]  # doctest: +SKIP
     """
-    from wakewise.reports import begin_report, write_comparison, write_report
-    from wakewise.reports.draft import Draft
+    from wakewise.reports import Draft, begin_report, write_comparison, write_report
     from wakewise.trials import Quiet, compare_methods
 
     if not flights:

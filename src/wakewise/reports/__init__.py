@@ -13,8 +13,9 @@ from wakewise.doors import lazy_door
 
 if TYPE_CHECKING:
     from wakewise.reports.compare import write_comparison
+    from wakewise.reports.draft import Draft
     from wakewise.reports.report import begin_report, write_report
 
-__all__ = ["begin_report", "write_comparison", "write_report"]
+__all__ = ["Draft", "begin_report", "write_comparison", "write_report"]
 
 lazy_door(__name__, "reports", "photos")
