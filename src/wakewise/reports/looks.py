@@ -103,7 +103,8 @@ def _water(folder: Path, shots: list[Photograph]) -> tuple[dict[str, NDArray[np.
         return {}, None
     try:
         depths = Depths.read(folder)
-        ranges, pairs = {}, []
+        ranges: dict[str, NDArray[np.float32]] = {}
+        pairs = []
         for shot in shots:
             image = _read(shot.path)
             if image is not None and depths.knows(shot.name, image.shape[:2]):
