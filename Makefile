@@ -39,7 +39,8 @@ check: setup
 
 test: check
 	$(BIN)/wakewise warm
-	$(BIN)/pytest -n 2
+	@# A file at a time: what its tests share is made once, and its kernels are loaded by one of the two workers.
+	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 bench: setup
 	$(BIN)/wakewise bench

@@ -1,7 +1,10 @@
 """The examples: a question each, in one look, and what they say is what they do."""
 
 import ast
+import contextlib
+import io
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -16,7 +19,20 @@ FLOWN = r"seed 1: water at the target \d+\.\d\d mm/s, \d+\.\d mm off its way, \d
 
 
 def run(name, folder, *arguments):
-    """What the example prints, run in an empty folder as a reader would."""
+    """What the example prints, run as the main program in an empty folder; kernels stay loaded for the next one."""
+    out = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(out):
+        patch.chdir(folder)
+        patch.setenv("MPLBACKEND", "Agg")
+        patch.setattr(sys, "argv", [str(EXAMPLES / name), *arguments])
+        runpy.run_path(str(EXAMPLES / name), run_name="__main__")
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close("all")
+    return out.getvalue()
+
+
+def run_alone(name, folder, *arguments):
+    """What the example prints in a process of its own, as for a reader."""
     done = subprocess.run(
         [sys.executable, str(EXAMPLES / name), *arguments], cwd=folder, capture_output=True, text=True, check=False
     )
@@ -112,7 +128,7 @@ def test_photographs_become_a_model_in_metres(tmp_path):
     target = scenario.parts().target
     views = planned_views(target, scenario.mission, scenario.imaging.exposure_s, np.random.default_rng(1))
     write_photos(tmp_path, views, None, scenario.imaging, target)
-    said = run("photographs_to_model.py", tmp_path, "images", "poses.csv")
+    said = run_alone("photographs_to_model.py", tmp_path, "images", "poses.csv")
     figures = ast.literal_eval(said)
     assert figures["images"] == figures["registered_images"] == 12 and figures["scale"] > 0.0
     assert (tmp_path / "runs" / "photographs" / "model" / "dense.ply").exists()

@@ -76,13 +76,13 @@ def trial(
     >>> scenario = ww.Scenario.preset("quick", **{"mission.views": [8, 6, 4]})
     >>> ww.trial(scenario, "runs/few")  # doctest: +SKIP
     """
-    from wakewise.reports import write_report
+    from wakewise.reports import Draft, begin_report, write_report
     from wakewise.trials import Quiet, run_trial
 
-    watch, place = watch or Quiet(), Path(folder)
-    figures = run_trial(flight, place, watch, told)
+    watch, place, draft = watch or Quiet(), Path(folder), Draft()
+    figures = run_trial(flight, place, watch, told, lambda missing: begin_report(place, draft, missing))
     with watch.stage("report") as progress:
-        report = write_report(place)
+        report = write_report(place, draft)
         progress(1, 1)
     return Result(place, figures, report)
 
@@ -109,7 +109,7 @@ def compare(flights: Mapping[str, Parts | Scenario], folder: str | Path, watch: 
     >>> flights = {"dp": parts.replace(method="dp"), "ours": parts}
     >>> ww.compare(flights, "runs/both").figures["ratios"]["ours"]  # doctest: +SKIP
     """
-    from wakewise.reports import write_comparison, write_report
+    from wakewise.reports import Draft, begin_report, write_comparison, write_report
     from wakewise.trials import Quiet, compare_methods
 
     if not flights:
@@ -118,10 +118,13 @@ def compare(flights: Mapping[str, Parts | Scenario], folder: str | Path, watch: 
         if not name or "/" in name or "\\" in name or name.startswith("."):
             raise InputError(f"compare: '{name}' names a folder, it must hold no separator and not begin with a dot")
     watch, place = watch or Quiet(), Path(folder)
-    figures = compare_methods(flights, place, watch)
+    drafts = {name: Draft() for name in flights}
+    figures = compare_methods(
+        flights, place, watch, lambda name, lacks: begin_report(place / name, drafts[name], lacks)
+    )
     with watch.stage("report") as progress:
         for name in flights:
-            write_report(place / name)
+            write_report(place / name, drafts.pop(name))
         report = write_comparison({name: place / name for name in flights}, place)
         progress(1, 1)
     return Result(place, figures, report)

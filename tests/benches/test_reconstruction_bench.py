@@ -15,6 +15,8 @@ SMALL = {
     "imaging.height": 240,
     "imaging.fov_deg": 50,
     "imaging.samples": 1,
+    "reconstruction.mesh_depth": 6,
+    "target.points": 60,
 }
 
 

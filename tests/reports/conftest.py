@@ -176,7 +176,7 @@ def write_metrics(folder: Path, **changes: object) -> None:
 def small_views() -> Iterator[None]:
     """Render small pictures: what is tested does not depend on their size."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("wakewise.reports.report.VIEW_PIXELS", 48)
+        patch.setattr("wakewise.reports.model.VIEW_PIXELS", 48)
         patch.setattr("wakewise.reports.compare.VIEW_PIXELS", 48)
         yield
 

@@ -147,7 +147,9 @@ class Depths:
             surface = trimesh.load(model / "mesh.ply", process=False)
             if isinstance(surface, trimesh.Trimesh) and len(surface.faces):
                 mesh = EmbreeScene()
-                TriangleMesh(mesh, surface.vertices.astype(np.float32), surface.faces.astype(np.int32))
+                # Plain arrays: trimesh's own keep a record of every element that is read.
+                vertices, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
+                TriangleMesh(mesh, vertices.astype(np.float32), faces.astype(np.int32))
                 corners = trimesh.bounds.corners(surface.bounds)
         return cls(views={view.name: view for view in views}, points_m=points, mesh=mesh, corners_m=corners)
 

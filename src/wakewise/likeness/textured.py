@@ -138,21 +138,23 @@ def vertex_colours(
         h, w = image.shape[:2]
         if abs(w * view.height - h * view.width) > 0.01 * w * view.height:
             continue  # turned since: its pixels are not where the model has them
-        pixels, depth = project(view, vertices_m)
-        pixels = pixels * np.array([w / view.width, h / view.height])
         way = vertices_m - view.p_WC_m
-        length = np.linalg.norm(way, axis=1)
-        facing = -np.sum(normals * way, axis=1) / np.maximum(length, 1e-12)
-        inside = (depth > 1e-6) & np.all((pixels > 1.0) & (pixels < np.array([w - 1.0, h - 1.0])), axis=1)
-        some = np.flatnonzero(inside & (facing > _STEEPEST_COS))
-        if not len(some):
+        length = np.sqrt(np.einsum("ij,ij->i", way, way))
+        facing = -np.einsum("ij,ij->i", normals, way) / np.maximum(length, 1e-12)
+        # What looks away is most of a mesh: it is left out before anything else is asked of it.
+        some = np.flatnonzero(facing > _STEEPEST_COS)
+        pixels, depth = project(view, vertices_m[some])
+        pixels = pixels * np.array([w / view.width, h / view.height])
+        u, v = pixels.T
+        inside = np.flatnonzero((depth > 1e-6) & (u > 1.0) & (u < w - 1.0) & (v > 1.0) & (v < h - 1.0))
+        if not len(inside):
             continue
-        start = np.ascontiguousarray(np.broadcast_to(view.p_WC_m.astype(np.float32), (len(some), 3)))
-        hit = scene.run(start, way[some].astype(np.float32), output=True)
-        some = some[np.asarray(hit["tfar"]) > 1.0 - _GAP]
-        place = (pixels[some] - 0.5).astype(np.float32)
-        colour = _sampled(srgb_decode(np.ascontiguousarray(image[..., ::-1])), place)
-        good = (facing[some] * view.focal_px / depth[some]) ** _SHARPNESS
+        start = np.ascontiguousarray(np.broadcast_to(view.p_WC_m.astype(np.float32), (len(inside), 3)))
+        hit = scene.run(start, way[some[inside]].astype(np.float32), query="DISTANCE")
+        inside = inside[np.asarray(hit) > 1.0 - _GAP]
+        some, pixels, depth = some[inside], pixels[inside], depth[inside]
+        colour = _sampled(srgb_decode(np.ascontiguousarray(image[..., ::-1])), (pixels - 0.5).astype(np.float32))
+        good = (facing[some] * view.focal_px / depth) ** _SHARPNESS
         total[some] += good[:, None] * colour
         weight[some] += good
     seen = weight > 0.0

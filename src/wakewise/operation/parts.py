@@ -21,13 +21,14 @@ from wakewise.missions import CameraAim, Route, TankBounds, aim_of, plan_route
 from wakewise.operation.foreign import described, from_outside, guarded
 from wakewise.operation.pilots import make_pilot
 from wakewise.operation.preflight import Preflight, preflight
+from wakewise.operation.regions import region_of
 from wakewise.operation.seeds import Seeds
 from wakewise.operation.surroundings import surroundings_of, tank_bounds
 from wakewise.operation.survey import found_target
 from wakewise.operation.worlds.makers import make_world
 from wakewise.planning import Surroundings
 from wakewise.tank.swaying import DRAG, Loose, Yielding
-from wakewise.targets import Region, Sway, Target, delicacy, find_target, sample_region
+from wakewise.targets import Region, Sway, Target, find_target
 from wakewise.vehicles import Vehicle
 from wakewise.wake import wake_model
 
@@ -162,9 +163,7 @@ class Parts:
     def region(self) -> Region:
         """Points that stand for the water round the target, where it is taken to be."""
         settings = self.scenario.target
-        gain = settings.delicate_gain
-        marks = delicacy(self.found_target.mesh) if gain > 0.0 else None
-        return sample_region(self.found_target, settings.points, self.seeds.region(), marks, gain)
+        return region_of(self.found_target, settings.points, self.seeds, settings.delicate_gain)
 
     @part
     def route(self) -> Route:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -233,10 +234,13 @@ def reconstruct(
     return model
 
 
-def mesh_model(out: Path, settings: ReconstructionSettings, progress: Progress = no_progress) -> StageResult:
+def mesh_model(
+    out: Path, settings: ReconstructionSettings, progress: Progress = no_progress, *, held: bool = False
+) -> StageResult:
     """Make mesh.ply of a model whose dense points are there, unless it was made of them already.
 
-    No figure of a model needs its surface, so this may come after all that does.
+    No figure of a model needs its surface, so this may come after all that does. `held`: the process that started this
+    one keeps others out of the folder.
 
     Raises
     ------
@@ -252,7 +256,7 @@ def mesh_model(out: Path, settings: ReconstructionSettings, progress: Progress =
     if not known or not dense.is_file():
         raise InputError(f"{out}: holds no dense points of a reconstruction (dense.ply, stages/dense.json)")
     spacing = 1e-3 * known["figures"]["point_spacing_mm"]
-    with alone(out):
+    with nullcontext() if held else alone(out):
         return run_stage(
             out,
             "mesh",

@@ -1,10 +1,10 @@
 """Reports: one HTML page per trial or comparison, with plots, photographs and a 3D scene; it opens with no network.
 
-Start reading in `report.py` (a trial's page, part by part) and `compare.py` (trials side by side). `trial.py` reads a
-trial's folder, `words.py` and `yardstick.py` say figures in words, `page.py` is HTML with its style and script,
-`figures.py`, `views.py`, `photos.py`, `errors.py`, `looks.py` and `scene3d.py` are the pictures, `ink.py` their
-colours. Studies have pages of their own: `wake.py` with `wake_plots.py`, `target.py`, `levers.py`, `operator.py`,
-`degradation.py`; `vehicle/` is a vehicle's.
+Start reading in `report.py` (a trial's page, part by part; `model.py` is the part of its model, `draft.py` keeps what
+is made early) and `compare.py` (trials side by side). `trial.py` reads a trial's folder, `words.py` and `yardstick.py`
+say figures in words, `page.py` is HTML with its style and script, `figures.py`, `views.py`, `photos.py`, `errors.py`,
+`looks.py` and `scene3d.py` are the pictures, `ink.py` their colours. Studies have pages of their own: `wake.py` with
+`wake_plots.py`, `target.py`, `levers.py`, `operator.py`, `degradation.py`; `vehicle/` is a vehicle's.
 """
 
 from typing import TYPE_CHECKING
@@ -13,8 +13,9 @@ from wakewise.doors import lazy_door
 
 if TYPE_CHECKING:
     from wakewise.reports.compare import write_comparison
-    from wakewise.reports.report import write_report
+    from wakewise.reports.draft import Draft
+    from wakewise.reports.report import begin_report, write_report
 
-__all__ = ["write_comparison", "write_report"]
+__all__ = ["Draft", "begin_report", "write_comparison", "write_report"]
 
 lazy_door(__name__, "reports", "photos")

@@ -12,7 +12,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from wakewise.arrays import Array, IntArray
-from wakewise.reports.errors import ModelErrors
+from wakewise.reports.errors import CloudErrors
 from wakewise.reports.ink import (
     CARD,
     CORAL,
@@ -267,7 +267,7 @@ def thrust_columns(trial: Trial) -> list[str]:
     return sorted((name for name in names if numbers[name].isdigit()), key=lambda name: int(numbers[name]))
 
 
-def error_histogram(errors: ModelErrors, narrow: bool = False) -> Figure:
+def error_histogram(errors: CloudErrors, narrow: bool = False) -> Figure:
     """How many points of the model are how far from the truth, and how much of the truth is covered how nearly."""
     figure = new_figure(*((NARROW_IN, 5.6) if narrow else (WIDTH_IN, 3.3)))
     accuracy, coverage = figure.subplots(*((2, 1) if narrow else (1, 2)))

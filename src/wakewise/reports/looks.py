@@ -56,16 +56,14 @@ def colours_html(trial: Trial) -> str:
     if not shots:
         return ""
     picks = [shots[round((i + 0.5) / SHOWN * (len(shots) - 1))] for i in range(min(SHOWN, len(shots)))]
-    depths, fit = _water(trial.folder, picks)
+    ranges, fit = _water(trial.folder, picks)
     cells = []
     for shot in picks:
         image = _read(shot.path)
         if image is None:
             continue
-        if fit is not None and depths is not None and depths.knows(shot.name, image.shape[:2]):
-            after = without_water(image, depths.ranges_m(shot.name, image.shape[:2]), fit)
-        else:
-            after = balanced(image)
+        range_m = ranges.get(shot.name)
+        after = balanced(image) if fit is None or range_m is None else without_water(image, range_m, fit)
         cells.append(_pair(shot, image, after))
     if not cells:
         return ""
@@ -96,20 +94,25 @@ def coloured_model(trial: Trial) -> tuple[Surface, Array] | None:
     return surface, srgb_encode(colours)
 
 
-def _water(folder: Path, shots: list[Photograph]) -> tuple[Depths | None, WaterFit | None]:
-    """Depths of the trial's model and the water fitted to a few photographs; None where there is no model."""
+def _water(folder: Path, shots: list[Photograph]) -> tuple[dict[str, NDArray[np.float32]], WaterFit | None]:
+    """Ranges in a few photographs by name, as the trial's model has them, and the water fitted to them.
+
+    None where there is no model, no ranges of a photograph that the model does not know.
+    """
     if not (folder / "sparse" / "images.bin").is_file():
-        return None, None
+        return {}, None
     try:
         depths = Depths.read(folder)
+        ranges: dict[str, NDArray[np.float32]] = {}
         pairs = []
         for shot in shots:
             image = _read(shot.path)
             if image is not None and depths.knows(shot.name, image.shape[:2]):
-                pairs.append((image, depths.ranges_m(shot.name, image.shape[:2])))
-        return depths, fit_water(pairs)
+                ranges[shot.name] = depths.ranges_m(shot.name, image.shape[:2])
+                pairs.append((image, ranges[shot.name]))
+        return ranges, fit_water(pairs)
     except (InputError, StageError):
-        return None, None
+        return {}, None
 
 
 def _pair(shot: Photograph, before: NDArray[np.uint8], after: NDArray[np.uint8]) -> str:

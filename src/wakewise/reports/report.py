@@ -9,31 +9,16 @@ from pathlib import Path
 from wakewise.evaluation.surface import SUCCESS_COMPLETENESS_PCT, SUCCESS_RMSE_MM
 from wakewise.files import write_text
 from wakewise.reports import figures
-from wakewise.reports.errors import ModelErrors, model_errors
-from wakewise.reports.ink import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, error_colours
-from wakewise.reports.looks import coloured_model, colours_html, film_html
-from wakewise.reports.page import (
-    absence,
-    chip,
-    error_scale,
-    fold,
-    missing,
-    panel,
-    pictures,
-    plot,
-    scene_box,
-    section,
-    tile,
-    whole_page,
-)
+from wakewise.reports.draft import Draft
+from wakewise.reports.looks import colours_html, film_html
+from wakewise.reports.model import before_colours, before_mesh, model_section
+from wakewise.reports.page import absence, fold, missing, plot, section, tile, whole_page
 from wakewise.reports.photos import contact_sheet
-from wakewise.reports.scene3d import CAMERA_RGB, HULL_RGB, PATH_RGB, PLANNED_RGB, scene_html, vehicle_of
+from wakewise.reports.scene3d import vehicle_of
 from wakewise.reports.trial import Trial, read_trial
-from wakewise.reports.views import OUTLOOK, SIDES, Frame, coverage_colours, draw_cloud, draw_surface
 from wakewise.reports.words import grouped, number, shown, unit, verdict
 from wakewise.reports.yardstick import yardstick_html
 
-VIEW_PIXELS = 360
 PARTS = (
     ("yardstick", "Yardstick"),
     ("model", "Model"),
@@ -45,8 +30,34 @@ PARTS = (
 )
 
 
-def write_report(trial: Path) -> Path:
-    """Write report.html into a trial folder and give its path.
+def begin_report(trial: Path, draft: Draft, missing: str) -> None:
+    """Make the parts of a report that can be made before its folder is whole.
+
+    Parameters
+    ----------
+    trial : Path
+    draft : Draft
+        Takes them; give it to `write_report` then.
+    missing : {"mesh", "colours"}
+        What is still being made: the mesh and its colours, or the colours alone.
+
+    Raises
+    ------
+    InputError
+        As `write_report`.
+    """
+    read = read_trial(trial)
+    _seen_photographs(read, draft)
+    _flown(read, draft)
+    _water(read, draft)
+    before_mesh(read, draft)
+    if missing == "colours":
+        before_colours(read, draft)
+        draft.once("seen", lambda: colours_html(read))
+
+
+def write_report(trial: Path, draft: Draft | None = None) -> Path:
+    """Write report.html into a trial folder and give its path; `draft` holds the parts that are made already.
 
     The page is one file that opens with no network. A part of the folder that is missing leaves a gap that says why.
 
@@ -57,20 +68,20 @@ def write_report(trial: Path) -> Path:
     """
     read = read_trial(trial)
     path = trial / "report.html"
-    write_text(path, report_page(read))
+    write_text(path, report_page(read, draft))
     return path
 
 
-def report_page(trial: Trial) -> str:
-    """HTML of the whole report."""
-    errors = model_errors(trial)
+def report_page(trial: Trial, draft: Draft | None = None) -> str:
+    """HTML of the whole report; `draft` holds the parts that are made already."""
+    draft = draft or Draft()
     calm = yardstick_html(trial)
     parts = [part for part in PARTS if calm or part[0] != "yardstick"]
     links = "".join(f'<a href="#{anchor}">{title}</a>' for anchor, title in parts)
     body = (
         f'<header class="top">{_headline(trial)}</header><nav class="parts" aria-label="parts"><div>{links}</div></nav>'
-        f"<main>{calm}{_model(trial, errors)}{_flown(trial)}{_seen(trial)}{_water(trial)}{_figures(trial)}"
-        f"{_again(trial)}</main><footer>{_footer(trial)}</footer>"
+        f"<main>{calm}{model_section(trial, draft)}{_flown(trial, draft)}{_seen(trial, draft)}"
+        f"{_water(trial, draft)}{_figures(trial)}{_again(trial)}</main><footer>{_footer(trial)}</footer>"
     )
     return whole_page(f"{trial.name} · Wakewise", body)
 
@@ -139,7 +150,11 @@ def _energy(trial: Trial) -> str:
     return "duration" if energy is None else f"{number(energy)} kJ in the thrusters"
 
 
-def _flown(trial: Trial) -> str:
+def _flown(trial: Trial, draft: Draft) -> str:
+    return draft.once("flown", lambda: _flown_section(trial))
+
+
+def _flown_section(trial: Trial) -> str:
     legs = [name for name, _, _ in figures.legs(trial)]
     orbits = len({name for name in legs if name.startswith("orbit")})
     duration = trial.metrics.number("duration_s")
@@ -166,29 +181,6 @@ def _flown(trial: Trial) -> str:
     )
 
 
-def _scene(trial: Trial, errors: ModelErrors | None, poster: str) -> str:
-    """The 3D scene, opened on the model, and what its layers are."""
-    html = scene_html(trial, errors)
-    if html is None:
-        return missing("the 3D scene", absence(trial, "steps.parquet", "images.csv", "truth.ply"))
-    legend = "".join(
-        chip("rgb({},{},{})".format(*colour), name)
-        for colour, name in (
-            (PATH_RGB, "path"),
-            (CAMERA_RGB, "photographs"),
-            (PLANNED_RGB, "planned viewpoints"),
-            (HULL_RGB, "vehicle"),
-        )
-    )
-    if errors is not None:
-        legend = error_scale("model by error (mm)") + legend
-    hint = (
-        '<span class="hint">Drag to turn, scroll to come closer. The button at the lower right switches layers on and '
-        "off: the model by its error, photographs, path, and the vehicle, which flies when you press play.</span>"
-    )
-    return scene_box(html, hint + legend, poster)
-
-
 def _leg_of(trial: Trial, time_s: float) -> str:
     """Leg on which a photograph was taken; shutters open just where an orbit begins and ends, so orbits go first."""
     near_s = 0.05
@@ -196,20 +188,30 @@ def _leg_of(trial: Trial, time_s: float) -> str:
     return next((name for name in names if name.startswith("orbit")), names[0] if names else "")
 
 
-def _seen(trial: Trial) -> str:
+def _seen_photographs(trial: Trial, draft: Draft) -> str:
+    leg_of = {i: _leg_of(trial, shot.time_s) for i, shot in enumerate(trial.photographs)}
+    return draft.once("photographs", lambda: contact_sheet(trial, leg_of))
+
+
+def _seen(trial: Trial, draft: Draft) -> str:
     if not trial.photographs:
         gap = missing("the photographs", absence(trial, "images.csv"))
         return section("seen", "What was seen", "No photographs are on record.", gap)
-    leg_of = {i: _leg_of(trial, shot.time_s) for i, shot in enumerate(trial.photographs)}
     lead = (
         f"{len(trial.photographs)} photographs in the order they were taken"
         '<span class="on-screen">; a click enlarges</span>. Sharpness is that of the target as it '
         "appears in the picture (variance of the Laplacian), so compare it between photographs of the same orbit."
     )
-    return section("seen", "What was seen", lead, contact_sheet(trial, leg_of) + colours_html(trial))
+    return section(
+        "seen", "What was seen", lead, _seen_photographs(trial, draft) + draft.once("seen", lambda: colours_html(trial))
+    )
 
 
-def _water(trial: Trial) -> str:
+def _water(trial: Trial, draft: Draft) -> str:
+    return draft.once("water", lambda: _water_section(trial))
+
+
+def _water_section(trial: Trial) -> str:
     gap = absence(trial, "steps.parquet")
     exposures = len(figures.exposure_times(trial))
     vehicle = vehicle_of(trial)
@@ -236,73 +238,6 @@ def _water(trial: Trial) -> str:
             narrow=figures.thrust_strip(trial, names, narrow=True),
         ),
     )
-
-
-def _model(trial: Trial, errors: ModelErrors | None) -> str:
-    scene = _scene(trial, errors, _poster(trial, errors))
-    if errors is None or trial.truth is None:
-        why = absence(trial, "dense.ply", "truth.ply")
-        gap = missing("the model's error", why)
-        return section("model", "The model", "There is nothing to measure.", scene + gap)
-    frame = Frame.around(trial.truth.vertices_m[errors.counts])
-    if errors.model is not None and errors.model_accuracy_m is not None:
-        colours = error_colours(errors.model_accuracy_m)
-        views = draw_surface(errors.model, colours, SIDES, frame, VIEW_PIXELS)
-    else:
-        views = draw_cloud(errors.points_m, error_colours(errors.accuracy_m), SIDES, frame, VIEW_PIXELS)
-    covered = draw_surface(
-        trial.truth, coverage_colours(errors.coverage_m, errors.counts), SIDES, frame, VIEW_PIXELS
-    )  # fmt: skip
-    aligned = "after rigid alignment to the truth" if errors.fine_aligned else "as it came, without fine alignment"
-    return section(
-        "model",
-        "The model",
-        f"How far the reconstruction is from the true surface, {aligned}. What stands less than 10 mm above the bed "
-        "does not count: sand touches it.",
-        scene
-        + _in_colour(trial)
-        + panel(
-            "Accuracy",
-            "The reconstruction, coloured by its distance to the true surface.",
-            error_scale("error (mm)", ((OVER_LIMIT, "more"),)),
-            pictures(views, SIDES, "model"),
-        )
-        + panel(
-            "Completeness",
-            "The true surface, coloured by its distance to the nearest reconstructed point.",
-            error_scale("distance (mm)", ((NOT_COVERED, "not covered"), (NOT_COUNTED, "does not count"))),
-            pictures(covered, SIDES, "true surface"),
-        )
-        + plot(
-            figures.error_histogram(errors),
-            "distribution of errors",
-            f"From {number(len(errors.points_m))} points of the cloud, thinned to one per 0.8 mm. The last bar holds "
-            "everything beyond.",
-            narrow=figures.error_histogram(errors, narrow=True),
-        ),
-    )
-
-
-def _poster(trial: Trial, errors: ModelErrors | None) -> str:
-    """The model as the 3D scene opens on it, for as long as the scene loads; empty where there is none."""
-    found = coloured_model(trial)
-    if found is None and errors is not None and errors.model is not None and errors.model_accuracy_m is not None:
-        found = errors.model, error_colours(errors.model_accuracy_m)
-    if found is None or trial.truth is None:
-        return ""
-    surface, colours = found
-    frame = Frame.around(trial.truth.vertices_m)
-    return draw_surface(surface, colours, (OUTLOOK,), frame, VIEW_PIXELS)[0]
-
-
-def _in_colour(trial: Trial) -> str:
-    found = coloured_model(trial)
-    if found is None:
-        return ""
-    surface, colours = found
-    views = draw_surface(surface, colours, SIDES, Frame.around(surface.vertices_m), VIEW_PIXELS)
-    text = "The model in the colours of its photographs, as mesh.glb has it for other programs."
-    return panel("Likeness", text, "", pictures(views, SIDES, "model in colour"))
 
 
 def _figures(trial: Trial) -> str:

@@ -67,29 +67,39 @@ def coverage_colours(coverage_m: Array, counts: BoolArray) -> Array:
     return colours
 
 
+class Drawing:
+    """A mesh that is drawn from many sides, in one or more colourings."""
+
+    def __init__(self, surface: Surface) -> None:
+        self._faces, self._normals = surface.faces, _vertex_normals(surface)
+        self._scene = rtcore_scene.EmbreeScene()
+        TriangleMesh(self._scene, surface.vertices_m.astype(np.float32), surface.faces.astype(np.int32))
+
+    def pictures(self, colours: Array, views: tuple[View, ...], frame: Frame, pixels: int) -> list[str]:
+        """PNG data URIs of the mesh, lit, with a colour per vertex, shape (n, 3); orthographic, clear background."""
+        side = pixels * int(np.sqrt(SAMPLES_PER_PIXEL))
+        step = (np.arange(side) + 0.5) / side * 2.0 - 1.0
+        across, along = (grid.reshape(-1, 1) for grid in np.meshgrid(step, -step))
+        pictures = []
+        for right, up, toward in (view.axes for view in views):
+            start = frame.centre_m + frame.radius_m * (across * right + along * up + 2.0 * toward)
+            rays = np.repeat(-toward[None].astype(np.float32), len(start), axis=0)
+            hit = self._scene.run(start.astype(np.float32), rays, output=True)
+            seen = np.flatnonzero(np.asarray(hit["primID"]) >= 0)
+            face, u, v = (np.asarray(hit[name])[seen] for name in ("primID", "u", "v"))
+            weights = np.stack([1.0 - u - v, u, v], axis=1)
+            corners = self._faces[face]
+            normals = np.einsum("nk,nkd->nd", weights, self._normals[corners])
+            image = np.zeros((side * side, 4))
+            image[seen, :3] = np.einsum("nk,nkd->nd", weights, colours[corners]) * _shade(normals, right, up, toward)
+            image[seen, 3] = 1.0
+            pictures.append(_png(image.reshape(side, side, 4), pixels))
+        return pictures
+
+
 def draw_surface(surface: Surface, colours: Array, views: tuple[View, ...], frame: Frame, pixels: int) -> list[str]:
     """PNG data URIs of a lit mesh with a colour per vertex, shape (n, 3); orthographic, clear background."""
-    side = pixels * int(np.sqrt(SAMPLES_PER_PIXEL))
-    step = (np.arange(side) + 0.5) / side * 2.0 - 1.0
-    across, along = (grid.reshape(-1, 1) for grid in np.meshgrid(step, -step))
-    vertex_normals = _vertex_normals(surface)
-    scene = rtcore_scene.EmbreeScene()
-    TriangleMesh(scene, surface.vertices_m.astype(np.float32)[surface.faces])
-    pictures = []
-    for right, up, toward in (view.axes for view in views):
-        start = frame.centre_m + frame.radius_m * (across * right + along * up + 2.0 * toward)
-        rays = np.repeat(-toward[None].astype(np.float32), len(start), axis=0)
-        hit = scene.run(start.astype(np.float32), rays, output=True)
-        seen = np.flatnonzero(np.asarray(hit["primID"]) >= 0)
-        face, u, v = (np.asarray(hit[name])[seen] for name in ("primID", "u", "v"))
-        weights = np.stack([1.0 - u - v, u, v], axis=1)
-        corners = surface.faces[face]
-        normals = np.einsum("nk,nkd->nd", weights, vertex_normals[corners])
-        image = np.zeros((side * side, 4))
-        image[seen, :3] = np.einsum("nk,nkd->nd", weights, colours[corners]) * _shade(normals, right, up, toward)
-        image[seen, 3] = 1.0
-        pictures.append(_png(image.reshape(side, side, 4), pixels))
-    return pictures
+    return Drawing(surface).pictures(colours, views, frame, pixels)
 
 
 def draw_cloud(points_m: Array, colours: Array, views: tuple[View, ...], frame: Frame, pixels: int) -> list[str]:

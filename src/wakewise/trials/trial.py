@@ -7,7 +7,7 @@ import io
 import json
 import platform
 from collections.abc import Callable, Mapping
-from contextlib import suppress
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,6 @@ from wakewise.evaluation import SWAY_FIGURES, Crop, evaluate_surface, flight_fig
 from wakewise.extras import need
 from wakewise.files import write_json, write_text
 from wakewise.geometry import matrix_from_quat
-from wakewise.likeness.textured import write_textured
 from wakewise.missions import SETTLING
 from wakewise.operation import (
     Darkroom,
@@ -37,10 +36,11 @@ from wakewise.operation import (
 from wakewise.operation.flying import FLIGHT_JOBS
 from wakewise.operation.photography import moved_m
 from wakewise.processes import alone
-from wakewise.reconstruction import mesh_model, read_cloud, read_lens, reconstruct
+from wakewise.reconstruction import read_cloud, read_lens, reconstruct
 from wakewise.targets import Mesh, write_mesh
 from wakewise.trials.metrics import Figures, Gathering, comparison
 from wakewise.trials.stages import Ledger, Quiet, Watch, of_the_computer
+from wakewise.trials.surface import SurfaceMaker
 from wakewise.trials.yardstick import add_yardsticks
 from wakewise.warming import is_warm, warm
 
@@ -75,7 +75,11 @@ REGION_SHARE = 1.25
 
 
 def run_trial(
-    flight: Parts | Scenario, folder: Path, watch: Watch | None = None, told: Callable[[Figures], None] | None = None
+    flight: Parts | Scenario,
+    folder: Path,
+    watch: Watch | None = None,
+    told: Callable[[Figures], None] | None = None,
+    meanwhile: Callable[[str], None] | None = None,
 ) -> Figures:
     """Run what is left of a trial and return its figures, which are the content of metrics.json.
 
@@ -83,6 +87,9 @@ def run_trial(
     ----------
     told : callable, optional
         Called with the figures as soon as they are known and written, before the mesh and its colours are made.
+    meanwhile : callable, optional
+        With it another process makes them: called with "mesh" while that makes the mesh, and with "colours" while it
+        makes its colours; not called where they are there already or there is no such process.
 
     Raises
     ------
@@ -102,16 +109,16 @@ def run_trial(
             warm(JOBS, progress)
     _ = parts.preflight
     claim(folder, scenario)
-    with alone(folder):
-        result = _figures(parts, scenario, folder, watch)
+    with alone(folder), SurfaceMaker(folder, scenario.reconstruction, parts.target.bed_z_m) as surface:
+        result = _figures(parts, scenario, folder, watch, surface.ready if meanwhile is not None else lambda: None)
         if told is not None:
             told(result)
-        _surface(parts, folder, watch)
+        surface.make(watch, meanwhile)
         return result
 
 
-def _figures(parts: Parts, scenario: Scenario, folder: Path, watch: Watch) -> Figures:
-    """Run the stages that figures come from and write metrics.json."""
+def _figures(parts: Parts, scenario: Scenario, folder: Path, watch: Watch, modelled: Callable[[], None]) -> Figures:
+    """Run the stages that figures come from and write metrics.json; `modelled` is called when the model is there."""
     ledger = Ledger(folder / "stages.json")
 
     def stage(name: str, product: str, work: Callable[[Callable[..., None]], None]) -> None:
@@ -127,6 +134,7 @@ def _figures(parts: Parts, scenario: Scenario, folder: Path, watch: Watch) -> Fi
         stage("fly", "steps.parquet", lambda progress: fly_trial(parts, folder, progress, darkroom.take))
         stage("photograph", "images.csv", lambda progress: _photograph(parts, folder, darkroom, progress))
     stage("reconstruct", "model.json", lambda progress: reconstruct_trial(parts, folder, progress))
+    modelled()
     stage("evaluate", "score.json", lambda _: write_json(folder / "score.json", evaluate_trial(parts, folder)))
     figures = json.loads((folder / "score.json").read_text(encoding="utf-8"))
     gathering = Gathering(figures=figures["figures"], reasons=figures["reasons"])
@@ -145,28 +153,24 @@ def _photograph(parts: Parts, folder: Path, darkroom: Darkroom, progress: Callab
     photograph_flight(parts, folder, progress)
 
 
-def _surface(parts: Parts, folder: Path, watch: Watch) -> None:
-    """Mesh and colours: for people only, so after the figures and no part of what the trial is said to have cost."""
-    settings, mesh, coloured = parts.scenario.reconstruction, folder / "mesh.ply", folder / "mesh.glb"
-    if not settings.mesh or not (folder / "dense.ply").exists():
-        return
-    if mesh.exists() and mesh.stat().st_mtime >= (folder / "dense.ply").stat().st_mtime:
-        watch.skipped("mesh")
-    else:
-        with watch.stage("mesh") as progress, suppress(StageError):
-            mesh_model(folder, settings, progress)
-    if coloured.exists() and mesh.exists() and coloured.stat().st_mtime >= mesh.stat().st_mtime:
-        watch.skipped("colours")
-    elif mesh.exists():
-        with watch.stage("colours") as progress:
-            texture_trial(parts, folder, progress)
+def compare_methods(
+    flights: Mapping[str, Parts | Scenario],
+    folder: Path,
+    watch: Watch | None = None,
+    meanwhile: Callable[[str, str], None] | None = None,
+) -> Figures:
+    """Run one trial per method, each in its own folder, and set their figures side by side (comparison.json).
 
-
-def compare_methods(flights: Mapping[str, Parts | Scenario], folder: Path, watch: Watch | None = None) -> Figures:
-    """Run one trial per method, each in its own folder, and set their figures side by side (comparison.json)."""
+    `meanwhile` is that of `run_trial`, with the method's name before.
+    """
     for flight in flights.values():  # what does not fit is refused before the first of them flies
         _ = (flight if isinstance(flight, Parts) else flight.parts()).preflight
-    result = comparison({name: run_trial(flight, folder / name, watch) for name, flight in flights.items()})
+    result = comparison(
+        {
+            name: run_trial(flight, folder / name, watch, None, None if meanwhile is None else partial(meanwhile, name))
+            for name, flight in flights.items()
+        }
+    )
     write_json(folder / "comparison.json", result)
     return result
 
@@ -260,13 +264,6 @@ def _forget_what_was_not_measured(folder: Path) -> None:
     if path.exists() and of_the_computer(json.loads(path.read_text(encoding="utf-8"))["failure"]):
         (folder / "score.json").unlink(missing_ok=True)
         path.unlink()
-
-
-def texture_trial(parts: Parts, folder: Path, progress: Callable[..., None]) -> None:
-    """Write the model in the photographs' colours (mesh.glb), for people; a mesh that no photograph sees gets none."""
-    bed_z_m = parts.target.bed_z_m
-    with suppress(StageError):
-        write_textured(folder, folder / "images", folder / "mesh.glb", bed_z_m=bed_z_m, progress=progress)
 
 
 def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:

@@ -1,0 +1,58 @@
+"""A region is drawn once: what it follows from is its shape, place, number of points, seed and gain, all of it."""
+
+import numpy as np
+import pytest
+
+from wakewise.operation import regions
+from wakewise.operation.regions import MOST_KEPT, region_of
+from wakewise.operation.seeds import Seeds
+from wakewise.targets import Mesh, place_on_bed, sample_region
+
+POINTS = 6
+
+
+def pyramid(height_m=0.1, bed_z_m=1.0):
+    """Four sides on a square of 0.1 m."""
+    corners = np.array([[-0.05, -0.05, 0], [0.05, -0.05, 0], [0.05, 0.05, 0], [-0.05, 0.05, 0], [0, 0, height_m]])
+    faces = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [0, 2, 1], [0, 3, 2]])
+    return place_on_bed("pyramid", Mesh(corners, faces), bed_z_m)
+
+
+@pytest.fixture(autouse=True)
+def nothing_kept(monkeypatch):
+    monkeypatch.setattr(regions, "_kept", {})
+
+
+def test_the_kept_region_is_the_one_that_would_be_drawn():
+    """To the bit, the first time and from memory, of another object of the same shape."""
+    drawn = sample_region(pyramid(), POINTS, Seeds(3).region())
+    first, again = (region_of(pyramid(), POINTS, Seeds(3)) for _ in range(2))
+    assert again is first
+    for name in ("points_W_m", "weights", "distance_m"):
+        assert np.array_equal(getattr(first, name), getattr(drawn, name))
+        assert not getattr(first, name).flags.writeable
+
+
+def test_any_change_of_what_it_follows_from_draws_anew(monkeypatch):
+    """Shape, depth, number of points, seed and gain each have their own."""
+    monkeypatch.setattr(regions, "sample_region", lambda *_: object())
+    asked = [
+        (pyramid(), POINTS, Seeds(0), 0.0),
+        (pyramid(0.11), POINTS, Seeds(0), 0.0),
+        (pyramid(bed_z_m=1.1), POINTS, Seeds(0), 0.0),
+        (pyramid(), POINTS + 1, Seeds(0), 0.0),
+        (pyramid(), POINTS, Seeds(1), 0.0),
+        (pyramid(), POINTS, Seeds(0), 2.0),
+    ]
+    found = [region_of(*each) for each in asked]
+    assert len({id(region) for region in found}) == len(asked)
+    assert all(region_of(*each) is region for each, region in zip(asked, found, strict=True))
+
+
+def test_the_oldest_goes_first(monkeypatch):
+    """Memory is bounded; what was asked for again has become the youngest."""
+    drawn = []
+    monkeypatch.setattr(regions, "sample_region", lambda target, points, *_: drawn.append(points) or object())
+    for points in (*range(MOST_KEPT), 0, MOST_KEPT, 0, 1):
+        region_of(pyramid(), points, Seeds(0))
+    assert drawn == [*range(MOST_KEPT), MOST_KEPT, 1]
