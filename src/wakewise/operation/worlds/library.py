@@ -1,7 +1,8 @@
 """Worlds by name: what the water, the bed, the target and the vehicle's secrets are like where users have the trouble.
 
 Each is a YAML file: why it is flown, and fields of a scenario, each with a value, or a range from which the seed draws,
-and the source of the number. A world lies over a preset and under what the user says.
+and the source of the number; `_every.yaml` holds what all of them draw. A world lies over a preset and under what the
+user says.
 """
 
 from __future__ import annotations
@@ -76,7 +77,8 @@ class NamedWorld:
 def world_names() -> tuple[str, ...]:
     """Names of the worlds that come with the package, sorted."""
     folder = resources.files("wakewise.operation.worlds") / "library_data"
-    return tuple(sorted(e.name.removesuffix(".yaml") for e in folder.iterdir() if e.name.endswith(".yaml")))
+    names = (e.name.removesuffix(".yaml") for e in folder.iterdir() if e.name.endswith(".yaml"))
+    return tuple(sorted(name for name in names if not name.startswith("_")))
 
 
 @functools.cache
@@ -92,8 +94,12 @@ def load_world(name: str) -> NamedWorld:
         close = difflib.get_close_matches(name, world_names(), 1)
         hint = f"did you mean {close[0]}? " if close else ""
         raise InputError(f"world '{name}': not in the library, {hint}allowed are {', '.join(world_names())}")
-    text = (resources.files("wakewise.operation.worlds") / "library_data" / f"{name}.yaml").read_text("utf-8")
-    return parse_world(name, text)
+    every, own = parse_world("_every", _text("_every")).file, parse_world(name, _text(name)).file
+    return NamedWorld(name=name, file=own.model_copy(update={"fields": every.fields | own.fields}))
+
+
+def _text(name: str) -> str:
+    return (resources.files("wakewise.operation.worlds") / "library_data" / f"{name}.yaml").read_text("utf-8")
 
 
 def parse_world(name: str, text: str) -> NamedWorld:
