@@ -32,7 +32,7 @@ def test_body_and_tilt_put_the_camera_where_the_route_wants_it(time_s, vehicle, 
     X_WC = ROUTE.body(time_s, aim).X_WB @ vehicle.X_BC_at(tilt)
     wished, _, _ = ROUTE.camera(time_s)
     assert X_WC.p_m == pytest.approx(wished.p_m, abs=1e-12)
-    assert X_WC.R == pytest.approx(wished.R, abs=1e-12)
+    assert pytest.approx(wished.R, abs=1e-12) == X_WC.R
 
 
 def away_from_corners(time_s: float, aim: CameraAim) -> bool:
@@ -99,7 +99,9 @@ def test_the_pilot_tells_the_wished_tilt() -> None:
 
 def test_what_the_joint_cannot_do_is_said_beforehand() -> None:
     """A tilt beyond the stops, a joint that is too slow, and a joint that is not there: one line each."""
-    with pytest.raises(InputError, match=r"mission.aim: tilt, on leg 'climb to orbit 60 deg' .* -45 and 45 deg: take both"):
+    with pytest.raises(
+        InputError, match=r"mission.aim: tilt, on leg 'climb to orbit 60 deg' .* -45 and 45 deg: take both"
+    ):
         check_tilt(ROUTE, aim_of(HEAVY, "tilt"), stops_suffice=True)
     check_tilt(ROUTE, aim_of(HEAVY, "both"))
     slow = replace(HEAVY, tilt=replace(HEAVY.tilt, rate_rad_s=math.radians(2.0)))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wakewise.errors import InputError
-from wakewise.vehicles import DragCase, drag_coefficients, draft_yaml, load_draft, load_vehicle, with_drag
+from wakewise.vehicles import DragCase, draft_yaml, drag_coefficients, load_draft, load_vehicle, with_drag
 from wakewise.vehicles.library import parse_vehicle
 
 HOVER_M_S = 0.036
@@ -64,8 +64,12 @@ def test_a_case_that_is_not_there_is_refused() -> None:
         with_drag(load_vehicle("paper"), "bx")
     with pytest.raises(InputError, match="drag_cases: drawn is not a name"):
         DragCase(
-            name="drawn", source="x", estimate=False, linear_damping=np.zeros((6, 6)), quadratic_damping=np.zeros((6, 6))
+            name="drawn",
+            source="x",
+            estimate=False,
+            linear_damping=np.zeros((6, 6)),
+            quadratic_damping=np.zeros((6, 6)),
         )
     text = draft_yaml(load_draft("bluerov2-heavy"))
-    with pytest.raises(InputError, match="drag_cases.wu-2018"):
+    with pytest.raises(InputError, match=r"drag_cases\.wu-2018"):
         parse_vehicle(text.replace("quadratic_N_s2_m2: [18.18, 21.66, 36.99]", ""), "x.yaml", "x")

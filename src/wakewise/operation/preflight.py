@@ -32,8 +32,9 @@ def preflight(parts: Parts) -> Preflight:
     Raises
     ------
     InputError
-        A tilt beyond the camera's stops or faster than its joint, an orbit that would touch something, a start from which no plan can be good, a current faster than the vehicle
-        can hold, failures or a cable that do not fit; what and where is named.
+        A tilt beyond the camera's stops or faster than its joint, an orbit that would touch something, a start from
+        which no plan can be good, a current faster than the vehicle can hold, failures or a cable that do not fit; what
+        and where is named.
     """
     scenario, vehicle, route = parts.scenario, parts.vehicle, parts.route
     check_tilt(route, parts.aim, stops_suffice=scenario.mission.aim == "tilt")

@@ -162,7 +162,7 @@ class Vehicle:
         """What each thruster can hold, the same for all; None where thrust is continuous through zero."""
         return thrust_steps(self.curve, self.least_thrust)
 
-    def X_BC_at(self, tilt_rad: float) -> Pose:  # noqa: N802  (a pose, in monogram notation)
+    def X_BC_at(self, tilt_rad: float) -> Pose:
         """Camera mount at an angle of the tilt joint; the mount itself where the camera is fixed."""
         return self.X_BC if self.tilt is None else self.tilt.mount(self.X_BC, tilt_rad)
 
