@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 from wakewise.errors import InputError
-from wakewise.vehicles import DragCase, draft_yaml, drag_coefficients, load_draft, load_vehicle, with_drag
+from wakewise.vehicles import (
+    DragCase,
+    draft_yaml,
+    drag_coefficients,
+    load_draft,
+    load_vehicle,
+    possible_drags,
+    with_drag,
+)
 from wakewise.vehicles.library import parse_vehicle
 
 HOVER_M_S = 0.036
@@ -56,6 +64,13 @@ def test_without_cases_a_draw_is_the_believed_drag() -> None:
     """There is nothing else to draw."""
     rexrov = load_vehicle("rexrov")
     assert with_drag(rexrov, "drawn", np.random.default_rng(1)) is rexrov
+
+
+def test_what_may_be_drawn_is_told() -> None:
+    """All sets for `drawn`, else the one that is named."""
+    paper = load_vehicle("paper")
+    assert possible_drags(paper, "drawn") == ("as-believed", "box", "von-benzon")
+    assert possible_drags(paper, "box") == ("box",)
 
 
 def test_a_case_that_is_not_there_is_refused() -> None:

@@ -13,6 +13,7 @@ from wakewise.operation.surroundings import surroundings_of
 from wakewise.planning import check_start, state_of
 from wakewise.tank import Holding, holding, tank_ambient
 from wakewise.tank.preflight import check_fit
+from wakewise.vehicles import possible_drags, with_drag
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
@@ -82,7 +83,7 @@ def check_begin(parts: Parts) -> None:
 
 
 def check_current(parts: Parts, looks: int = 200) -> Holding | None:
-    """Hold the water that passes the vehicle along its route against what its thrusters can give.
+    """Hold the water that passes the vehicle along its route against what its thrusters can give, with its worst drag.
 
     Raises
     ------
@@ -102,7 +103,10 @@ def check_current(parts: Parts, looks: int = 200) -> Holding | None:
         passing.append(current @ wished.X_WB.R - wished.nu_B[:3])
     apart = tank.mismatch
     trim_N = apart.trim_range_N if apart.trim_N is None else apart.trim_N
-    found = holding(vehicle, np.array(passing), tank.density_kg_m3, trim_N)
+    flows = np.array(passing)
+    drags = (with_drag(vehicle, case) for case in possible_drags(vehicle, apart.drag))
+    held = [h for h in (holding(v, flows, tank.density_kg_m3, trim_N) for v in drags) if h is not None]
+    found = min(held, key=lambda h: h.share, default=None)
     if found is not None and found.share < 1.0:
         raise InputError(f"tank: {vehicle.name} cannot hold its route, {found.said()}")
     return found

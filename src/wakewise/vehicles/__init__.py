@@ -22,7 +22,7 @@ from wakewise.vehicles.check import (
 )
 from wakewise.vehicles.describe import check_report, describe, summary_line
 from wakewise.vehicles.draft import ThrusterDraft, VehicleDraft
-from wakewise.vehicles.drag import drag_coefficients, with_drag
+from wakewise.vehicles.drag import drag_coefficients, possible_drags, with_drag
 from wakewise.vehicles.dynamics import (
     RigidBody,
     acceleration,
@@ -83,6 +83,7 @@ __all__ = [
     "pack_bodies",
     "parameters",
     "perturbed",
+    "possible_drags",
     "restoring_wrench",
     "step_batch",
     "step_rk4",
