@@ -48,9 +48,9 @@ class BodyState:
 class Measurement:
     """What the sensors said at one instant. A sensor that was silent is None.
 
-    `tilt_rad` is the angle of the camera's joint; `X_WB` is a camera-based pose, `p_WB_m` a position from optical tracking, shape (3,), `omega_B_rad_s` the gyro and
+    `X_WB` is a camera-based pose, `p_WB_m` a position from optical tracking, shape (3,), `omega_B_rad_s` the gyro and
     `force_B_m_s2` the accelerometer (specific force: -g when at rest), both at the body origin, shape (3,), `depth_m`
-    the pressure sensor (positive down).
+    the pressure sensor (positive down), `tilt_rad` the angle of the camera's joint.
     """
 
     time_s: float

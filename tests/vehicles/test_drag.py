@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 from wakewise.errors import InputError
-from wakewise.vehicles import DragCase, draft_yaml, drag_coefficients, load_draft, load_vehicle, with_drag
+from wakewise.vehicles import (
+    DragCase,
+    draft_yaml,
+    drag_coefficients,
+    load_draft,
+    load_vehicle,
+    possible_drags,
+    with_drag,
+)
 from wakewise.vehicles.library import parse_vehicle
 
 HOVER_M_S = 0.036
@@ -58,6 +66,13 @@ def test_without_cases_a_draw_is_the_believed_drag() -> None:
     assert with_drag(rexrov, "drawn", np.random.default_rng(1)) is rexrov
 
 
+def test_what_may_be_drawn_is_told() -> None:
+    """All sets for `drawn`, else the one that is named."""
+    paper = load_vehicle("paper")
+    assert possible_drags(paper, "drawn") == ("as-believed", "box", "von-benzon")
+    assert possible_drags(paper, "box") == ("box",)
+
+
 def test_a_case_that_is_not_there_is_refused() -> None:
     """One line tells which there are; reserved names and damping that pushes are refused in the file."""
     with pytest.raises(InputError, match=r"tank.mismatch.drag: 'bx', paper .* as-believed, box, von-benzon, drawn"):
@@ -71,5 +86,5 @@ def test_a_case_that_is_not_there_is_refused() -> None:
             quadratic_damping=np.zeros((6, 6)),
         )
     text = draft_yaml(load_draft("bluerov2-heavy"))
-    with pytest.raises(InputError, match="drag_cases.wu-2018"):
+    with pytest.raises(InputError, match=r"drag_cases\.wu-2018"):
         parse_vehicle(text.replace("quadratic_N_s2_m2: [18.18, 21.66, 36.99]", ""), "x.yaml", "x")

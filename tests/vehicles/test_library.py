@@ -24,7 +24,7 @@ def shipped(name: str) -> str:
 def test_the_library_holds_the_cited_sets_and_knows_which_can_fly() -> None:
     assert draft_names() == (
         *("bluerov2", "bluerov2-abir", "bluerov2-gazebo", "bluerov2-heavy", "bluerov2-heavy-gazebo"),
-        *("bluerov2-heavy-wu", "orca", "paper", "paper-six-thrusters", "paper-tilting", "rexrov"),
+        *("bluerov2-heavy-wu", "orca", "paper", "paper-six-thrusters", "paper-tilting", "rexrov", "soft-thrusters"),
     )
     assert vehicle_names() == [name for name in draft_names() if name != "orca"]
     assert vehicle_names(flyable_only=False) == list(draft_names())
@@ -96,6 +96,21 @@ def test_six_of_the_papers_eight_thrusters_are_the_papers_in_all_else() -> None:
     assert np.array_equal(six.allocation_matrix, paper.allocation_matrix[:, [0, 1, 2, 3, 4, 7]])
     assert six.mass_kg == paper.mass_kg
     assert np.array_equal(six.hydrodynamics.added_mass, paper.hydrodynamics.added_mass)
+
+
+def test_the_soft_vehicle_has_slow_jets_and_flies() -> None:
+    """At equal thrust its jets leave at three tenths of the speed; no disk meets another or sits outside the box."""
+    soft, paper = load_vehicle("soft-thrusters"), load_vehicle("paper")
+    speeds = np.sqrt(1.0 / np.array([v.disk_areas_m2[0] for v in (soft, paper)]))
+    assert speeds[0] / speeds[1] == pytest.approx(0.3)
+    assert soft.least_thrusts_N == (0.02, 0.02)
+    places = soft.thruster_positions_B_m
+    apart = np.linalg.norm(places[:, None] - places[None], axis=2)[np.triu_indices(8, 1)]
+    assert apart.min() > 0.17  # disks that stand across each other
+    assert np.linalg.norm(places[:4, None, :] - places[None, :4], axis=2)[np.triu_indices(4, 1)].min() > 0.2
+    assert np.linalg.norm(places[4:, None, :] - places[None, 4:], axis=2)[np.triu_indices(4, 1)].min() > 0.2
+    assert np.all(np.abs(places) + 0.0 <= 0.5 * soft.size_m)
+    assert np.linalg.matrix_rank(soft.allocation_matrix) == 6
 
 
 def test_a_file_may_stand_on_another_of_the_library() -> None:

@@ -58,8 +58,8 @@ def run_loop(
     """Run the loop for `duration_s` at a fixed step.
 
     At each step the estimate of now, which is all a controller may know, meets the goal of now; the resulting thrusts
-    are held for `dt_s`. `start` is the first guess of the estimator, `tilt_rad` the camera's tilt before it is measured.
-    Solve times are thread CPU.
+    are held for `dt_s`. `start` is the first guess of the estimator, `tilt_rad` that of the camera's tilt. Solve times
+    are thread CPU.
     """
     control_state, filter_state = controller.init(), estimator.init(start)
     estimate, thrusts, aim = start, np.zeros(thrusters), getattr(plant, "aim", None)

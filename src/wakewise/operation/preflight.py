@@ -14,6 +14,7 @@ from wakewise.planning import check_start, state_of
 from wakewise.tank import Holding, holding, tank_ambient
 from wakewise.tank.preflight import check_fit
 from wakewise.tank.swaying import check_sway
+from wakewise.vehicles import possible_drags, with_drag
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
@@ -33,8 +34,9 @@ def preflight(parts: Parts) -> Preflight:
     Raises
     ------
     InputError
-        A tilt beyond the camera's stops or faster than its joint, an orbit that would touch something, a start from which no plan can be good, a current faster than the vehicle
-        can hold, failures or a cable that do not fit; what and where is named.
+        A tilt beyond the camera's stops or faster than its joint, an orbit that would touch something, a start from
+        which no plan can be good, a current faster than the vehicle can hold, failures or a cable that do not fit; what
+        and where is named.
     """
     scenario, vehicle, route = parts.scenario, parts.vehicle, parts.route
     check_tilt(route, parts.aim, stops_suffice=scenario.mission.aim == "tilt")
@@ -102,9 +104,10 @@ def check_begin(parts: Parts) -> None:
 
 
 def check_current(parts: Parts, looks: int = 200) -> Holding | None:
-    """Hold the water that passes the vehicle along its route against what its thrusters can give.
+    """Hold the water that passes the vehicle along its route against what its thrusters can give, with its worst drag.
 
-    The drag is the worst that the plant may have: above the believed one by all of `tank.mismatch.damping_pct`.
+    The drag is the worst that the plant may have: of any case that may be drawn, and all of `tank.mismatch.damping_pct`
+    above it.
 
     Raises
     ------
@@ -124,7 +127,10 @@ def check_current(parts: Parts, looks: int = 200) -> Holding | None:
         passing.append(current @ wished.X_WB.R - wished.nu_B[:3])
     apart = tank.mismatch
     trim_N = apart.trim_range_N if apart.trim_N is None else apart.trim_N
-    found = holding(vehicle, np.array(passing), tank.density_kg_m3, trim_N, 0.01 * apart.damping_pct)
+    flows, more = np.array(passing), 0.01 * apart.damping_pct
+    drags = (with_drag(vehicle, case) for case in possible_drags(vehicle, apart.drag))
+    held = [h for h in (holding(v, flows, tank.density_kg_m3, trim_N, more) for v in drags) if h is not None]
+    found = min(held, key=lambda h: h.share, default=None)
     if found is not None and found.share < 1.0:
         raise InputError(f"tank: {vehicle.name} cannot hold its route, {found.said()}")
     return found

@@ -7,7 +7,8 @@ per cited source; `vehicle_file.py` and `draft.py` read them). `dynamics.py` has
 (`fossen.py` the readable matrices, `kernels.py`, `runge_kutta.py`, `semi_implicit.py` the compiled steps,
 `jacobians.py` their derivatives, `batch.py` many vehicles at once), `check.py` and `mixing.py` rank, null space and
 wrong signs in shipped matrices, `describe.py` and `parameters.py` all of it in words, `perturbation.py` the vehicle
-that the tank flies, `drag.py` its drag as other sources have it, `tilt.py` the joint of its camera. Thrusters are a room below, files of other projects the room `importers`.
+that the tank flies, `drag.py` its drag as other sources have it, `tilt.py` the joint of its camera. Thrusters are a
+room below, files of other projects the room `importers`.
 """
 
 from wakewise.vehicles.batch import pack_bodies, step_batch
@@ -21,7 +22,7 @@ from wakewise.vehicles.check import (
 )
 from wakewise.vehicles.describe import check_report, describe, summary_line
 from wakewise.vehicles.draft import ThrusterDraft, VehicleDraft
-from wakewise.vehicles.drag import drag_coefficients, with_drag
+from wakewise.vehicles.drag import drag_coefficients, possible_drags, with_drag
 from wakewise.vehicles.dynamics import (
     RigidBody,
     acceleration,
@@ -82,6 +83,7 @@ __all__ = [
     "pack_bodies",
     "parameters",
     "perturbed",
+    "possible_drags",
     "restoring_wrench",
     "step_batch",
     "step_rk4",

@@ -12,6 +12,22 @@ from wakewise.vehicles.hydrodynamics import AS_BELIEVED, DRAWN
 from wakewise.vehicles.vehicle import Vehicle
 
 
+def possible_drags(vehicle: Vehicle, case: str) -> tuple[str, ...]:
+    """Names of the sets of drag that a choice may come to: all there are for `drawn`, else the one that it names.
+
+    Raises
+    ------
+    InputError
+        If the vehicle has no such case.
+    """
+    names = (AS_BELIEVED, *(c.name for c in vehicle.drag_cases))
+    if case not in (*names, DRAWN):
+        raise InputError(
+            f"tank.mismatch.drag: {case!r}, {vehicle.name} has no such case, allowed {', '.join((*names, DRAWN))}"
+        )
+    return names if case == DRAWN else (case,)
+
+
 def with_drag(vehicle: Vehicle, case: str, rng: np.random.Generator | None = None) -> Vehicle:
     """The vehicle with the drag of a case: its name, `as-believed`, or `drawn`, which takes one of all, each alike.
 
@@ -20,13 +36,8 @@ def with_drag(vehicle: Vehicle, case: str, rng: np.random.Generator | None = Non
     InputError
         If the vehicle has no such case.
     """
-    names = (AS_BELIEVED, *(c.name for c in vehicle.drag_cases))
-    if case == DRAWN:
-        case = names[int((rng or np.random.default_rng(0)).integers(len(names)))]
-    if case not in names:
-        raise InputError(
-            f"tank.mismatch.drag: {case!r}, {vehicle.name} has no such case, allowed {', '.join((*names, DRAWN))}"
-        )
+    names = possible_drags(vehicle, case)
+    case = names[int((rng or np.random.default_rng(0)).integers(len(names)))]
     if case == AS_BELIEVED:
         return vehicle
     chosen = next(c for c in vehicle.drag_cases if c.name == case)

@@ -10,7 +10,7 @@ from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
 
 AS_BELIEVED, DRAWN = "as-believed", "drawn"
-"""What a true vehicle's drag is called besides its cases by name: the believed set, and one of all that a seed draws."""
+"""What a true vehicle's drag is called besides its cases by name: the believed set, and one of all, drawn."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
