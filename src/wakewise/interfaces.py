@@ -321,7 +321,11 @@ class Posture:
 
 
 class Witness(Protocol):
-    """Knows the truth of a simulated world; there is none at sea."""
+    """Knows the truth of a simulated world; there is none at sea.
+
+    Beside what follows it may have `posture()`, which gives how a soft or a loose target stands now, a `Posture`, or
+    None of one that nothing moves.
+    """
 
     def observe(self) -> Truth:
         """Vehicle, thrusters and collisions now."""

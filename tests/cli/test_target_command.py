@@ -88,3 +88,17 @@ def test_an_unknown_target_is_refused(capsys, tmp_path):
     """Neither a coral's name nor a file."""
     assert run(["target", "show", str(tmp_path / "nothing.ply")]) == 2
     assert "no such file" in capsys.readouterr().err
+
+
+def test_a_soft_target_tells_how_it_bends(ball, capsys):
+    """Stems, frequency and the tip's way in four streams, which grows with the stream; a file's mesh has none of it."""
+    assert run(["target", "show", "gorgonian", "--points", "20", "--json"]) == 0
+    sway = json.loads(capsys.readouterr().out)["sway"]
+    assert sway["stems"] == 1
+    assert 0.5 < sway["frequency_Hz"] < 2.0
+    ways = list(sway["tip_mm"].values())
+    assert ways == sorted(ways)
+    assert ways[1] / ways[0] == pytest.approx(81.0, rel=0.05)  # drag goes with the square, as long as little bends
+    assert ways[3] / ways[1] < 25.0
+    assert run(["target", "show", str(ball), "--points", "20", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["sway"] is None

@@ -5,7 +5,7 @@ import polars as pl
 import pytest
 
 from wakewise.errors import InputError
-from wakewise.evaluation import flight_figures
+from wakewise.evaluation import SWAY_FIGURES, flight_figures
 from wakewise.evaluation.flight import path_distance, rising_edges, roll_pitch_rms_deg, sign_flips
 from wakewise.geometry import quat_from_euler
 
@@ -88,3 +88,24 @@ def test_missing_columns_give_none_and_no_rows_an_error():
         flight_figures(pl.DataFrame({"x": [1]}))
     with pytest.raises(InputError, match="grow"):
         flight_figures(pl.DataFrame({"time_s": [0.0, 0.0]}))
+
+
+def test_sway_is_judged_at_the_shutter_and_its_peaks_over_all():
+    """Root mean square, mean shape and the spread about it over exposures; peaks and the way slid over the flight."""
+    n = 400
+    swing = np.where(np.arange(n) % 2 == 0, 0.001, 0.003)
+    exposing = np.arange(n) % 10 < 2  # one of each, so that the mean is 2 mm
+    columns = {
+        "sway_m": 1.5 * swing, "sway_peak_m": 4.0 * swing + (np.arange(n) == 7) * 0.1, "sway_x_m": swing,
+        "sway_y_m": 0.0 * swing, "sway_z_m": 0.0 * swing, "target_stress_Pa": 1e6 * swing,
+        "shifted_m": np.linspace(0.0, 0.02, n),
+    }  # fmt: skip
+    figures = flight_figures(table(exposing=exposing, **columns))
+    assert figures["sway_rms_mm"] == pytest.approx(1.5 * np.sqrt(5.0))
+    assert figures["sway_mean_mm"] == pytest.approx(2.0)
+    assert figures["sway_about_mean_mm"] == pytest.approx(1.0)
+    assert figures["sway_peak_mm"] == pytest.approx(112.0)
+    assert figures["target_stress_peak_Pa"] == pytest.approx(3e3)
+    assert figures["shifted_mm"] == pytest.approx(20.0)
+    rigid = flight_figures(table(exposing=exposing))
+    assert all(rigid[key] is None for key in SWAY_FIGURES)

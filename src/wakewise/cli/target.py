@@ -128,7 +128,8 @@ def show(
     typer.echo(f"region: {facts['region_on_surface']} points on the surface, {points} in all")
     if isinstance(sway := facts["sway"], dict):
         bends = ", ".join(f"{way:.2g} at {speed}" for speed, way in sway["tip_mm"].items())
-        typer.echo(f"sways: {sway['stems']} of its own, from {sway['frequency_Hz']:.2g} Hz; tip (mm, at m/s): {bends}")
+        stems = f"{sway['stems']} stem{'s' if sway['stems'] != 1 else ''}"
+        typer.echo(f"sways: {stems}, from {sway['frequency_Hz']:.2g} Hz; tip in a stream of m/s (mm): {bends}")
     if out is not None:
         typer.echo(f"written: {out}")
 
