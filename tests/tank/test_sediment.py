@@ -196,7 +196,7 @@ def test_a_fluctuating_stress_lifts_what_its_mean_does_not():
 
 def test_fluff_goes_first_and_the_firm_layer_stays():
     """Between the two thresholds all the fluff leaves, no firm grain; above both, the firm layer erodes too."""
-    laws = SiltLaws.of(8e-6, 2650.0, 1000.0, 1e-3, 0.035, firm_kg_m2=0.5, firm_threshold_Pa=0.35)
+    laws = SiltLaws.of(8e-6, 2650.0, 1000.0, 1e-3, 0.035, firm_kg_m2=0.5)
     silt = Silt(laws, 0.6, SIZE_M, 4000, np.random.default_rng(0))
     start = silt.total_kg
     star = np.sqrt(0.2 / 1000.0)
