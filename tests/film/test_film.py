@@ -286,6 +286,23 @@ def test_silt_is_a_straight_line_between_photographs(flown: Path) -> None:
     assert silt_at([], 1.0) is None
 
 
+def test_silt_far_away_is_mixed_as_that_near_is() -> None:
+    """Between two exposures the outer grid, too, is a straight line in time; without one on either there is none."""
+
+    def exposure(time_s: float, outer: bool) -> ExposureRecord:
+        far = ScalarGrid(origin_W_m=np.zeros(3), spacing_m=0.2, values=np.full((2, 2, 2), time_s))
+        near = ScalarGrid(
+            origin_W_m=np.zeros(3), spacing_m=0.05, values=np.zeros((2, 2, 2)), outer=far if outer else None
+        )
+        return ExposureRecord(time_s=time_s, X_WC_true=(Pose(np.zeros(3)),), X_WC_est=Pose(np.zeros(3)), silt=near)
+
+    mixed = silt_at([exposure(1.0, True), exposure(2.0, True)], 1.25)
+    assert mixed is not None and mixed.outer is not None
+    assert mixed.outer.values == pytest.approx(np.full((2, 2, 2), 1.25))
+    half = silt_at([exposure(1.0, True), exposure(2.0, False)], 1.25)
+    assert half is not None and half.outer is None
+
+
 def test_speed_has_one_colour_and_ends(tmp_path: Path) -> None:
     """Colours stay within 0 and 1, and beyond the fastest nothing changes."""
     colours = speed_colours(np.linspace(0, 2 * FASTEST_M_S, 50))

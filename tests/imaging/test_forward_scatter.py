@@ -151,3 +151,10 @@ def test_an_edge_behind_silt_is_softer_than_one_behind_clear_water():
     contrast = seen[50, -20, 0] - seen[50, 20, 0]
     steepest = np.diff(seen[50, :, 0]).max()
     assert steepest / contrast == pytest.approx(math.exp(-1.0) / math.exp(-0.5), rel=0.12)
+
+
+def test_hardly_any_silt_blurs_nothing_and_keeps_its_light():
+    """Light of which less than half a grey level is turned comes back where it was lost."""
+    signal = np.random.default_rng(0).random((20, 20, 3), np.float32)
+    tau = np.full((20, 20), 3e-3, np.float32)
+    assert forward_scattered(signal, tau, EVEN, 6.0) == pytest.approx(signal * math.expm1(1.5e-3), rel=1e-4)

@@ -5,6 +5,7 @@ import pytest
 from pydantic import ValidationError
 
 from wakewise.tank.beds import SILT_RANGES, SILTS
+from wakewise.tank.grains import STRESS_INTENSITY
 from wakewise.tank.sediment import SiltLaws
 from wakewise.tank.settings import SiltSettings
 
@@ -32,7 +33,7 @@ def test_values_lie_in_their_ranges(kind):
 def test_fluff_moves_before_mud_and_mud_before_its_firm_layer():
     """The order of strengths is fluff, fresh mud, firm mud; loose grains of sand need more than fluff."""
     fluff, mud, sand = (SiltSettings(kind=kind) for kind in ("fluff", "fresh-mud", "sand"))
-    assert fluff.threshold_Pa < mud.threshold_Pa < fluff.firm_threshold_Pa
+    assert fluff.threshold_Pa < mud.threshold_Pa < 10 * fluff.threshold_Pa
     laws = SiltLaws.of(sand.grain_m, sand.grain_density_kg_m3, 1000.0, sand.erosion_kg_m2_s)
     assert laws.sand
     assert fluff.threshold_Pa < laws.threshold_Pa
@@ -43,7 +44,7 @@ def test_fluff_is_gone_where_its_firm_layer_is_not():
     bed = SiltSettings(kind="fluff")
     laws = SiltLaws.of(
         bed.grain_m, bed.grain_density_kg_m3, 1000.0, bed.erosion_kg_m2_s, bed.threshold_Pa,
-        stress_intensity=bed.stress_intensity, firm_kg_m2=bed.firm_load_kg_m2, firm_threshold_Pa=bed.firm_threshold_Pa,
+        stress_intensity=STRESS_INTENSITY, firm_kg_m2=bed.firm_load_kg_m2,
     )  # fmt: skip
     loose, firm = laws.lifted_kg_m2_s(np.array([0.1, 0.1]), np.array([1.1, 1.0]))
     assert firm < 1e-3 * loose

@@ -14,13 +14,14 @@ Airy's pattern, and each pixel's blurred light as one Gaussian with the mean var
 from __future__ import annotations
 
 import math
-from typing import cast
+from typing import Any, cast
 
 import cv2
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.imaging.renderer import Image
+from wakewise.compiled import njit
+from wakewise.imaging.renderer import BAND_ROWS, Image, in_threads
 
 FORWARD_SHARE = 0.5
 """Diffraction's share of what a large grain takes from a beam."""
@@ -32,7 +33,8 @@ LOBE = 0.45
 That is 0.225 wavelengths over the numerical aperture (Zhang, Zerubia, Olivo-Marin 2007, doi 10.1364/AO.46.001819).
 """
 _SHARP_PX2 = 0.02  # a blur of so small a variance is none
-_STEPS = (0.0, 1 / 16, 1 / 4, 1.0)  # variances of the blurs that are made, over the largest
+_FAINT = 0.002  # half a grey level of 255: blurring less than this of the light shows nowhere
+_STEPS = np.array([0.0, 1 / 16, 1 / 4, 1.0])  # variances of the blurs that are made, over the largest
 
 
 def lobe_rad(diameter_m: float) -> float:
@@ -88,27 +90,47 @@ def forward_scattered(signal: Image, tau: Image, lever: Image, lobe_px: float) -
         Its sum is that of signal times (exp(tau / 2) - 1): what leaves one pixel arrives at others.
     """
     h, w = tau.shape
-    turns = np.float32(FORWARD_SHARE) * tau
-    share = np.expm1(turns)
-    # Mean number of turns of light that was turned at all: tau exp(tau) / (exp(tau) - 1), 1 of thin water.
-    orders = np.where(turns > 1e-4, turns * (share + 1.0) / np.maximum(share, 1e-9), 1.0)
+    # No pixel's light is spread wider than the thickest water before the lens would.
+    thickest = FORWARD_SHARE * float(tau.max(initial=0.0))
+    largest = lobe_px**2 * float(lever.max(initial=0.0)) * _mean_turns(thickest)
+    if largest < _SHARP_PX2 or thickest < _FAINT:
+        return cast(Image, signal * np.expm1(np.float32(FORWARD_SHARE) * tau)[..., None])
     wide = cv2.resize(lever, (w, h), interpolation=cv2.INTER_LINEAR)
-    variance = lobe_px**2 * orders * wide
-    scattered = signal * share[..., None]
-    # Where the water is clear the width does not matter.
-    largest = float(np.max(variance, where=share > 1e-4, initial=0.0))
-    if largest < _SHARP_PX2:
-        return cast(Image, scattered)
-    out = np.zeros_like(signal)
-    place = np.minimum(variance / largest, 1.0)
-    for k, level in enumerate(_STEPS):
-        weight = np.ones_like(place)
-        if k > 0:
-            weight = np.minimum(weight, np.clip((place - _STEPS[k - 1]) / (level - _STEPS[k - 1]), 0.0, 1.0))
-        if k + 1 < len(_STEPS):
-            weight = np.minimum(weight, np.clip((_STEPS[k + 1] - place) / (_STEPS[k + 1] - level), 0.0, 1.0))
-        out += blurred(scattered * weight[..., None].astype(np.float32), level * largest)
+    parts = np.empty((len(_STEPS), h, w, 3), np.float32)
+
+    def band(first: int) -> None:
+        _part(first, min(first + BAND_ROWS, h), signal, tau, wide, lobe_px**2 / max(largest, 1e-12), _STEPS, parts)
+
+    in_threads(band, range(0, h, BAND_ROWS))
+    out = parts[0]
+    for k in range(1, len(_STEPS)):
+        out += blurred(parts[k], _STEPS[k] * largest)
     return out
+
+
+@njit
+def _mean_turns(turns: float) -> float:
+    """Mean number of turns of light that was turned at all, t exp(t) / (exp(t) - 1) of Poisson's law."""
+    return turns / (1.0 - math.exp(-turns)) if turns > 1e-4 else 1.0
+
+
+@njit(nogil=True)
+def _part(first: int, last: int, signal: Any, tau: Any, lever: Any, scale: float, steps: Any, parts: Any) -> None:
+    """Share what each pixel scatters, in rows first..last-1, among the two blurs whose variances lie round its own."""
+    highest = steps.shape[0] - 2
+    for y in range(first, last):
+        for x in range(tau.shape[1]):
+            turns = FORWARD_SHARE * tau[y, x]
+            share = math.exp(turns) - 1.0
+            place = min(scale * lever[y, x] * _mean_turns(turns), 1.0)
+            k = 0
+            while k < highest and place > steps[k + 1]:
+                k += 1
+            upper = (place - steps[k]) / (steps[k + 1] - steps[k])
+            for n in range(steps.shape[0]):
+                weight = share * (1.0 - upper) if n == k else (share * upper if n == k + 1 else 0.0)
+                for c in range(3):
+                    parts[n, y, x, c] = weight * signal[y, x, c]
 
 
 def blurred(image: Image, variance_px2: float) -> Image:

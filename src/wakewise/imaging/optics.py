@@ -217,7 +217,7 @@ def through_water(
 
     in_threads(band, range(0, camera.height, BAND_ROWS))
     if grains is not None and spread:
-        length_m = tau / np.maximum(silt_per_m, np.float32(1e-9))
+        length_m = (tau / np.maximum(silt_per_m, np.float32(1e-9))).astype(np.float32)
         lever = mean_square_lever(haze.ranges_m, haze.silt_tau, length_m[:: haze.stride, :: haze.stride])
         out += forward_scattered(signal, tau, lever, camera.focal_px * lobe_rad(grains.diameter_m))
     return out, silt_per_m

@@ -12,7 +12,7 @@ THIN_SPACE = "\u202f"
 # Endings of keys, longest first where one contains another.
 _UNITS = (
     ("_m_s", "m/s"), ("_per_m", "1/m"), ("_per_s", "1/s"), ("_mm", "mm"), ("_Pa", "Pa"), ("_pct", "%"), ("_deg", "deg"),
-    ("_kJ", "kJ"), ("_px", "px"), ("_MB", "MB"), ("_N", "N"), ("_ms", "ms"), ("_m", "m"), ("_s", "s"),
+    ("_kJ", "kJ"), ("_px", "px"), ("_MB", "MB"), ("_N", "N"), ("_g", "g"), ("_ms", "ms"), ("_m", "m"), ("_s", "s"),
 )  # fmt: skip
 
 GROUPS: dict[str, tuple[str, ...]] = {
@@ -25,7 +25,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     ),
     "The water": (
         "target_speed", "exposure_speed", "ambient_speed", "bed_speed", "turbidity", "disturbance", "target_pressure",
-        "exposure_pressure", "exposure_optical", "bed_shear", "grain_threshold", "tracer", "ray_optical",
+        "exposure_pressure", "exposure_optical", "bed_shear", "grain_threshold", "tracer", "ray_optical", "silt_",
     ),
     "The flight": (
         "method", "seed", "duration", "position", "path", "estimate", "velocity", "roll", "energy", "sign",

@@ -23,7 +23,6 @@ _PLAIN: dict[str, float | None] = {
     "load_kg_m2": 0.0,
     "suspended_mg_l": 0.0,
     "firm_load_kg_m2": 0.0,
-    "firm_threshold_Pa": None,
     "threshold_Pa": None,
     "settling_m_s": None,
     "erosion_kg_m2_s": 5e-5,
@@ -41,9 +40,7 @@ SILTS: dict[str, dict[str, float | None]] = {
     # deep is clear after 35 s, and no thruster keeps it up. What it tests is sand on the bed, not turbid water.
     "caco3-50mg": _PLAIN | {"suspended_mg_l": 50.0, "grain_m": 3e-4, "grain_density_kg_m3": 2710.0},
     "fresh-mud": _PLAIN | _MUD | {"load_kg_m2": 5.0, "threshold_Pa": 0.106},
-    "fluff": _PLAIN
-    | _MUD
-    | {"load_kg_m2": 1.1, "threshold_Pa": 0.035, "firm_load_kg_m2": 1.0, "firm_threshold_Pa": 0.35},
+    "fluff": _PLAIN | _MUD | {"load_kg_m2": 1.1, "threshold_Pa": 0.035, "firm_load_kg_m2": 1.0},
     "sand": _PLAIN | {"load_kg_m2": 20.0, "grain_m": 2.5e-4, "grain_density_kg_m3": 2710.0},
 }
 """Fields that a kind of silt sets, unless they are given as well."""
@@ -52,7 +49,7 @@ _MUD_RANGES = {"grain_m": (5e-6, 15e-6), "settling_m_s": (5e-5, 1e-3), "erosion_
 SILT_RANGES: dict[str, dict[str, tuple[float, float]]] = {
     "silt": {"load_kg_m2": (0.03, 0.86), "grain_m": (10e-6, 40e-6), "erosion_kg_m2_s": (1e-5, 1e-4)},
     "fresh-mud": _MUD_RANGES | {"threshold_Pa": (0.037, 0.305)},
-    "fluff": _MUD_RANGES | {"threshold_Pa": (0.025, 0.05), "firm_threshold_Pa": (0.25, 0.5), "load_kg_m2": (1.03, 1.3)},
+    "fluff": _MUD_RANGES | {"threshold_Pa": (0.025, 0.05), "load_kg_m2": (1.03, 1.3)},
     "sand": {"grain_m": (1.3e-4, 5e-4)},
 }
 """From (low, high) of each figure a world may draw; `load_kg_m2` of fluff counts the firm layer's 1.0 as well."""

@@ -19,6 +19,12 @@ from wakewise.physics import GRAVITY_M_S2
 VISCOSITY_M2_S = 1.0e-6  # of fresh water at 20 degrees
 VON_KARMAN = 0.40
 _FASTEST_M_S, _NODES = 4.0, 2049  # of a table of friction velocities
+STRESS_INTENSITY = 0.4
+"""Rms of a bed's stress over its mean under turbulence, of boundary layers (0.36 to 0.40).
+
+Alfredsson, Johansson, Haritonidis and Eckelmann 1988, doi 10.1063/1.866783; log-normal: Cheng 2006, Phys. Fluids 18,
+096602. Where jets strike it is higher; no figure was found for that, so that what is lifted there is rather too little.
+"""
 _SUBLAYER = 11.6  # height of the viscous sublayer in nu / u*
 SAND_M = 62.5e-6  # from here on grains are sand (Wentworth 1922), which van Rijn's law is for
 

@@ -83,7 +83,6 @@ class SiltLaws:
         settling_m_s: float | None = None,
         stress_intensity: float = 0.0,
         firm_kg_m2: float = 0.0,
-        firm_threshold_Pa: float | None = None,
     ) -> SiltLaws:
         """Laws of a grain: its own threshold and settling speed unless given, ten times that threshold where firm.
 
@@ -102,7 +101,7 @@ class SiltLaws:
             sand=pickup == "van-rijn" or (pickup == "auto" and grain_m >= SAND_M),
             stress_intensity=stress_intensity,
             firm_kg_m2=firm_kg_m2,
-            firm_threshold_Pa=_FIRMER * least if firm_threshold_Pa is None else firm_threshold_Pa,
+            firm_threshold_Pa=_FIRMER * least,
         )
 
     def lifted_kg_m2_s(self, stress_Pa: Array, load_kg_m2: Array) -> Array:

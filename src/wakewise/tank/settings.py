@@ -122,11 +122,6 @@ class SiltSettings(Settings):
     A load of 0.1 kg/m2 lies just below the mean of all sediment on mid-shelf reefs (0.127; inner shelf 0.864 kg/m2;
     Tebbett, Goatley and Bellwood 2017, doi 10.1371/journal.pone.0170854), of which part is as fine as the silt here: a
     silty bed, not an average one. Other beds by name, with sources: `wakewise.tank.beds`.
-
-    The stress under turbulence is log-normal about its mean (Cheng 2006, Phys. Fluids 18, 096602), with an rms of 0.36
-    to 0.40 of the mean in boundary layers (Alfredsson, Johansson, Haritonidis and Eckelmann 1988, doi
-    10.1063/1.866783). Where jets strike it is higher; no figure was found for that, so that what is lifted there is
-    rather too little.
     """
 
     kind: Literal["clear", "silt", "caco3-50mg", "fresh-mud", "fluff", "sand"] = Field(
@@ -139,7 +134,7 @@ class SiltSettings(Settings):
         0.0,
         ge=0.0,
         le=20.0,
-        description="of load_kg_m2, what lies lowest and is firmer; what settles lies on top of it",
+        description="of load_kg_m2, what lies lowest and has ten times the threshold; what settles lies on it",
     )
     grain_m: float = Field(20e-6, ge=1e-6, le=1e-3, description="grain diameter of the silt")
     grain_density_kg_m3: float = Field(2710.0, gt=1150.0, le=8000.0, description="density of the grains (calcite 2710)")
@@ -151,17 +146,11 @@ class SiltSettings(Settings):
     threshold_Pa: float | None = Field(
         None, gt=0.0, le=10.0, description="stress from which it erodes, null for Soulsby's, from the grain"
     )
-    firm_threshold_Pa: float | None = Field(
-        None, gt=0.0, le=10.0, description="stress from which the firmer part erodes, null for ten times the other's"
-    )
     settling_m_s: float | None = Field(
         None,
         gt=0.0,
         le=0.5,
         description="speed at which it sinks, null for Soulsby's, from the grain; aggregates sink faster",
-    )
-    stress_intensity: float = Field(
-        0.4, ge=0.0, le=1.5, description="rms of the bed's stress over its mean, from turbulence; 0 for the mean alone"
     )
 
     @model_validator(mode="after")

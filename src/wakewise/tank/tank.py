@@ -15,7 +15,7 @@ from wakewise.interfaces import BodyState, FlakeCloud, Measurement, Posture, Sca
 from wakewise.tank.ambient import build_ambient
 from wakewise.tank.camera_joint import CameraJoint
 from wakewise.tank.flakes import Flakes
-from wakewise.tank.grains import speed_at_stress_m_s
+from wakewise.tank.grains import STRESS_INTENSITY, speed_at_stress_m_s
 from wakewise.tank.lane import Lane
 from wakewise.tank.measuring import TargetProbes
 from wakewise.tank.plant import VehiclePlant
@@ -128,9 +128,8 @@ class Tank:
             silt.threshold_Pa,
             silt.pickup,
             settling_m_s=silt.settling_m_s,
-            stress_intensity=silt.stress_intensity,
+            stress_intensity=STRESS_INTENSITY,
             firm_kg_m2=silt.firm_load_kg_m2,
-            firm_threshold_Pa=silt.firm_threshold_Pa,
         )
         self._swell = _swell(self.ambient, laws)
         self._silt = Silt(laws, silt.load_kg_m2, settings.size_m, MAX_SILT_PARTICLES, silt_rng, self._swell)
