@@ -20,7 +20,7 @@ import numpy as np
 
 from wakewise.arrays import Array, BoolArray, freeze
 from wakewise.geometry import Pose
-from wakewise.pilot.settings import PersonSettings
+from wakewise.pilot.people import PEOPLE, People
 
 AXES = ("forward", "right", "down", "turn")
 NEUROMUSCULAR_S = 0.1
@@ -141,44 +141,43 @@ class PersonState:
     until_s: float
 
 
-def draw_person(settings: PersonSettings, seed: int, sticks: Sticks) -> Person:
-    """The person that a seed draws; `settings.seed` goes before `seed`."""
-    chosen = seed if settings.seed is None else settings.seed
-    rng = np.random.default_rng(chosen)
+def draw_person(seed: int, sticks: Sticks, people: People = PEOPLE) -> Person:
+    """The person that a seed draws from these people, at these sticks."""
+    rng = np.random.default_rng(seed)
 
     def one(low_high: tuple[float, float]) -> float:
         return float(rng.uniform(*low_high))
 
-    delay_s, video_s = one(settings.delay_s), one(settings.video_s)
-    margin_rad, lead_most_s = math.radians(one(settings.phase_margin_deg)), one(settings.lead_most_s)
+    delay_s, video_s = one(people.delay_s), one(people.video_s)
+    margin_rad, lead_most_s = math.radians(one(people.phase_margin_deg)), one(people.lead_most_s)
     late_s = delay_s + video_s + sticks.lag_s
-    image, size = one(settings.image_step), one(settings.size_step)
+    image, size = one(people.image_step), one(people.size_step)
     drag = np.maximum(sticks.drag, 1e-9)
     return Person(
-        seed=chosen,
+        seed=seed,
         sticks=sticks,
         delay_s=delay_s,
         video_s=video_s,
         crossover_rad_s=(0.5 * math.pi - margin_rad) / late_s,
         lead_s=np.where(sticks.inertia > 0.0, np.minimum(sticks.inertia / drag, lead_most_s), 0.0),
-        remnant=one(settings.remnant),
-        attended=settings.attended,
-        dwell_s=settings.dwell_s,
+        remnant=one(people.remnant),
+        attended=people.attended,
+        dwell_s=people.dwell_s,
         step=np.array([size, image, image, image]),
-        rate_step_per_s=one(settings.rate_step_per_s),
+        rate_step_per_s=one(people.rate_step_per_s),
         drift=np.array(
             [
-                one(settings.standoff_drift),
-                math.radians(one(settings.azimuth_drift_deg)),
-                one(settings.level_drift),
-                math.radians(one(settings.heading_drift_deg)),
+                one(people.standoff_drift),
+                math.radians(one(people.azimuth_drift_deg)),
+                one(people.level_drift),
+                math.radians(one(people.heading_drift_deg)),
             ]
         ),
-        drift_s=one(settings.drift_s),
-        pace=one(settings.pace),
-        trim_s=one(settings.trim_s),
-        gain=one(settings.gain),
-        stick_step=one(settings.stick_step),
+        drift_s=one(people.drift_s),
+        pace=one(people.pace),
+        trim_s=one(people.trim_s),
+        gain=one(people.gain),
+        stick_step=one(people.stick_step),
     )
 
 
