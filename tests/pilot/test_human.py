@@ -37,7 +37,8 @@ def person(seed: int = 3, **changes) -> Person:
 
 
 def view(place=(0.0, 0.0, 0.0), heading=0.0, velocity=(0.0, 0.0, 0.0), turn=0.0) -> View:
-    return View(p_W_m=np.array(place), heading_rad=heading, v_W_m_s=np.array(velocity), turn_rad_s=turn)
+    v = np.array(velocity)
+    return View(p_W_m=np.array(place), heading_rad=heading, v_W_m_s=v, turn_rad_s=turn, hull_W_m_s=v)
 
 
 def pushes(who: Person, views, wishes) -> np.ndarray:
@@ -162,6 +163,7 @@ def test_a_view_is_where_the_camera_is():
     seen = View.of(X_WB, np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.5]), X_BC)
     np.testing.assert_allclose(seen.p_W_m, [1.0, 2.2, 3.0], atol=1e-12)
     np.testing.assert_allclose(seen.v_W_m_s, [-0.1, 0.1, 0.0], atol=1e-12)
+    np.testing.assert_allclose(seen.hull_W_m_s, [0.0, 0.1, 0.0], atol=1e-12)
     assert seen.heading_rad == pytest.approx(0.5 * np.pi) and seen.turn_rad_s == pytest.approx(0.5)
 
 

@@ -63,7 +63,9 @@ class ControlSettings(Settings):
         default=LeverSettings(), description="what `wake-aware` and `instant` use beyond the free jet"
     )
     person: int | None = Field(
-        default=None, ge=0, description="who flies `manual`, by number; none = the one whom the trial's seed draws"
+        default=None,
+        ge=0,
+        description="who flies `manual` or is the pilot `human`, by number; none = the one that the trial's seed draws",
     )
 
 

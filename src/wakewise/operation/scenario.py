@@ -61,7 +61,7 @@ class Scenario(Settings):
     method: str = Field("wake-aware", description="how thrusts are chosen: a method's name, or package.module:make")
     vehicle: str = Field("paper", description="library name or path of a vehicle file")
     world: str = Field("tank", description="where it is flown: tank, paper (circular), lattice, or package.module:make")
-    pilot: str = Field("route", description="where goals come from: route, or package.module:make")
+    pilot: str = Field("route", description="where goals come from: route, human, or package.module:make")
     target: TargetSettings = TargetSettings()
     mission: MissionSettings = MissionSettings()
     control: ControlSettings = ControlSettings()

@@ -35,7 +35,7 @@ THUMB_S = 0.25
 """Shortest nudge of a thumb; estimate, as long as an effective delay."""
 FARTHEST_M = 3.0
 """A target farther off than this, or behind, is not what the camera is kept on."""
-_COLUMNS = 8
+_COLUMNS = 11
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,12 +57,16 @@ class Sticks:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class View:
-    """What matters of a camera's pose: place and velocity in W, shape (3,) each, heading and its rate."""
+    """What matters of a camera's pose: place and velocity in W, shape (3,) each, heading and its rate.
+
+    `hull_W_m_s` is the velocity of the hull behind it, whose drag a practised hand pushes against.
+    """
 
     p_W_m: Array
     heading_rad: float
     v_W_m_s: Array
     turn_rad_s: float
+    hull_W_m_s: Array
 
     @classmethod
     def of(cls, X_WB: Pose, nu_B: Array, X_BC: Pose) -> View:
@@ -75,12 +79,13 @@ class View:
             heading_rad=math.atan2(axis_W[1], axis_W[0]),
             v_W_m_s=v_W,
             turn_rad_s=float((R @ nu_B[3:])[2]),
+            hull_W_m_s=R @ nu_B[:3],
         )
 
     @property
     def row(self) -> Array:
-        """As one array, shape (8,)."""
-        return np.array([*self.p_W_m, self.heading_rad, *self.v_W_m_s, self.turn_rad_s])
+        """As one array, shape (11,)."""
+        return np.array([*self.p_W_m, self.heading_rad, *self.v_W_m_s, self.turn_rad_s, *self.hull_W_m_s])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -117,7 +122,7 @@ class Person:
 class PersonState:
     """What a person carries on: count of steps, what was seen and wished (newest first), hands and habits.
 
-    `seen` and `wished`, shape (n, 8), rows as `View.row`; the rest, shape (4,): `hand` what the hands make of it,
+    `seen` and `wished`, shape (n, 11), rows as `View.row`; the rest, shape (4,): `hand` what the hands make of it,
     `trim` the steady push that was learned, `drift` the error of the eye now, `last` and `unseen_s` the offset last
     seen and how long ago, `pushed` where the sticks are and `owed` what they fell short of, both shares of full
     stick, `square` and `rate_square` what is seen, squared and averaged, `minded` the axes that are minded, for
@@ -304,7 +309,7 @@ def _offsets(seen: Array, wished: Array, watch_W_m: Array | None) -> tuple[Array
             heading, far_m = math.atan2(away[1], away[0]), float(np.linalg.norm(away))
     offset = np.append(level @ (wished[:3] - seen[:3]), math.remainder(heading - seen[3], 2.0 * math.pi))
     rate = np.append(level @ (wished[4:7] - seen[4:7]), turn - seen[7])
-    return offset, rate, np.append(level @ wished[4:7], turn), far_m
+    return offset, rate, np.append(level @ wished[8:11], turn), far_m
 
 
 def _beyond(values: Array, step: Array) -> Array:
