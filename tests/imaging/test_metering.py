@@ -7,7 +7,8 @@ import pytest
 from imaging_helpers import coral_scene, view
 
 from wakewise.imaging import ImagingSettings, SiltOptics, photograph
-from wakewise.imaging.metering import LUMINANCE, TARGET, automatic, brightness, divided, settled
+from wakewise.imaging.metering import LUMINANCE, MOST_AMPLIFIED, TARGET, automatic, brightness, divided, settled
+from wakewise.imaging.settings import LONGEST_S
 
 AUTO = ImagingSettings(auto_exposure=True, width=240, height=180)
 DIM = AUTO.model_copy(update={"ambient": 0.02, "panels": 0.03, "lamp": 0.02})
@@ -42,20 +43,20 @@ def test_a_settled_camera_meets_its_target():
 def test_dim_water_makes_long_exposures():
     """The shutter is opened for longer first, and no longer than allowed; then the signal is amplified."""
     bright, dim = take(AUTO), take(DIM)
-    assert bright.exposure_s < dim.exposure_s <= DIM.exposure_most_s
+    assert bright.exposure_s < dim.exposure_s <= LONGEST_S
     dark = AUTO.model_copy(update={"ambient": 0.0, "panels": 0.0, "lamp": 0.01})
     chosen = divided(settled([brightness(coral_scene()[0], place(), None, dark, SiltOptics(), np.ones(3))]), dark)
-    assert chosen.exposure_s == dark.exposure_most_s and chosen.amplification > 1.0
+    assert chosen.exposure_s == LONGEST_S and chosen.amplification > 1.0
 
 
 @pytest.mark.parametrize("gain", [0.01, 0.3, 0.75, 3.0, 30.0, 3000.0])
 def test_gain_is_exposure_times_amplification(gain):
     """What is chosen multiplies up to the gain asked for, unless it is beyond both bounds."""
     chosen = divided(gain, AUTO)
-    most = AUTO.gain * AUTO.exposure_most_s / AUTO.exposure_s * AUTO.amplification_most
+    most = AUTO.gain * LONGEST_S / AUTO.exposure_s * MOST_AMPLIFIED
     assert chosen.gain == pytest.approx(min(gain, most))
-    assert 1.0 <= chosen.amplification <= AUTO.amplification_most
-    assert chosen.amplification == 1.0 or chosen.exposure_s == AUTO.exposure_most_s
+    assert 1.0 <= chosen.amplification <= MOST_AMPLIFIED
+    assert chosen.amplification == 1.0 or chosen.exposure_s == LONGEST_S
 
 
 def test_exposure_lags_behind_what_is_seen():
@@ -90,7 +91,7 @@ def test_the_same_exposure_makes_the_same_bytes():
 
 
 def test_amplified_signals_are_noisier():
-    """With the shutter as long as it may be, half of the light is noisier by the root of two, relative to the signal."""
+    """With the shutter as long as it may be, half of the light has noise larger by the root of two."""
     lit = AUTO.model_copy(update={"ambient": 0.0, "panels": 0.04, "lamp": 0.0, "flakes_per_m3": 0.0})
     less = lit.model_copy(update={"panels": 0.02})
     noise = []

@@ -151,7 +151,7 @@ def manual(
     tracker = make_tracker(vehicle, settings)
     return ManualController(
         name="manual",
-        person=draw_person(settings.person, 0, vehicle_sticks(vehicle, tracker)),
+        person=draw_person(settings.person or 0, vehicle_sticks(vehicle, tracker)),
         tracker=tracker,
         layout=vehicle_layout(vehicle),
         view=WakeView.of(vehicle, region, wake, settings.superposition),

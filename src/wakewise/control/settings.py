@@ -7,7 +7,6 @@ from typing import Annotated
 from pydantic import Field
 
 from wakewise.control.levers import LeverSettings
-from wakewise.pilot.settings import PersonSettings
 from wakewise.planning.problem import DISTURBANCE_WEIGHT, EFFORT_WEIGHT, PlanSettings
 from wakewise.settings import Settings
 from wakewise.wake import WakeSettings
@@ -70,12 +69,13 @@ class ControlSettings(Settings):
     levers: LeverSettings = Field(
         default=LeverSettings(), description="what `wake-aware` and `instant` use beyond the free jet"
     )
-    person: PersonSettings = Field(default=PersonSettings(), description="who flies `manual`, and the pilot `human`")
+    person: int | None = Field(
+        default=None,
+        ge=0,
+        description="who flies `manual` or is the pilot `human`, by number; none = the one that the trial's seed draws",
+    )
 
 
 def flown_by(settings: ControlSettings, seed: int) -> ControlSettings:
-    """The settings with the seed of the person who flies, unless they name another."""
-    person = settings.person
-    if person.seed is not None:
-        return settings
-    return settings.model_copy(update={"person": person.model_copy(update={"seed": seed})})
+    """The settings with the person whom a seed draws, unless they name one."""
+    return settings if settings.person is not None else settings.model_copy(update={"person": seed})

@@ -20,7 +20,7 @@ from wakewise.geometry import Pose
 from wakewise.imaging.optics import SiltOptics, haze_between, through_water
 from wakewise.imaging.renderer import render
 from wakewise.imaging.scene import Scene
-from wakewise.imaging.settings import METERED_EVERY_S, ImagingSettings
+from wakewise.imaging.settings import LONGEST_S, METERED_EVERY_S, ImagingSettings
 from wakewise.interfaces import ScalarGrid
 
 TARGET = 0.16
@@ -33,8 +33,8 @@ MIDDLE = 3.0
 """Weight of the middle third, across and down, over the rest; estimate: that tuning falls from 3 to 1 and 0."""
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 """Of linear red, green and blue (ITU-R BT.709)."""
-SHORTEST_S = 1e-4
-"""Shortest exposure."""
+SHORTEST_S, MOST_AMPLIFIED = 1e-5, 8.0
+"""Shortest exposure and most amplification of that tuning."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,8 +82,8 @@ def divided(gain: float, settings: ImagingSettings) -> Chosen:
     `settings.gain` at `settings.exposure_s` is the sensor unamplified.
     """
     wished_s = settings.exposure_s * gain / settings.gain
-    exposure_s = min(max(wished_s, SHORTEST_S), settings.exposure_most_s)
-    amplification = min(max(wished_s / exposure_s, 1.0), settings.amplification_most)
+    exposure_s = min(max(wished_s, SHORTEST_S), LONGEST_S)
+    amplification = min(max(wished_s / exposure_s, 1.0), MOST_AMPLIFIED)
     return Chosen(
         exposure_s=exposure_s,
         gain=settings.gain * amplification * exposure_s / settings.exposure_s,

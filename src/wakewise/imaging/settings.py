@@ -24,6 +24,8 @@ LAMP_OFFSET_M = 0.2
 """Distance of each of two lamps to the camera's side: where small vehicles carry them."""
 FLAKES_PER_KG = 1e6
 """Visible flakes per kilogram of suspended silt."""
+LONGEST_S = 1.0 / 30.0
+"""Longest exposure that is chosen automatically: a frame of video."""
 METERED, METERED_EVERY_S = 8, 0.1
 """Views before each photograph that automatic exposure goes by, and the time between them: five of its lags."""
 ELECTRONS_PER_S, READ_NOISE_E = 1.5e6, 4.0
@@ -37,7 +39,6 @@ CAMERAS: dict[str, dict[str, Any]] = {
         "fov_deg": 80.0,
         "readout_s": 0.032,
         "auto_exposure": True,
-        "exposure_most_s": 1.0 / 30.0,
         "photo_format": "jpeg",
         "jpeg_quality": 60,
     },
@@ -47,7 +48,6 @@ CAMERAS: dict[str, dict[str, Any]] = {
         "fov_deg": 80.0,
         "readout_s": 0.017,
         "auto_exposure": True,
-        "exposure_most_s": 1.0 / 30.0,
         "photo_format": "jpeg",
         "jpeg_quality": 75,
     },
@@ -72,15 +72,6 @@ class ImagingSettings(Settings):
     )
     auto_exposure: bool = Field(
         False, description="choose exposure and gain by what is seen; exposure_s and gain are then the base sensitivity"
-    )
-    exposure_most_s: float = Field(
-        0.03,
-        description="longest exposure that is chosen automatically, s; darker scenes are amplified",
-        gt=0.0,
-        le=1.0,
-    )
-    amplification_most: float = Field(
-        8.0, description="most amplification that is chosen automatically, 1 = none", ge=1.0, le=100.0
     )
     instants: int = Field(5, description="true camera poses kept across each exposure, for motion blur", ge=2, le=101)
     samples: int = Field(2, description="rays across a pixel (squared in all) on target and edges", ge=1, le=8)
@@ -115,7 +106,7 @@ class ImagingSettings(Settings):
     @property
     def window_s(self) -> float:
         """From when the first row may open to when the last has closed."""
-        return (self.exposure_most_s if self.auto_exposure else self.exposure_s) + self.readout_s
+        return (LONGEST_S if self.auto_exposure else self.exposure_s) + self.readout_s
 
     def shutter(self, exposure_s: float | None = None) -> Shutter:
         """When rows see, within `window_s`; for an exposure that was chosen, else for the one that is set."""

@@ -105,7 +105,13 @@ def take_photograph(parts: Parts, folder: Path, number: int, exposure: ExposureR
         exposure.flakes,
     )
     write_image(image, photo.image, scenario.imaging.jpeg_quality)
-    noted = {"exposure": mark, "sharpness": photo.sharpness, "turbidity_per_m": photo.turbidity_per_m}
+    noted = {
+        "exposure": mark,
+        "sharpness": photo.sharpness,
+        "turbidity_per_m": photo.turbidity_per_m,
+        "exposure_s": photo.exposure_s,
+        "gain": photo.gain,
+    }
     write_text(note, json.dumps(noted))
     return noted
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from wakewise.interfaces import Pilot
 from wakewise.missions import RoutePilot
+from wakewise.operation.helm import HumanPilot
 from wakewise.plugins import find
 
 if TYPE_CHECKING:
@@ -18,7 +19,18 @@ def route_pilot(parts: Parts) -> RoutePilot:
     return RoutePilot(route=parts.route, aim=parts.aim, exposure_s=parts.scenario.imaging.window_s)
 
 
-PILOTS: dict[str, Callable[[Parts], Pilot]] = {"route": route_pilot}
+def human_pilot(parts: Parts) -> HumanPilot:
+    """`human`: a person who flies the route by eye, and whose sticks ask any method for velocities."""
+    return HumanPilot(
+        wish=route_pilot(parts),
+        X_BC=parts.vehicle.X_BC,
+        target_W_m=parts.target.centre_W_m,
+        dt_s=1.0 / parts.control.rate_hz,
+        seed=parts.control.person or 0,
+    )
+
+
+PILOTS: dict[str, Callable[[Parts], Pilot]] = {"route": route_pilot, "human": human_pilot}
 """Our own pilots: what makes each from the parts of a flight."""
 
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from wakewise.arrays import Array, BoolArray, freeze
 from wakewise.geometry import Pose
-from wakewise.pilot.settings import PersonSettings
+from wakewise.pilot.people import PEOPLE, People
 
 AXES = ("forward", "right", "down", "turn")
 NEUROMUSCULAR_S = 0.1
@@ -35,7 +35,7 @@ THUMB_S = 0.25
 """Shortest nudge of a thumb; estimate, as long as an effective delay."""
 FARTHEST_M = 3.0
 """A target farther off than this, or behind, is not what the camera is kept on."""
-_COLUMNS = 8
+_COLUMNS = 11
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,12 +57,16 @@ class Sticks:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class View:
-    """What matters of a camera's pose: place and velocity in W, shape (3,) each, heading and its rate."""
+    """What matters of a camera's pose: place and velocity in W, shape (3,) each, heading and its rate.
+
+    `hull_W_m_s` is the velocity of the hull behind it, whose drag a practised hand pushes against.
+    """
 
     p_W_m: Array
     heading_rad: float
     v_W_m_s: Array
     turn_rad_s: float
+    hull_W_m_s: Array
 
     @classmethod
     def of(cls, X_WB: Pose, nu_B: Array, X_BC: Pose) -> View:
@@ -75,12 +79,13 @@ class View:
             heading_rad=math.atan2(axis_W[1], axis_W[0]),
             v_W_m_s=v_W,
             turn_rad_s=float((R @ nu_B[3:])[2]),
+            hull_W_m_s=R @ nu_B[:3],
         )
 
     @property
     def row(self) -> Array:
-        """As one array, shape (8,)."""
-        return np.array([*self.p_W_m, self.heading_rad, *self.v_W_m_s, self.turn_rad_s])
+        """As one array, shape (11,)."""
+        return np.array([*self.p_W_m, self.heading_rad, *self.v_W_m_s, self.turn_rad_s, *self.hull_W_m_s])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -117,7 +122,7 @@ class Person:
 class PersonState:
     """What a person carries on: count of steps, what was seen and wished (newest first), hands and habits.
 
-    `seen` and `wished`, shape (n, 8), rows as `View.row`; the rest, shape (4,): `hand` what the hands make of it,
+    `seen` and `wished`, shape (n, 11), rows as `View.row`; the rest, shape (4,): `hand` what the hands make of it,
     `trim` the steady push that was learned, `drift` the error of the eye now, `last` and `unseen_s` the offset last
     seen and how long ago, `pushed` where the sticks are and `owed` what they fell short of, both shares of full
     stick, `square` and `rate_square` what is seen, squared and averaged, `minded` the axes that are minded, for
@@ -141,44 +146,43 @@ class PersonState:
     until_s: float
 
 
-def draw_person(settings: PersonSettings, seed: int, sticks: Sticks) -> Person:
-    """The person that a seed draws; `settings.seed` goes before `seed`."""
-    chosen = seed if settings.seed is None else settings.seed
-    rng = np.random.default_rng(chosen)
+def draw_person(seed: int, sticks: Sticks, people: People = PEOPLE) -> Person:
+    """The person that a seed draws from these people, at these sticks."""
+    rng = np.random.default_rng(seed)
 
     def one(low_high: tuple[float, float]) -> float:
         return float(rng.uniform(*low_high))
 
-    delay_s, video_s = one(settings.delay_s), one(settings.video_s)
-    margin_rad, lead_most_s = math.radians(one(settings.phase_margin_deg)), one(settings.lead_most_s)
+    delay_s, video_s = one(people.delay_s), one(people.video_s)
+    margin_rad, lead_most_s = math.radians(one(people.phase_margin_deg)), one(people.lead_most_s)
     late_s = delay_s + video_s + sticks.lag_s
-    image, size = one(settings.image_step), one(settings.size_step)
+    image, size = one(people.image_step), one(people.size_step)
     drag = np.maximum(sticks.drag, 1e-9)
     return Person(
-        seed=chosen,
+        seed=seed,
         sticks=sticks,
         delay_s=delay_s,
         video_s=video_s,
         crossover_rad_s=(0.5 * math.pi - margin_rad) / late_s,
         lead_s=np.where(sticks.inertia > 0.0, np.minimum(sticks.inertia / drag, lead_most_s), 0.0),
-        remnant=one(settings.remnant),
-        attended=settings.attended,
-        dwell_s=settings.dwell_s,
+        remnant=one(people.remnant),
+        attended=people.attended,
+        dwell_s=people.dwell_s,
         step=np.array([size, image, image, image]),
-        rate_step_per_s=one(settings.rate_step_per_s),
+        rate_step_per_s=one(people.rate_step_per_s),
         drift=np.array(
             [
-                one(settings.standoff_drift),
-                math.radians(one(settings.azimuth_drift_deg)),
-                one(settings.level_drift),
-                math.radians(one(settings.heading_drift_deg)),
+                one(people.standoff_drift),
+                math.radians(one(people.azimuth_drift_deg)),
+                one(people.level_drift),
+                math.radians(one(people.heading_drift_deg)),
             ]
         ),
-        drift_s=one(settings.drift_s),
-        pace=one(settings.pace),
-        trim_s=one(settings.trim_s),
-        gain=one(settings.gain),
-        stick_step=one(settings.stick_step),
+        drift_s=one(people.drift_s),
+        pace=one(people.pace),
+        trim_s=one(people.trim_s),
+        gain=one(people.gain),
+        stick_step=one(people.stick_step),
     )
 
 
@@ -305,7 +309,7 @@ def _offsets(seen: Array, wished: Array, watch_W_m: Array | None) -> tuple[Array
             heading, far_m = math.atan2(away[1], away[0]), float(np.linalg.norm(away))
     offset = np.append(level @ (wished[:3] - seen[:3]), math.remainder(heading - seen[3], 2.0 * math.pi))
     rate = np.append(level @ (wished[4:7] - seen[4:7]), turn - seen[7])
-    return offset, rate, np.append(level @ wished[4:7], turn), far_m
+    return offset, rate, np.append(level @ wished[8:11], turn), far_m
 
 
 def _beyond(values: Array, step: Array) -> Array:
