@@ -32,10 +32,9 @@ def estimate(*current_m_s, **of):
 
 
 def test_an_unknown_current_adds_no_points():
-    """None, or the lever off: the view is the very same; NaN is no current either."""
+    """None, or the lever off: the view is the very same."""
     eyes = watch()
     assert eyes.at(None, estimate()).view is eyes.view
-    assert eyes.at(None, estimate(np.nan, 0.0, 0.0)).view is eyes.view
     assert not watch(drift=False).at(None, estimate(0.05, 0.0, 0.0)).current_W_m_s.any()
 
 

@@ -262,7 +262,8 @@ def test_the_table_of_a_flight_makes_sense(trial: tuple[Path, dict]) -> None:
         late.select("est_x_m", "est_y_m", "est_z_m").to_numpy()
         - late.select("true_x_m", "true_y_m", "true_z_m").to_numpy()
     )
-    assert np.sqrt((error**2).sum(axis=1).mean()) < 0.005
+    # Sensors whose errors last put the estimate some 5 mm off; a filter that lost its way is off by centimetres.
+    assert np.sqrt((error**2).sum(axis=1).mean()) < 0.012
     thrusts = steps.select([f"thrust_{i + 1}_N" for i in range(8)]).to_numpy()
     assert np.abs(thrusts).max() <= 51.0 * 1.1
     assert steps["exposing"].sum() == 18

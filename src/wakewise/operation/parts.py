@@ -11,7 +11,7 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from wakewise.control import make_controller
+from wakewise.control import ControlSettings, make_controller
 from wakewise.errors import InputError
 from wakewise.estimation import ErrorStateFilter
 from wakewise.importers import any_vehicle
@@ -157,6 +157,11 @@ class Parts:
         """Where goals come from: by default the route, by the clock."""
         return make_pilot(self)
 
+    @property
+    def control(self) -> ControlSettings:
+        """What the controllers are told: the scenario's settings, and nothing of the water that is flown in."""
+        return self.scenario.control
+
     @part
     def wake(self) -> WakeModel:
         """What the controller believes its jets do."""
@@ -175,7 +180,7 @@ class Parts:
             self.vehicle,
             self.region,
             self.wake,
-            self.scenario.control,
+            self.control,
             self.surroundings,
         )
 
