@@ -5,8 +5,9 @@ import pytest
 
 from wakewise.allocation import Weights, gentle_allocation
 from wakewise.control import ControlSettings, make_controller, vehicle_layout
-from wakewise.control.levers import BED_POINTS, DRIFT_POINTS, DRIFT_WEIGHT, LeverSettings, watched, with_drift
+from wakewise.control.levers import BED_POINTS, DRIFT_POINTS, DRIFT_WEIGHT, LeverSettings, with_bed_points, with_drift
 from wakewise.control.spare import Respared, SpareState, joined_jets, meeting_pairs, meeting_view
+from wakewise.control.watch import Watch
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Command, Goal
 from wakewise.targets import Region
@@ -21,6 +22,11 @@ AHEAD = Region(
     distance_m=np.zeros(3),
 )
 """Points ahead of a vehicle at the origin that looks north, where its camera looks."""
+
+
+def watching(view):
+    """What is seen through a view, and nothing that drifts there."""
+    return Watch(region=AHEAD, view=view, levers=LeverSettings(drift=False))
 
 
 def test_two_equal_jets_join_along_the_middle_with_the_sum_of_their_momenta():
@@ -105,7 +111,11 @@ def test_respared_thrusts_make_the_same_wrench_and_a_fallback_is_left_alone():
     inner, body = Asks(), BodyState(X_WB=Pose(np.zeros(3)))
     view = meeting_view(WakeView.of(VEHICLE, AHEAD, RoundJet()), LAYOUT)
     spared = Respared(
-        name="x", inner=inner, layout=LAYOUT, view=view, weights=Weights(disturbance=150.0, effort=1e-3, previous=1e-3)
+        name="x",
+        inner=inner,
+        layout=LAYOUT,
+        watch=watching(view),
+        weights=Weights(disturbance=150.0, effort=1e-3, previous=1e-3),
     )
     state, rng, searches = spared.init(), np.random.default_rng(1), []
     for k in range(12):
@@ -131,7 +141,7 @@ def test_shares_leave_a_poor_minimum_within_two_seconds():
     )
     view = WakeView.of(VEHICLE, below, RoundJet())
     weights = Weights(disturbance=150.0, effort=1e-3, previous=100.0)
-    spared = Respared(name="x", inner=inner, layout=LAYOUT, view=view, weights=weights)
+    spared = Respared(name="x", inner=inner, layout=LAYOUT, watch=watching(view), weights=weights)
     best = gentle_allocation(LAYOUT, inner.wrench, view.gram(body.X_WB), Weights(disturbance=150.0, effort=1e-3))
     poor = LAYOUT.inverse @ inner.wrench
     state = SpareState(inner=0, thrusts_N=poor, free_age_s=0.0)
@@ -145,8 +155,7 @@ def test_shares_leave_a_poor_minimum_within_two_seconds():
 
 def test_water_that_will_drift_to_the_target_lies_upstream_of_it():
     """Points are the surface's, moved against the current by up to DRIFT_S; the farther, the wider and the lighter."""
-    levers = LeverSettings(drift_m_s=(0.03, 0.0, 0.0))
-    found = with_drift(AHEAD, levers)
+    found = with_drift(AHEAD, np.array([0.03, 0.0, 0.0]))
     new = found.points_W_m[3:]
     assert len(new) == DRIFT_POINTS and new[:, 0].max() < 0.72 + 0.02 * 25.0 and new[:, 0].min() > 0.7 - 0.05 * 25.0
     np.testing.assert_allclose(found.weights[3:].sum(), DRIFT_WEIGHT)
@@ -156,9 +165,8 @@ def test_water_that_will_drift_to_the_target_lies_upstream_of_it():
     far = order[-DRIFT_POINTS // 4 :]
     assert np.ptp(new[far, 1]) > 0.3 > np.ptp(AHEAD.points_W_m[:, 1])
     assert set(np.round(new[:, 2], 9)) <= set(np.round(AHEAD.points_W_m[:, 2], 9))
-    for still in ({"drift_m_s": None}, {"drift_m_s": (0.0, 0.0, 0.0)}, {"drift": False}):
-        assert with_drift(AHEAD, levers.model_copy(update=still)) is AHEAD
-    both = watched(AHEAD, levers.model_copy(update={"bed": True}), 1.5)
+    assert with_drift(AHEAD, np.zeros(3)) is AHEAD
+    both = with_drift(with_bed_points(AHEAD, LeverSettings(bed=True), 1.5), np.array([0.03, 0.0, 0.0]))
     assert len(both.weights) == 3 + DRIFT_POINTS + BED_POINTS
 
 

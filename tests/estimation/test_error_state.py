@@ -1,17 +1,25 @@
 """The filter alone: what it makes of sensors that are noisy, late, silent or broken, and how well it knows itself."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from scipy.stats import chi2
 
 from wakewise.estimation import ErrorStateFilter
 from wakewise.estimation.kernels import unexplained
-from wakewise.estimation.settings import Priors
+from wakewise.estimation.settings import FilterSettings, Priors
 from wakewise.geometry import Pose, matrix_from_quat, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
 from wakewise.interfaces import BodyState, Measurement
+from wakewise.tank.lasting import Lasting
+from wakewise.tank.sensors import FORCE_WALK_M_S2, GYRO_WALK_RAD_S
+from wakewise.tank.settings import MismatchSettings, SensorSettings
 from wakewise.thrusters import thruster_lag
 from wakewise.vehicles import compile_body, load_vehicle, step_rk4
 
 VEHICLE = load_vehicle("paper")
+STEADY = Priors(pose_slow_std_m=0.0, pose_slow_std_rad=0.0, tracking_slow_std_m=0.0, depth_bias_std_m=0.0)
+"""What is to be assumed of sensors none of whose errors last."""
 BODY = compile_body(VEHICLE)
 DT = 0.02
 
@@ -28,14 +36,20 @@ def record(
     seed=0,
     load_W_N=None,
     outlier_every=0,
+    slow_m=0.0,
+    slow_rad=0.0,
+    depth_bias_m=0.0,
+    settings=None,
 ):
     """Fly the nominal vehicle on thrusts that wander, filter its sensors; returns errors, NEES of the pose and state.
 
     Errors per step: position, velocity, attitude, rate (each three). `load_W_N(t)` pulls at the vehicle unknown to
-    the filter; every n-th pose is half a metre off where `outlier_every` says so.
+    the filter; every n-th pose is half a metre off where `outlier_every` says so. `slow_m` and `slow_rad` are spreads
+    of errors of poses that last half a minute; unless `priors` say otherwise the filter knows of none.
     """
     rng = np.random.default_rng(seed)
-    filter_ = ErrorStateFilter(VEHICLE, priors=priors)
+    shift, turn = (Lasting(spread, 30.0, r) for spread, r in zip((slow_m, slow_rad), rng.spawn(2), strict=True))
+    filter_ = ErrorStateFilter(VEHICLE, settings, priors=priors or STEADY)
     p, q, nu = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0, 0, 0]), np.zeros(6)
     start = p + offset_m * np.array([1.0, -1.0, 1.0]) / np.sqrt(3.0)
     state = filter_.init(BodyState(X_WB=Pose(start, q)))
@@ -53,8 +67,8 @@ def record(
             t = k * DT + (sub + 1) * DT / 4
             if t >= pose_due - 1e-9:
                 pose_due, poses = pose_due + 1.0 / 62.0, poses + 1
-                turned = quat_multiply(q, quat_from_rotvec(noise * 0.0035 * rng.normal(size=3)))
-                seen = p + noise * 0.002 * rng.normal(size=3)
+                turned = quat_multiply(q, quat_from_rotvec(noise * 0.0035 * rng.normal(size=3) + turn.at(t)))
+                seen = p + noise * 0.002 * rng.normal(size=3) + shift.at(t)
                 if outlier_every and poses % outlier_every == 0:
                     seen = seen + np.array([0.5, 0.0, 0.0])
                 if not silent[0] <= t < silent[1]:
@@ -64,7 +78,7 @@ def record(
         R = matrix_from_quat(q)
         gyro = nu[3:] + gyro_bias + noise * 0.002 * rng.normal(size=3)
         force = R.T @ ((R @ nu[:3] - v_before) / DT - [0.0, 0.0, 9.80665]) + noise * 0.05 * rng.normal(size=3)
-        depth = float(p[2] + noise * 0.005 * rng.normal())
+        depth = float(p[2] + depth_bias_m + noise * 0.005 * rng.normal())
         arrived += (Measurement(time_s=now, omega_B_rad_s=gyro, force_B_m_s2=force, depth_m=depth),)
         state, estimate = filter_.step(state, DT, arrived, command)
         tilt = rotvec_from_quat(quat_multiply(quat_conjugate(estimate.X_WB.q), q))
@@ -92,10 +106,24 @@ def test_noise_is_averaged_away():
 
 
 def test_the_filter_knows_how_wrong_it_is():
-    """Mean NEES of the pose over independent flights lies within the 95 % bounds of its chi-square distribution."""
-    at = np.array([record(seconds=6.0, seed=seed)[1][[200, 299]] for seed in range(12)])
+    """Told the sensors' own noise, its mean NEES over independent flights is within the 95 % bounds of chi-square.
+
+    Told what a user would state, which is rounded up, it claims less than it knows, and no more.
+    """
+    own = FilterSettings(
+        position_std_m=0.002,
+        attitude_std_rad=0.0035,
+        gyro_std_rad_s=0.002,
+        accelerometer_std_m_s2=0.05,
+        depth_std_m=0.005,
+    )
+    at, stated = (
+        np.array([record(seconds=6.0, seed=seed, settings=s)[1][[200, 299]] for seed in range(12)])
+        for s in (own, FilterSettings())
+    )
     low, high = chi2.ppf([0.025, 0.975], 6 * at.size) / at.size
     assert low < at.mean() < high
+    assert 0.3 * at.mean() < stated.mean() < at.mean()
 
 
 def test_exact_sensors_and_model_leave_next_to_no_error():
@@ -139,7 +167,7 @@ def test_uncertainty_grows_while_poses_are_missing():
 def test_latency_is_taken_back():
     """Poses 90 ms old, three times the usual, are late for the default wait and harmless for a longer one."""
     fresh, _, _ = record(seconds=8.0, latency_s=0.0)
-    waited, _, state = record(seconds=8.0, latency_s=0.09, priors=Priors(settle_s=0.095))
+    waited, _, state = record(seconds=8.0, latency_s=0.09, priors=replace(STEADY, settle_s=0.095))
     _, _, hurried = record(seconds=2.0, latency_s=0.09)
     assert state.late == 0
     assert hurried.late > 80
@@ -205,3 +233,47 @@ def test_order_of_arrival_does_not_matter():
         settled.append(state)
     np.testing.assert_allclose(settled[0].mean, settled[1].mean, atol=1e-12)
     assert settled[0].taken == settled[1].taken == 40
+
+
+@pytest.mark.parametrize(("ratio", "least", "most"), [(0.5, 1.0, 3.2), (1.0, 4.0, 8.0), (2.0, 12.0, 40.0)])
+def test_the_claim_follows_the_assumed_slow_error(ratio, least, most):
+    """Poses off by half, once and twice what is assumed: NEES of 6 components near 1.5, 6 and 24, white noise aside.
+
+    Told of no slow error, the filter claims to be hundreds of times surer than it is.
+    """
+    slow = {"slow_m": ratio * 0.004, "slow_rad": ratio * 0.0026}
+    found = [record(seconds=3.0, seed=seed, priors=Priors(), **slow)[1][-1] for seed in range(12)]
+    assert least < np.mean(found) < most
+    if ratio == 1.0:
+        blind = [record(seconds=3.0, seed=seed, **slow)[1][-1] for seed in range(3)]
+        assert np.mean(blind) > 20.0 * np.mean(found)
+
+
+def test_a_depth_that_is_off_for_good_does_not_drag_the_place_along():
+    """3 cm of bias: with it as a state the height stays within 5 mm, without it is pulled off by more."""
+    within, _, state = record(seconds=6.0, priors=Priors(), depth_bias_m=0.03)
+    dragged, _, _ = record(seconds=6.0, depth_bias_m=0.03)
+    assert np.abs(within[200:, 2]).max() < 0.005 < np.abs(dragged[200:, 2]).max()
+    assert state.mean[-1] == pytest.approx(0.03, abs=0.005)
+
+
+def test_the_filters_figures_are_not_the_tanks():
+    """None of the spreads that the filter assumes of sensors and vehicle is the one that the tank draws with."""
+    filter_, priors, tank, apart = FilterSettings(), Priors(), SensorSettings(), MismatchSettings()
+    pairs = [
+        (filter_.position_std_m, tank.pose_noise_m),
+        (filter_.attitude_std_rad, tank.pose_noise_rad),
+        (filter_.tracking_std_m, tank.tracking_noise_m),
+        (filter_.gyro_std_rad_s, tank.gyro_noise_rad_s),
+        (filter_.accelerometer_std_m_s2, tank.accelerometer_noise_m_s2),
+        (filter_.depth_std_m, tank.depth_noise_m),
+        (priors.gyro_bias_std_rad_s, tank.gyro_bias_rad_s),
+        (priors.accelerometer_bias_std_m_s2, tank.accelerometer_bias_m_s2),
+        (priors.depth_bias_std_m, tank.depth_bias_m),
+        (priors.gain_std, 0.01 * apart.thrust_pct / np.sqrt(3.0)),
+        (priors.drag_std, 0.01 * apart.damping_pct / np.sqrt(3.0)),
+        (priors.gyro_bias_walk_rad_s2, GYRO_WALK_RAD_S),
+        (priors.accelerometer_bias_walk_m_s3, FORCE_WALK_M_S2),
+    ]
+    for assumed, drawn in pairs:
+        assert abs(np.log(assumed / drawn)) > 0.1, (assumed, drawn)

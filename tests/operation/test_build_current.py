@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from wakewise.errors import InputError
+from wakewise.geometry import Pose
+from wakewise.interfaces import BodyState
 from wakewise.operation import load_scenario, preflight
 from wakewise.operation.preflight import check_current
-from wakewise.tank.ambient import mean_current_m_s
 from wakewise.vehicles import load_vehicle
 
 
@@ -52,28 +53,16 @@ def test_the_water_that_is_checked_is_the_water_that_is_flown(seed, monkeypatch)
         np.testing.assert_allclose(row, current @ wished.X_WB.R - wished.nu_B[:3], atol=1e-12)
 
 
-def test_the_levers_know_the_current_that_the_tank_has(tmp_path):
-    """Change the tank's current and drift points follow: upstream of the target."""
+def test_no_controller_is_told_the_current_that_the_tank_has():
+    """Whatever the tank's current, the controller that is made is the same: it learns of it from its estimate."""
 
-    def upstream_m(**changes):
-        scenario = load_scenario("quick", None, {"method": "instant", **changes})
-        parts = scenario.parts()
-        points = parts.controller.view.points_W_m[len(parts.region.weights) :]
-        return points.mean(axis=0)[:2] - parts.target.centre_W_m[:2] if len(points) else None
+    def made(**changes):
+        controller = load_scenario("quick", None, {"method": "instant", **changes}).parts().controller
+        return controller, controller.watch.at(None, BodyState(X_WB=Pose(np.zeros(3))))
 
-    east = upstream_m(**{"tank.current.velocity_m_s": [0.0, 0.05, 0.0]})
-    assert east[1] < -0.3 and abs(east[0]) < 0.1
-    assert upstream_m(**{"tank.current.velocity_m_s": [0.0, 0.0, 0.0]}) is None
-    wrong = {"tank.current.velocity_m_s": [0.0, 0.05, 0.0], "control.levers.drift_m_s": [0.0, -0.05, 0.0]}
-    assert upstream_m(**wrong)[1] > 0.3, "a current that is named is believed"
-
-
-def test_the_mean_current_is_that_of_the_flight(tmp_path):
-    """A steady one is itself; of a series it is the mean from the start to the flight's end, gain included."""
-    path = tmp_path / "c.csv"
-    path.write_text("time_s,u,v\n0,0.0,0.1\n10,0.1,0.1\n20,0.1,0.1\n30,0.9,0.1\n")
-    tank = load_scenario(
-        None, None, {"tank.current.file": str(path), "tank.current.gain": 0.5, "tank.current.gap_s": 20}
+    (still, seen), (east, seen_east) = (
+        made(**{"tank.current.velocity_m_s": [0.0, speed, 0.0]}) for speed in (0.0, 0.05)
     )
-    assert mean_current_m_s(tank.tank, 20.0) == pytest.approx((0.0375, 0.05, 0.0), abs=1e-3)
-    assert mean_current_m_s(load_scenario(None, None, {}).tank, 20.0) == (0.03, 0.02, 0.0)
+    assert np.array_equal(still.view.points_W_m, east.view.points_W_m)
+    assert np.array_equal(seen.view.points_W_m, seen_east.view.points_W_m)
+    assert not seen_east.current_W_m_s.any()

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from wakewise.geometry import Pose, quat_conjugate, quat_from_euler, quat_from_rotvec, quat_multiply, rotvec_from_quat
 from wakewise.interfaces import BodyState
@@ -17,8 +18,19 @@ VECTOR = np.concatenate([STATE.X_WB.p_m, STATE.X_WB.q, STATE.nu_B])
 FORCE = np.array([0.3, -0.1, -9.8])
 
 
+NOTHING_LASTS = {
+    "pose_slow_m": (0.0, 0.0),
+    "pose_slow_rad": (0.0, 0.0),
+    "pose_stamp_late_s": (0.0, 0.0),
+    "pose_outliers": 0.0,
+    "tracking_slow_m": (0.0, 0.0),
+    "depth_bias_m": 0.0,
+}
+"""Sensors whose errors are all gone at the next sample, but for the inertial unit's bias."""
+
+
 def _record(seconds, seed=0, turbidity=0.0, **settings):
-    sensors = Sensors(SensorSettings(**settings), np.random.default_rng(seed))
+    sensors = Sensors(SensorSettings(**(NOTHING_LASTS | settings)), np.random.default_rng(seed))
     out = []
     while sensors.next_due_s() <= seconds:
         time_s = sensors.next_due_s()
@@ -46,7 +58,7 @@ def test_a_pose_arrives_late_with_the_time_it_was_taken():
 
 
 def test_noise_has_the_stated_size():
-    """Scatter of pose, gyro and depth is what the settings say, within 8 %; the gyro has a constant bias."""
+    """Scatter of pose, gyro and depth is what the settings say, within 8 %; the gyro has a bias."""
     record = [m for _, m in _record(60.0)]
     poses = [m.X_WB for m in record if m.X_WB is not None]
     position = np.array([X.p_m - STATE.X_WB.p_m for X in poses])
@@ -105,3 +117,99 @@ def test_a_turned_attitude_is_the_product_of_quaternions():
     for turn in ([0.3, -0.2, 1.1], [1e-9, 0.0, 2e-9], [0.0, 0.0, 0.0]):
         expected = quat_multiply(STATE.X_WB.q, quat_from_rotvec(turn))
         assert _turned(np.array(STATE.X_WB.q), np.array(turn)) == pytest.approx(expected, abs=1e-15)
+
+
+def _place_errors(record):
+    return np.array([m.X_WB.p_m - STATE.X_WB.p_m for m in record if m.X_WB is not None])
+
+
+def test_a_poses_lasting_error_does_not_average_out():
+    """The mean over two seconds is off by millimetres, each flight by its own; over 60 flights by the stated spread."""
+    flights = [[m for _, m in _record(2.0, seed=k, pose_slow_m=(0.004, 0.004))] for k in range(60)]
+    means = np.array([_place_errors(record).mean(axis=0) for record in flights])
+    assert means.std() == pytest.approx(0.004, rel=0.2)
+    exact = np.array([_place_errors([m for _, m in _record(2.0, seed=k)]).mean(axis=0) for k in range(5)])
+    assert np.abs(exact).max() < 1e-3
+
+
+def test_each_lasting_error_is_its_own_sensors():
+    """Attitude, tracking and depth are off for good where they are told to be; the other sensors say what they said."""
+    before = [m for _, m in _record(5.0)]
+    for settings, of in (
+        ({"pose_slow_rad": (0.003, 0.003)}, lambda m: m.X_WB is not None and m.X_WB.q),
+        ({"tracking_slow_m": (0.004, 0.004)}, lambda m: m.p_WB_m),
+        ({"depth_bias_m": 0.02}, lambda m: m.depth_m),
+    ):
+        after = [m for _, m in _record(5.0, **settings)]
+        assert len(after) == len(before)
+        changed = [
+            not np.array_equal(of(a), of(b))
+            for a, b in zip(before, after, strict=True)
+            if of(a) is not None and of(a) is not False
+        ]
+        assert all(changed)
+        for other in (lambda m: m.omega_B_rad_s, lambda m: m.X_WB and m.X_WB.p_m):
+            assert all(np.array_equal(other(a), other(b)) for a, b in zip(before, after, strict=True))
+    bias = np.array([m.depth_m for _, m in _record(5.0, depth_bias_m=0.02) if m.depth_m is not None]) - 0.8
+    assert abs(bias.mean()) > 5.0 * bias.std() / np.sqrt(len(bias))
+
+
+def test_a_pose_is_stamped_late_by_the_flights_own_delay():
+    """Its stamp runs behind the picture by one value of the span, the same all flight; never behind its arrival."""
+    exact = [m.time_s for _, m in _record(3.0) if m.X_WB is not None]
+    late = [m.time_s for _, m in _record(3.0, pose_stamp_late_s=(0.005, 0.02)) if m.X_WB is not None]
+    by = np.array(late) - np.array(exact)
+    assert 0.005 <= by[0] <= 0.02 and by == pytest.approx(np.full(len(by), by[0]))
+    hurried = [(now, m.time_s) for now, m in _record(1.0, pose_stamp_late_s=(0.02, 0.02), pose_latency_s=0.0) if m.X_WB]
+    assert hurried and all(stamp <= now + 1e-9 for now, stamp in hurried)
+
+
+def test_one_pose_in_a_hundred_is_far_off():
+    """0.6 to 1.6 % of 3,700 poses are off by centimetres, the others not at all."""
+    plain = _place_errors([m for _, m in _record(60.0)])
+    some = _place_errors([m for _, m in _record(60.0, pose_outliers=0.01)])
+    moved = np.linalg.norm(some - plain, axis=1)
+    assert 0.006 < np.mean(moved > 0.0) < 0.016
+    assert np.median(moved[moved > 0.0]) > 0.05
+
+
+def test_the_inertial_bias_walks():
+    """Over 200 flights of 20 s the gyro's bias has gone 5e-5 sqrt(20) rad/s from where it was, within 15 %."""
+    gone = []
+    for k in range(200):
+        settings = {
+            "imu_rate_hz": 1.0,
+            "gyro_noise_rad_s": 0.0,
+            "gyro_bias_rad_s": 0.0,
+            "pose_rate_hz": 0.1,
+            "depth_rate_hz": 0.1,
+        }
+        rates = [
+            m.omega_B_rad_s
+            for _, m in _record(20.0, seed=k, tracking_rate_hz=0.0, **settings)
+            if m.omega_B_rad_s is not None
+        ]
+        gone.append(rates[-1] - STATE.nu_B[3:])
+    assert np.std(gone) == pytest.approx(5e-5 * np.sqrt(20.0), rel=0.15)
+
+
+def test_errors_that_last_are_on_by_default():
+    """A default sensor has each of them."""
+    s = SensorSettings()
+    assert min(s.pose_slow_m[0], s.pose_slow_rad[0], s.pose_stamp_late_s[0], s.tracking_slow_m[0]) > 0.0
+    assert s.pose_outliers > 0.0 and s.depth_bias_m > 0.0
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"pose_slow_m": (0.005, 0.003)},
+        {"pose_slow_s": (0.0, 10.0)},
+        {"pose_slow_rad": (-0.1, 0.1)},
+        {"pose_outliers": 1.5},
+    ],
+)
+def test_spans_that_make_no_sense_are_refused(bad):
+    """The first above the second, a memory of nothing, a negative spread, a chance above one."""
+    with pytest.raises(ValidationError):
+        SensorSettings(**bad)

@@ -3,20 +3,25 @@
 import json
 import os
 import shutil
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
 import pytest
 
+from wakewise.control import vehicle_layout
 from wakewise.errors import InputError
-from wakewise.operation import Scenario, fly, fly_trial, load_scenario
-from wakewise.operation.worlds.makers import tank_world
+from wakewise.operation import Parts, Scenario, fly, fly_trial, load_scenario
+from wakewise.operation.instant_water import InstantWater, jets_of
+from wakewise.operation.worlds.makers import tank_world, true_start, true_vehicle
 from wakewise.processes import alone
 from wakewise.reports import write_report
 from wakewise.trials import run_trial
-from wakewise.wake import point_disturbance, wake_model
+from wakewise.wake import point_disturbance
 
 SMALL = {
     "name": "small",
@@ -173,26 +178,82 @@ def test_the_report_of_a_real_trial_is_one_file_without_addresses(trial: tuple[P
     assert 'src="http' not in page
 
 
-def test_the_controllers_water_is_not_the_tanks() -> None:
-    """What the controller's wake model says of the target's water differs from what the tank's jets do there."""
-    scenario = small()
-    parts = scenario.parts()
-    vehicle, tank = parts.vehicle, tank_world(parts).tank()
+@dataclass(frozen=True)
+class Likeness:
+    """How a world's water differs from what the controller believes of it, whatever the strength of either.
+
+    `shape` is the share of the mean square speed about the running jets that the belief, scaled at best, leaves; 0 if
+    one is a multiple of the other. `memory` is the share of the speed that is left 2 s after the thrusters stopped,
+    when the belief has none.
+    """
+
+    shape: float
+    memory: float
+
+    @property
+    def own(self) -> bool:
+        """Whether the water follows a law of its own."""
+        return self.shape > 0.1 and self.memory > 0.05
+
+
+def likeness(parts: Parts, water: Any, speeds_m_s: Callable[[Any], Any]) -> Likeness:
+    """Blow thrusts of no wrench for 4 s, look round each jet to half a metre and 15 cm aside, stop, look again."""
+    vehicle = parts.vehicle
+    null = vehicle_layout(vehicle).null[:, 0]
+    thrusts = 0.6 * null / np.abs(null).max()
+    for _ in range(200):
+        water.step(thrusts, 0.02)
+    origins, axes = (
+        water.state.X_WB.apply(vehicle.thruster_positions_B_m),
+        vehicle.thruster_axes_B @ water.state.X_WB.R.T,
+    )
+    places = []
+    for origin, jet in zip(origins, -np.sign(thrusts)[:, None] * axes, strict=True):
+        aside = np.cross(jet, [0.3, 0.5, 0.8])
+        aside /= np.linalg.norm(aside)
+        ring = (aside, np.cross(jet, aside), -aside, -np.cross(jet, aside))
+        for along in (0.15, 0.25, 0.35, 0.45):
+            places += [origin + along * jet + r * n for r in (0.0, 0.03, 0.06, 0.1, 0.15) for n in ring]
+    points = np.array(places)
+    depth = parts.scenario.tank.size_m[2]
+    points = points[(points[:, 2] > 0.02) & (points[:, 2] < depth - 0.02)]
+    jet, areas = parts.wake, vehicle.disk_areas_m2
+    believed = np.sqrt([point_disturbance(jet, p[None], np.ones(1), origins, axes, areas, thrusts) for p in points])
+    real = speeds_m_s(points)
     for _ in range(100):
-        tank.step(np.array([0.0, 0, 0, 0, -3, -3, -3, -3]), 0.02)
-    X_WB = tank.state.X_WB
-    origins, axes = X_WB.apply(vehicle.thruster_positions_B_m), vehicle.thruster_axes_B @ X_WB.R.T
-    points = origins[4:] + 0.3 * axes[4:]
-    believed = [
-        point_disturbance(wake_model("jet"), p[None], np.ones(1), origins, axes, vehicle.disk_areas_m2, tank.thrusts_N)
-        for p in points
-    ]
-    real = (tank.excess_velocity(points) ** 2).sum(axis=1)
-    # One place of several may agree by chance: the true jets are turbulent, and each thruster has its own gain.
-    apart = np.abs(np.sqrt(believed) - np.sqrt(real)) / np.sqrt(real)
-    assert np.median(apart) > 0.02
+        water.step(np.zeros(len(thrusts)), 0.02)
+    left = speeds_m_s(points)
+    shape = 1.0 - (real @ believed) ** 2 / ((real @ real) * (believed @ believed))
+    return Likeness(shape=float(shape), memory=float(np.linalg.norm(left) / np.linalg.norm(real)))
+
+
+def test_the_controllers_water_is_not_the_tanks() -> None:
+    """The water of the tank, without turbulence and scaled at will, is not what the controller's wake model says."""
+    parts = small(**{"tank.jets.turbulence": 0.0}).parts()
+    tank = tank_world(parts).tank()
+    found = likeness(parts, tank, lambda points: np.linalg.norm(tank.excess_velocity(points), axis=1))
+    assert found.own, found
+    vehicle = parts.vehicle
     assert tank.vehicle.mass_kg != vehicle.mass_kg
     assert not np.allclose(tank.vehicle.thrust_gains, vehicle.thrust_gains)
+
+
+@pytest.mark.parametrize(("gain", "turbulence"), [(1.0, 0.0), (1.3, 0.25)])
+def test_water_that_is_the_controllers_own_belief_is_found_out(gain: float, turbulence: float) -> None:
+    """A world that blows as the controller's wake model says fails the same test, stronger and noisier as it may be."""
+    parts = small().parts()
+    exact, noise = jets_of(parts.wake), np.random.default_rng(5)
+
+    def jets(*of: Any) -> Any:
+        velocity = exact(*of)
+        return gain * velocity * (1.0 + turbulence * noise.normal(size=(len(velocity), 1)))
+
+    settings = parts.scenario.tank
+    rng = np.random.default_rng(1)
+    water = InstantWater(jets, true_vehicle(parts), parts.target, settings, true_start(parts), rng)
+    found = likeness(parts, water, water.speeds_m_s)
+    assert not found.own
+    assert found.shape < 0.1 and found.memory < 1e-3, found
 
 
 def test_the_table_of_a_flight_makes_sense(trial: tuple[Path, dict]) -> None:
@@ -204,7 +265,8 @@ def test_the_table_of_a_flight_makes_sense(trial: tuple[Path, dict]) -> None:
         late.select("est_x_m", "est_y_m", "est_z_m").to_numpy()
         - late.select("true_x_m", "true_y_m", "true_z_m").to_numpy()
     )
-    assert np.sqrt((error**2).sum(axis=1).mean()) < 0.005
+    # Sensors whose errors last put the estimate some 5 mm off; a filter that lost its way is off by centimetres.
+    assert np.sqrt((error**2).sum(axis=1).mean()) < 0.012
     thrusts = steps.select([f"thrust_{i + 1}_N" for i in range(8)]).to_numpy()
     assert np.abs(thrusts).max() <= 51.0 * 1.1
     assert steps["exposing"].sum() == 18

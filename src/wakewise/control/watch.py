@@ -56,4 +56,4 @@ class Watch:
             return np.zeros(3)
         if levers.drift_m_s is not None:
             return np.array(levers.drift_m_s, dtype=np.float64)
-        return np.zeros(3) if found is None or not np.isfinite(found).all() else found
+        return np.zeros(3) if found is None else found

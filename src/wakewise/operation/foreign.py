@@ -160,7 +160,7 @@ def guarded(parts: Parts) -> Controller[Any]:
     vehicle = parts.vehicle
 
     def backup() -> Controller[Any]:
-        return make_controller("dp", vehicle, parts.region, parts.wake, parts.scenario.control, parts.surroundings)
+        return make_controller("dp", vehicle, parts.region, parts.wake, parts.control, parts.surroundings)
 
     return Guarded(
         name=str(getattr(controller, "name", type(controller).__name__)),

@@ -177,7 +177,7 @@ class Parts:
 
     @cached_property
     def control(self) -> ControlSettings:
-        """What the controllers are told: the scenario's settings, and who flies."""
+        """What the controllers are told: the scenario's settings and who flies, nothing of the water flown in."""
         return flown_by(self.scenario.control, int(self.seeds.person().integers(2**32)))
 
     @part

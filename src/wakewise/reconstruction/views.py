@@ -104,6 +104,12 @@ class View:
         )
 
 
+def camera_centres(sparse: Path) -> dict[str, Array]:
+    """Where each registered photo of a sparse model was taken from, by its name, shape (3,) in the model's frame."""
+    images = pycolmap.Reconstruction(sparse).images.values()
+    return {one.name: np.asarray(one.projection_center()) for one in images if one.has_pose}
+
+
 def read_views(sparse: Path, region: Ball | None) -> tuple[tuple[View, ...], Array]:
     """Registered photos of a sparse model, in order of name, and the sparse points, shape (n, 3).
 

@@ -35,6 +35,10 @@ _FIGURES: dict[str, tuple[str, str, Better]] = {
                            "yields was photographed, instead of its shape at rest in still water", "less"),
     "f_score": ("%", "harmonic mean of precision and recall at 3 mm (Tanks and Temples), 0 to 100", "more"),
     **{key: (*SURFACE_DEFINITIONS[key], better) for key, better in _SURFACE_BETTER.items()},
+    "scale_error_pct": ("%", "by how much the model is too large, less than 0: too small; from the spread of its "
+                        "camera centres against the true ones", "none"),
+    "rmse_scaled_mm": ("mm", "rmse_mm of the model brought to the truth's place and size by the true camera centres",
+                       "less"),
     "images": ("", "photographs taken", "none"),
     "registered_images": ("", "photographs that found their place in the model", "more"),
     "features_per_image": ("", "mean number of SIFT keypoints in a photograph", "more"),

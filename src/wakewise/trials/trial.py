@@ -39,6 +39,7 @@ from wakewise.processes import alone
 from wakewise.reconstruction import read_cloud, read_lens, reconstruct
 from wakewise.targets import Mesh, write_mesh
 from wakewise.trials.metrics import Figures, Gathering, comparison
+from wakewise.trials.size import SIZE_FIGURES, size_figures
 from wakewise.trials.stages import Ledger, Quiet, Watch, of_the_computer
 from wakewise.trials.surface import SurfaceMaker
 from wakewise.trials.yardstick import add_yardsticks
@@ -291,6 +292,7 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
             )
             gathering.add({key: getattr(score, key) for key in (*_SURFACE_FIGURES, "success")})
             gathering.add({"rmse_mean_shape_mm": _rmse_mean_shape_mm(parts, folder)})
+            gathering.add(_size(parts, folder, photos))
         except StageError as fault:
             failure = str(fault)
     if parts.yielding is None:
@@ -299,7 +301,7 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
         gathering.missing(("rmse_mean_shape_mm",), f"no model: {failure}")
     if failure is not None:
         gathering.add({"success": False})
-        gathering.missing((*_SURFACE_FIGURES, *_MODEL_FIGURES), f"no model: {failure}")
+        gathering.missing((*_SURFACE_FIGURES, *_MODEL_FIGURES, *SIZE_FIGURES), f"no model: {failure}")
     return {"figures": gathering.figures, "reasons": gathering.reasons}
 
 
@@ -316,3 +318,14 @@ def _rmse_mean_shape_mm(parts: Parts, folder: Path) -> float | None:
         crop=Crop(bed_z_m=parts.target.bed_z_m),
     )
     return score.rmse_mm
+
+
+def _size(parts: Parts, folder: Path, photos: pl.DataFrame) -> dict[str, float]:
+    """Figures of the model's size; that they could not be computed takes no other figure away."""
+    from wakewise.reconstruction.views import camera_centres
+
+    true = dict(zip(photos["name"], photos.select("true_x_m", "true_y_m", "true_z_m").to_numpy(), strict=True))
+    cloud, crop = read_cloud(folder / "dense.ply").points_m, Crop(bed_z_m=parts.target.bed_z_m)
+    with suppress(StageError, InputError):
+        return size_figures(cloud, parts.target.mesh, crop, camera_centres(folder / "sparse"), true)
+    return {}
