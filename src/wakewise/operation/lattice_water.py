@@ -24,6 +24,7 @@ from wakewise.errors import InputError
 from wakewise.interfaces import BodyState, Measurement, Plant, ScalarGrid, Truth, WaterTruth, Witness
 from wakewise.lattice.live import LiveBox, disk_points
 from wakewise.tank import Sensors, TankSettings, VehiclePlant
+from wakewise.tank.camera_joint import CameraJoint
 from wakewise.tank.measuring import TargetProbes
 from wakewise.tank.sediment import SiltLaws
 from wakewise.tank.settings import PLANT_STEP_S
@@ -78,6 +79,8 @@ class LatticeWater:
     half_size_m : float
         The box reaches this far to each side of the target.
     cell_m : float
+    tilt_rad : float
+        Where the joint of the camera, if it has one, stands at the start.
 
     Raises
     ------
@@ -94,6 +97,7 @@ class LatticeWater:
         rng: np.random.Generator,
         half_size_m: float,
         cell_m: float = CELL_M,
+        tilt_rad: float = 0.0,
     ) -> None:
         _check(settings)
         sensor_rng, probe_rng, self._load_rng = rng.spawn(3)
@@ -129,6 +133,7 @@ class LatticeWater:
         self._loads = self._load_rng.standard_normal((len(vehicle.thrusters), _DISK_POINTS, 3))
         self._hull_B_m = _hull_points(vehicle)
         self._sensors = Sensors(settings.sensors, sensor_rng)
+        self._joint = CameraJoint(vehicle.tilt, tilt_rad, settings.sensors, sensor_rng.spawn(1)[0])
         self._probes = TargetProbes(target, probe_rng)
         self._laws = SiltLaws.of(
             settings.silt.grain_m, settings.silt.grain_density_kg_m3, density, settings.silt.erosion_kg_m2_s
@@ -162,7 +167,11 @@ class LatticeWater:
                 self._sensors.sample(self._time, self._plant.vector, self._plant.force_B_m_s2)
         while self._box.time_s - self._began_s < self._time - 0.5 * self._box.step_s:
             self._box.advance(*self._pushes())
-        return self._sensors.collect(self._time)
+        return self._sensors.collect(self._time) + self._joint.turn(self._time, dt_s)
+
+    def aim(self, tilt_rad: float) -> None:
+        """Wish an angle of the camera's joint; a fixed camera does not mind."""
+        self._joint.aim(tilt_rad)
 
     def _pushes(self) -> tuple[Array, Array]:
         """Where the vehicle pushes the water now, and with what, both shape (k, 3)."""
@@ -201,11 +210,17 @@ class LatticeWater:
         power = electrical_power_W(
             thrusts, plant.vehicle.disk_areas_m2, water_density_kg_m3=self.settings.density_kg_m3
         )
-        return Truth(state=plant.state, thrusts_N=thrusts, power_W=float(power.sum()), collision=bool(plant.contact))
+        return Truth(
+            state=plant.state,
+            thrusts_N=thrusts,
+            power_W=float(power.sum()),
+            collision=bool(plant.contact),
+            tilt_rad=self._joint.tilt_rad,
+        )
 
     def water(self) -> WaterTruth:
         """Water at the target now."""
-        camera = (self._plant.state.X_WB @ self._plant.vehicle.X_BC).p_m
+        camera = (self._plant.state.X_WB @ self._plant.vehicle.X_BC_at(self._joint.tilt_rad)).p_m
         return self._probes.measure(self._water, self._laws, None, camera, self.settings.density_kg_m3)
 
     def silt(self) -> ScalarGrid:
@@ -227,12 +242,20 @@ class LatticeWorld:
     half_size_m: float
     draw: Callable[[], np.random.Generator]
     cell_m: float = CELL_M
+    tilt_rad: float = 0.0
     name: str = "lattice"
 
     def begin(self) -> tuple[Plant, Witness | None]:
         """Fresh water at its start, which is plant and witness in one."""
         water = LatticeWater(
-            self.vehicle, self.target, self.settings, self.start, self.draw(), self.half_size_m, self.cell_m
+            self.vehicle,
+            self.target,
+            self.settings,
+            self.start,
+            self.draw(),
+            self.half_size_m,
+            self.cell_m,
+            self.tilt_rad,
         )
         return water, water
 

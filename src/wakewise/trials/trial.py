@@ -7,6 +7,7 @@ import io
 import json
 import platform
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path

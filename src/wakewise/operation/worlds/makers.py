@@ -95,6 +95,7 @@ def lattice_world(parts: Parts) -> LatticeWorld:
         start=true_start(parts),
         half_size_m=box_half_size_m(places, parts.target.centre_W_m, parts.vehicle),
         draw=parts.seeds.tank,
+        tilt_rad=parts.start_tilt_rad,
     )
 
 
