@@ -2,6 +2,7 @@
 
 - `dp`: dynamic positioning, a PID with the least thrusts.
 - `manual`: a person at two sticks, with the autopilot that such vehicles have (see `wakewise.pilot`).
+- `bow-rule`: the same, with bow thrusters that never blow forward.
 - `pseudo-inverse`: the motion of `wake-aware`, wrench for wrench, made with the least thrusts (an ablation).
 - `unaware`: the planner without a disturbance term.
 - `smooth`: the same with a price on change of thrust.
@@ -16,6 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, cast
 
+from wakewise.control.bow_rule import bow_rule
 from wakewise.control.dynamic_positioning import dynamic_positioning
 from wakewise.control.instant import instant
 from wakewise.control.manual import manual
@@ -58,6 +60,7 @@ Maker = Callable[[Vehicle, Region, WakeModel, ControlSettings, Surroundings | No
 
 MAKERS: dict[str, Maker] = {
     "dp": dynamic_positioning,
+    "bow-rule": bow_rule,
     "manual": manual,
     "pseudo-inverse": planned_pseudo_inverse,
     "unaware": unaware,

@@ -36,8 +36,8 @@ from wakewise.water import AmbientSum, SteadyCurrent
 CELL_M = 0.02
 STRONGEST_N = 5.0
 """Thrust of the fastest jet that the time step is made for; stronger ones of short duration still run."""
-SPIN_UP_M = 1.0
-"""Way that the current goes past the target before the thrusters start."""
+SPIN_UP_M, SPIN_UP_S = 1.0, 10.0
+"""Way that the current goes past the target before the thrusters start, or for how long if that is less."""
 _DISK_POINTS, _HULL_SPACING = 32, 0.04
 _UNSTEADINESS = 0.15  # rms of a disk's load over its mean, as in the cases (see `lattice.cases.Case`)
 _LOAD_LIFE = 0.5  # exit diameters over exit speed
@@ -141,7 +141,8 @@ class LatticeWater:
         self._time = 0.0
         speed = float(np.linalg.norm(current))
         nothing = np.zeros((0, 3))
-        for _ in range(round(SPIN_UP_M / speed / self._box.step_s) if speed > 0.0 else 0):
+        spin_up_s = min(SPIN_UP_M / speed, SPIN_UP_S) if speed > 0.0 else 0.0
+        for _ in range(round(spin_up_s / self._box.step_s)):
             self._box.advance(nothing, nothing)
         self._began_s = self._box.time_s
         self._water = _Water(self._box)

@@ -42,7 +42,8 @@ def test_a_world_lies_over_the_preset_and_under_what_the_user_says(tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text("world: payload\ntank: {mismatch: {trim_N: 0.5}}\n")
     scenario = load_scenario("quick", path, {})
-    assert scenario.tank.mismatch.trim_N == 0.5 and set(scenario.draws) == {"tank.current.velocity_m_s"}
+    drawn = set(load_world("payload").draws)
+    assert scenario.tank.mismatch.trim_N == 0.5 and set(scenario.draws) == drawn - {"tank.mismatch.trim_N"}
     assert load_scenario("quick", path, {"world": "still-tank"}).tank.current.velocity_m_s == (0.0, 0.0, 0.0)
 
 
@@ -64,9 +65,11 @@ def test_a_trial_holds_the_world_that_was_flown_in_numbers(tmp_path):
 
 def test_the_water_of_a_world_can_be_another():
     """`flow` takes the place of the world's own water and leaves the rest."""
-    scenario = Scenario.preset("quick", world="payload")
+    scenario = Scenario.preset("quick", world="payload", **{"target.sway": "none"})
     assert flow_name(scenario) == "tank" and flow_name(scenario.replace(flow="paper")) == "paper"
     assert scenario.replace(flow="paper").parts().world.name == "paper"
+    with pytest.raises(InputError, match="flow: 'paper' holds its target still"):
+        _ = Scenario.preset("quick", world="payload", flow="paper").parts().world
     with pytest.raises(InputError, match=r"flow: found 'papr'.*did you mean paper"):
         scenario.replace(flow="papr")
 

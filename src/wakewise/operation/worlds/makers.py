@@ -65,12 +65,18 @@ def tank_world(parts: Parts) -> TankWorld:
     )
 
 
-def _instant(name: str, jets: Callable[[float], Jets], parts: Parts) -> InstantWorld:
-    seed = parts.scenario.seed
+def _check_held(parts: Parts, name: str) -> None:
+    """Refuse a target that gives way where nothing moves it."""
     if parts.yielding is not None:
         raise InputError(
-            f"world: '{name}' holds its target still, target.sway and target.loose move it; in the tank they can"
+            f"flow: '{name}' holds its target still, target.sway and target.loose move it; "
+            "take target.sway=none, or the tank"
         )
+
+
+def _instant(name: str, jets: Callable[[float], Jets], parts: Parts) -> InstantWorld:
+    seed = parts.scenario.seed
+    _check_held(parts, name)
     return InstantWorld(
         name=name,
         jets=jets(parts.scenario.tank.density_kg_m3),
@@ -85,6 +91,7 @@ def _instant(name: str, jets: Callable[[float], Jets], parts: Parts) -> InstantW
 
 def lattice_world(parts: Parts) -> LatticeWorld:
     """`lattice`: a large-eddy simulation round the target, with the loop closed."""
+    _check_held(parts, "lattice")
     route = parts.route
     times_s = np.linspace(0.0, route.duration_s, 200)
     places = np.array([route.body(float(t), parts.aim).X_WB.p_m for t in times_s])

@@ -25,7 +25,7 @@ from wakewise.studies.worlds.figures import method_figures, ratios
 from wakewise.studies.worlds.flight import FLIGHT_FIGURES, MODEL_FIGURES, WorldTrial, fly_trial, scan_trial
 from wakewise.trials.timing import BenchOptions
 
-METHODS = ("dp", "manual", "unaware", "smooth", "wake-aware")
+METHODS = ("dp", "manual", "unaware", "smooth", "bow-rule", "wake-aware")
 """The first is what the others are held against."""
 
 EMERGENT = (

@@ -59,8 +59,9 @@ class WorldTrial:
     duration_s: float | None = None
 
     def scenario(self) -> Scenario:
-        """The quick preset in that world: what `wakewise scan --world` flies."""
-        return Scenario.preset("quick", world=self.world, method=self.method, seed=self.seed, flow=self.flow)
+        """The quick preset in that world: what `wakewise scan --world` flies. Other flows hold the target still."""
+        held = {} if self.flow is None else {"target.sway": "none"}
+        return Scenario.preset("quick", world=self.world, method=self.method, seed=self.seed, flow=self.flow, **held)
 
 
 def short_flight(trial: WorldTrial) -> Parts:
