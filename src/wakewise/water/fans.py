@@ -15,9 +15,9 @@ jet in water goes on to entrain, which the parcels' own closure does.
 So two parcels of different thrusters that meet become `RAYS` parcels with equal shares of their impulse. They begin as
 far from the place between the two as a wall jet does from where a jet strikes, each in a direction within its own equal
 share of w, another one at every second meeting (steps of the golden section cover a share evenly), so that the mean is
-smooth; a correction, the same for all, keeps momentum exact. Each ray is a jet of its own, which spreads, bends, strikes
-and merges as any other. Equal shares of w are equal areas swept about the focus of an ellipse of eccentricity cos alpha:
-Kepler's equation gives the directions.
+smooth; a correction, the same for all, keeps momentum exact. Each ray is a jet of its own, which spreads, bends,
+strikes and merges as any other. Equal shares of w are equal areas swept about the focus of an ellipse of eccentricity
+cos alpha: Kepler's equation gives the directions.
 
 What it does not hold: of unequal jets the weaker one's share fans out, in the plane midway between both directions, and
 the rest of the stronger goes straight on. What has met once does not meet again. The two jets' plane does not sway.
