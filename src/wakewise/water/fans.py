@@ -34,10 +34,10 @@ from wakewise.compiled import njit
 from wakewise.water.bedjets import STRIKE_HEIGHT
 from wakewise.water.parcels import CENTRE_SPEED, Jets, kept_only
 
-RAYS = 3
-"""Into so many parcels two turn."""
+RAYS = 4
+"""Into so many parcels two turn: an even number, so that none keeps to the bisector."""
 HELD = 2
-"""For so many meetings each ray keeps its direction, so that its parcels may become one: half as many to carry."""
+"""For so many meetings each ray keeps its direction, so that its parcels may become one: fewer to carry."""
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 WIDEST = -0.5  # cosine of 120 degrees: wider ones meet head-on, see `wakewise.water.meeting`
 NARROWEST = math.cos(math.radians(20))  # jets that cross at less merge
