@@ -109,7 +109,7 @@ LIMITS: tuple[Limit, ...] = (
         law="mean speed 1 to 2 diameters above the jets' plane, 1 to 6 behind the crossing, over the lattice's",
         source="the lattice, case crossing",
         asked=(0.75, 1.25),
-        reached=(0.87, 1.14),
+        reached=(0.9, 1.01),
         means="the fan is there and as strong; near the crossing it is not as high (decision 26)",
     ),
     Limit(
