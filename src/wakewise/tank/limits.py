@@ -102,7 +102,7 @@ LIMITS: tuple[Limit, ...] = (
         source="the lattice, case crossing",
         asked=(0.75, 1.25),
         reached=(1.28, 1.40),
-        means="wash of two jets that cross is a third too fast ahead of them; without fans it was 1.6 to 2.5 times",
+        means="wash of two jets that cross is a third too fast ahead of them; round jets without fans: 2 to 2.5 times",
     ),
     Limit(
         name="jets that cross: the fan",
