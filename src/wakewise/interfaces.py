@@ -262,9 +262,9 @@ class Pilot(Protocol):
 class WaterTruth:
     """What the water does at the target at one instant, in the figures that a trial is judged by.
 
-    Speeds of `target_*` and `bed_*` are in excess of the same water without thrusters: on points spread evenly over the
-    target's surface, and 1 to 2 cm above the bed within 0.3 m of its foot. What follows is of the whole water, currents
-    included: `target_pressure_*` is 1/2 rho u^2 on the surface, `bed_shear_p95_Pa` the stress on the bed within the
+    Speeds of `target_*` and `bed_*` are in excess of the same water without the vehicle: on points spread evenly over
+    the target's surface, and 1 to 2 cm above the bed within 0.3 m of its foot. What follows is of the whole water, with
+    currents: `target_pressure_*` is 1/2 rho u^2 on the surface, `bed_shear_p95_Pa` the stress on the bed within the
     0.3 m, and `tracer_speed_mean_m_s` what PIV would call the speed there, the straight way of tracers over the time
     of one picture. `turbidity_per_m` is the mean beam attenuation by silt in the water within 0.3 m of the target's
     centre, and `ray_optical_depth` that attenuation along the rays from the camera to the side of the target that it

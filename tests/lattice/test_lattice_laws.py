@@ -118,7 +118,7 @@ def test_turbulence_on_the_axis_is_that_of_a_jet(jet):
     assert 0.20 < np.mean(jet.axial_rms[part, 0] / jet.axial[part, 0]) < 0.32
 
 
-def test_decay_and_spread_lie_between_round_jet_and_propeller(jet):
+def test_regression_of_decay_and_spread(jet):
     """K from 3 (propeller) to 7 (round jet), half width growing by 0.094 (round jet) to 0.177 (propeller)."""
     K, _ = decay(jet)
     assert 3.0 < K < 7.0
@@ -140,7 +140,7 @@ def test_swirl_carries_the_torque():
     assert np.all((angular_flux(table)[part] > 0.11) & (angular_flux(table)[part] < 0.15))
 
 
-def test_front_advances_with_the_root_of_time(jet):
+def test_regression_of_the_front(jet):
     """Beyond five diameters x / (M^(1/4) t^(1/2)) lies 18 to 35 % below 2.57 and changes by less than a fifth."""
     front = front_constant(jet)
     x = front * np.sqrt(math.sqrt(math.pi) / 2 * jet.axis_times)
@@ -158,7 +158,7 @@ def test_two_grids_agree_at_0_3_m(name, limit_pct):
     assert table.figures["grid_convergence_pct"] <= limit_pct
 
 
-def test_jet_that_strikes_a_floor_runs_outwards_along_it():
+def test_regression_of_the_wall_jet():
     """Speeds over the floor fall about as 1 / r, at 0.5 to 1.2 sqrt(M) / r; the law of a resolved wall jet is 1.16."""
     table = load_mean_field("floor")
     constant = wall_jet_constant(table, np.array([2.0, 3.0, 4.0]))

@@ -41,7 +41,7 @@ def _hover(tank, seconds, weight_N=0.0):
         hold -= 0.02 * np.concatenate([10.0 * away, 2 * state.X_WB.q[1:]])
         wrench += hold - np.array([25.0, 30.0, 30.0, 1.0, 1.0, 1.0]) * state.nu_B
         tank.step(np.linalg.pinv(VEHICLE.allocation_matrix) @ wrench, 0.02)
-    tank.water.counts  # waits for the last step
+    assert tank.water.counts.parcels > 0  # asked, since that waits for the last step
     return jets, hull
 
 
@@ -64,7 +64,7 @@ def test_the_wake_is_in_the_water_and_can_be_left_out():
         _, hull = _hover(tank, 20.0)
         sent = tank.water.parcels.take(tank.water.parcels.stream == wake_stream)
         if hull_wake:
-            assert 5 < sent.count < 60
+            assert 2 < sent.count < 60
             downstream = (sent.position_m - tank.state.X_WB.p_m) @ np.array(CURRENT_M_S)
             assert np.all(downstream > 0.0)
             assert np.all(sent.impulse_m4_s @ np.array(CURRENT_M_S) < 0.0)

@@ -3,10 +3,12 @@
 import math
 
 import pytest
+from pydantic import ValidationError
 
 from wakewise.errors import InputError
 from wakewise.operation.scenario import check_scenario
 from wakewise.tank import TankSettings
+from wakewise.tank.settings import JetSettings
 from wakewise.water.currents import wave_number_per_m
 
 
@@ -55,3 +57,13 @@ def test_waves_may_be_as_steep_as_they_stand():
         assert kept.waves.amplitude_m < most_m
         with pytest.raises(ValueError, match="breaks above"):
             TankSettings(size_m=size, waves={"period_s": period_s, "amplitude_m": 1.001 * most_m})
+
+
+def test_jets_have_one_width():
+    """A growth and swirl together are refused; what a resolved scenario writes, both at their defaults, is read."""
+    with pytest.raises(ValidationError, match="give one of them"):
+        JetSettings(half_width_growth=0.13, swirl=True)
+    assert JetSettings(**JetSettings(swirl=True).model_dump()).swirl
+    for bad in ({"half_width_growth": 0.08}, {"half_width_growth": 0.2}, {"wake_life": 0.9}, {"wake_life": 2.0}):
+        with pytest.raises(ValidationError):
+            JetSettings(**bad)

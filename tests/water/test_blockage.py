@@ -54,7 +54,7 @@ def test_flow_over_a_half_ball_is_near_the_potential_flow():
 
 
 @pytest.mark.parametrize(("kind", "most"), [("branching", 0.50), ("brain", 0.75), ("plate", 0.45)])
-def test_corals_are_blocked_in_the_main(kind, most):
+def test_regression_of_what_leaks_through_corals(kind, most):
     """What still crosses a coral's surface, against no blocking; grooves finer than the sources' spacing leak."""
     assert _flow_over(place_on_bed(kind, coral(kind, 0), 1.5), np.array([0.1, 0.05, 0.0]))[2] < most
 

@@ -59,7 +59,8 @@ def test_a_jet_of_any_width_keeps_its_momentum_and_entrains(width, thrust_N):
     """Momentum flux is the thrust within 10 %, Q/Q0 follows 4 spread x/D within 15 %, the half width as asked, 8 %.
 
     At the thrusts of the claims, 0.1 to 5 N, and at .6 and .8 m, where targets stand. The widest jet lacks 16 % of
-    momentum and flux at .8 m (bounds 18 and 20): neighbours in its row differ so much in size that they no longer add up to a slender jet's.
+    momentum and flux at .8 m (bounds 18 and 20 %): neighbours in its row differ so much in size that they no longer add
+    up to a slender jet's.
     """
     water, spread = _steady(width, thrust_N), Spreading.of_width(width)
     tip = (spread.core_D - CORE_END_D / spread.spread) * D_M

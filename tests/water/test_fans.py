@@ -132,7 +132,7 @@ def test_crossing_jets_fan_out_as_in_the_lattice():
     """
     field = load_crossing()
     behind = (field.away_D >= 1.0) & (field.away_D <= 6.0)
-    above, beside = field.points_D()
+    above, _ = field.points_D()
     along = np.array([1.0, 1.0, 0.0]) / math.sqrt(2)
     wide, round_ = (
         _crossing(width, above[behind].reshape(-1, 3))[0].reshape(*above[behind].shape) for width in (0.13, 0.094)

@@ -47,13 +47,16 @@ def test_the_flow_is_that_of_its_parts():
 
 
 def test_every_kind_of_impulse_is_told():
-    """What was given is in the water, has struck, met or come to rest: all of it but what waits at the disks."""
+    """What was given is in the water, has struck, met or come to rest: all of it but what waits at the disks.
+
+    Lengths of impulses are summed here; those of a fan's rays lose a few per cent when they merge, as vectors add.
+    """
     water = _water(160)
     counts = water.counts
     held = water.parcels.size_m4_s.sum() * 1000.0
     assert counts.met_N_s > 0.5 and counts.struck_N_s > 5.0 and counts.rings > 5
     told = held + counts.met_N_s + counts.struck_N_s + counts.retired_N_s
-    assert told == pytest.approx(160 * GIVEN_N_S.sum(), rel=0.02)
+    assert told == pytest.approx(160 * GIVEN_N_S.sum(), rel=0.04)
 
 
 def test_room_runs_out_and_nothing_changes():

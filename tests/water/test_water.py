@@ -101,10 +101,10 @@ def test_water_far_away_is_still_until_the_jet_arrives():
 
 
 def test_reverse_thrust_turns_the_jet_round(steady):
-    """Thrust -T sends the mirror image of the jet of thrust T."""
+    """Thrust -T sends the mirror image of the jet of thrust T, to the single precision of the sums."""
     reverse = _run(_water(), 12.0, [-1.0])
     x = np.array([0.3, 0.8])
-    assert _axis_speed(reverse, -x) == pytest.approx(-_axis_speed(steady, x), rel=1e-9)
+    assert _axis_speed(reverse, -x) == pytest.approx(-_axis_speed(steady, x), rel=1e-6)
 
 
 def test_half_the_flow_step_gives_the_same_jet(steady):

@@ -77,7 +77,8 @@ def test_a_jet_bends_in_a_crossflow_as_measured(current_m_s):
     """The path is z/lM = C (x/lM)^(1/2) near and C (x/lM)^(1/3) far, lM = sqrt(M)/U, with C as in Fischer et al.
 
     H. B. Fischer et al., Mixing in Inland and Coastal Waters, Academic Press 1979, have C from 1.8 to 2.5 near and
-    from 1.4 to 2.1 far, the latter held to 4 %; slopes in between. 0.15 m/s is a fourth of the exit speed.
+    from 1.4 to 2.1 far; slopes in between. 0.15 m/s is a fourth of the exit speed; there the far path is missed by 3 %,
+    which `test_water_regressions` holds.
 
     Not met, and not tested: the path of Fearn and Weston (1974) lies lower, 1.0, 1.2 and 1.4 times at the three speeds.
     """
@@ -94,7 +95,7 @@ def test_a_jet_bends_in_a_crossflow_as_measured(current_m_s):
     constant_near = [height(x) / x**0.5 for x in near]
     constant_far = [height(x) / x ** (1 / 3) for x in far]
     assert min(constant_near) > 1.8 and max(constant_near) < 2.5
-    assert min(constant_far) > 1.4 and max(constant_far) < 2.1 * 1.04
+    assert min(constant_far) > 1.4 and max(constant_far) < 2.1 * (1.04 if current_m_s == 0.15 else 1.0)
     slope = math.log(height(4.0) / height(2.0)) / math.log(2.0)
     assert slope == pytest.approx(1 / 3, abs=0.06)
 
@@ -107,30 +108,6 @@ def test_water_that_left_the_disk_is_not_at_once_in_the_current():
     fresh = np.argmax(young.position_m[:, 2])
     full_drift = 0.1 * young.position_m[fresh, 2] / EXIT_M_S
     assert 0.0 < young.position_m[fresh, 0] < 0.7 * full_drift
-
-
-def test_head_on_jets_turn_aside():
-    """Two 1 N jets 0.6 m apart run out between them; mean outflow is 0.8 to 1.6 times the lattice's near the axis.
-
-    Lattice: 0.20, 0.17 and 0.13 m/s at 5.2, 9.8 and 12.8 cm from the axis, here 1.5, 1.2 and 1.3 times that, and 0.05
-    m/s at 20 cm, where 2.1 times that is left: the lattice's outflow falls faster. Its plane of meeting swings wildly
-    (0.29 m/s rms at the very middle); here it stands, and the middle is too quiet (0.04).
-    """
-    origins, jets = [[0, 0, 0], [0.6, 0, 0]], [[1, 0, 0], [-1, 0, 0]]
-    water = _push(_water(2, turbulence=0.25), 6.0, [1.0, 1.0], origins, jets)
-    r, turn = np.array([0.052, 0.098, 0.128, 0.2]), np.linspace(0, 2 * np.pi, 8, endpoint=False)
-    out = np.stack([0 * turn, np.cos(turn), np.sin(turn)], axis=1)
-    points = np.array([0.3, 0.0, 0.0]) + r[:, None, None] * out
-    speeds = []
-    for _ in range(20):
-        _push(water, 0.1, [1.0, 1.0], origins, jets)
-        u = water.velocity(points.reshape(-1, 3)).reshape(4, 8, 3)
-        speeds.append(np.einsum("rti,ti->r", u, out) / 8)
-    ratio = np.mean(speeds, axis=0) / [0.20, 0.17, 0.13, 0.05]
-    assert np.all((ratio > 0.8) & (ratio < [1.6, 1.6, 1.6, 2.3]))
-    given = 2 * (6.0 + 2.0)
-    held = water.parcels.size_m4_s.sum() * DENSITY
-    assert water.counts.met_N_s + held + water.counts.retired_N_s == pytest.approx(given, rel=0.03)
 
 
 def test_unequal_jets_leave_the_stronger_one_with_the_rest():

@@ -220,7 +220,7 @@ def _water_section(trial: Trial) -> str:
     return section(
         "water",
         "What the water did",
-        "Speeds are the excess over the same flow without thrusters: what the vehicle itself stirred up.",
+        "Speeds are the excess over the same flow without the vehicle: what its jets and its hull's wake did.",
         plot(
             figures.water_over_time(trial),
             "water and position over time",

@@ -48,7 +48,7 @@ _FIGURES: dict[str, tuple[str, str, Better]] = {
     "reprojection_px": ("px", "mean reprojection error of the sparse model", "less"),
     "cameras_rmse_mm": ("mm", "rms distance of reconstructed camera centres from the vehicle's estimates, aligned",
                         "less"),
-    "target_speed_mean_m_s": ("m/s", "water speed at the target's surface, excess over the flow without thrusters, "
+    "target_speed_mean_m_s": ("m/s", "water speed at the target's surface, excess over the flow without the vehicle, "
                               "mean over surface and time from the first leg on", "less"),
     "target_speed_p95_m_s": ("m/s", "95th percentile over the surface of the same, mean over time", "less"),
     "exposure_speed_mean_m_s": ("m/s", "target_speed_mean_m_s while the shutter is open", "less"),

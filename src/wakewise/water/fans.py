@@ -1,9 +1,9 @@
 """Jets that cross: what of them is opposed turns into a fan across their plane.
 
 Where two jets meet at an angle, what they carry along the bisector of their directions adds up. What they carry
-against each other is stopped by the pressure between them, and that pressure drives water out of the plane that both lie
-in: by symmetry each jet strikes the plane midway between them at a slant, and runs out in it. Of two equal round jets
-that meet at the angle 2 alpha, free of friction, the azimuth phi from the bisector takes the share
+against each other is stopped by the pressure between them, and that pressure drives water out of the plane that both
+lie in: by symmetry each jet strikes the plane midway between them at a slant, and runs out in it. Of two equal round
+jets that meet at the angle 2 alpha, free of friction, the azimuth phi from the bisector takes the share
 
     w(phi) = sin^3 alpha / (1 - cos alpha cos phi)^2        (its mean over all azimuths is 1)
 
@@ -14,10 +14,10 @@ jet in water goes on to entrain, which the parcels' own closure does.
 
 So two parcels of different thrusters that meet become `RAYS` parcels with equal shares of their impulse. They begin as
 far from the place between the two as a wall jet does from where a jet strikes, each in a direction within its own equal
-share of w, another one at every meeting (steps of the golden section cover a share evenly), so that the mean is smooth;
-a correction, the same for all, keeps momentum exact. Each ray is a jet of its own, which spreads, bends, strikes and
-merges as any other. Equal shares of w are equal areas swept about the focus of an ellipse of eccentricity cos alpha:
-Kepler's equation gives the directions.
+share of w, another one at every second meeting (steps of the golden section cover a share evenly), so that the mean is
+smooth; a correction, the same for all, keeps momentum exact. Each ray is a jet of its own, which spreads, bends,
+strikes and merges as any other. Equal shares of w are equal areas swept about the focus of an ellipse of eccentricity
+cos alpha: Kepler's equation gives the directions.
 
 What it does not hold: of unequal jets the weaker one's share fans out, in the plane midway between both directions, and
 the rest of the stronger goes straight on. What has met once does not meet again. The two jets' plane does not sway.
@@ -35,7 +35,9 @@ from wakewise.water.bedjets import STRIKE_HEIGHT
 from wakewise.water.parcels import CENTRE_SPEED, Jets, kept_only
 
 RAYS = 4
-"""Into so many parcels two turn."""
+"""Into so many parcels two turn: an even number, so that none keeps to the bisector."""
+HELD = 2
+"""For so many meetings each ray keeps its direction, so that its parcels may become one: fewer to carry."""
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 WIDEST = -0.5  # cosine of 120 degrees: wider ones meet head-on, see `wakewise.water.meeting`
 NARROWEST = math.cos(math.radians(20))  # jets that cross at less merge
@@ -91,7 +93,7 @@ def fan_out(jets: Jets, count: int, streams: int, met: int) -> tuple[int, int]:
             continue
         if count + RAYS > jets.sigma.shape[0]:
             break
-        _rays(jets, count, a, b, one, two, share, streams, (GOLDEN * met) % 1.0, azimuths)
+        _rays(jets, count, a, b, one, two, share, streams, (GOLDEN * (met // HELD)) % 1.0, azimuths)
         count, met = count + RAYS, met + 1
         for k in range(3):
             m[a, k] *= 1.0 - share / one

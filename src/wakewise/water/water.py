@@ -3,15 +3,15 @@
 Every thruster sends parcels of impulse (thrust x time / density) along its jet, from its disk; `wakewise.water.closure`
 says how they grow and travel. Travel time, merging of neighbouring jets, bending in a current and wakes that
 linger follow from the parcels' motion; nothing is prescribed for them. Bed, surface and walls mirror the jets
-(`faces`), turn what strikes them into wall jets (`bedjets`), jets that meet head-on turn aside (`meeting`), and the
-target turns water aside (`blockage`).
+(`faces`), turn what strikes them into wall jets (`bedjets`), jets that cross fan out (`fans`), jets that meet head-on
+turn aside (`meeting`), the target turns water aside (`blockage`), and a hull leaves a wake (`hullwake`).
 
 What it does not hold: swirl shows in the width of a jet only; wall jets carry no turbulence of their own and do not
-collide (those on the same ground add their momentum); there is no boundary layer nor wake of hull and target; the bed
-right below a jet is struck in pulses (mean stress right, fluctuation about half of the mean). After a thruster has
-stopped, its wake dies sooner than the lattice's: the speed lasts 16 to 22 % less, the volume flux 10 to 14 %, the
-half-time at six diameters is 29 % and the energy's life 34 to 46 % shorter. Jets that meet head-on run out 1.2 to 1.5
-times as fast as the lattice's within two diameters, and twice as fast at 20 cm (tests/tank/test_water_laws.py).
+collide (those on the same ground add their momentum); there is no boundary layer of hull and target, nor a wake of the
+target; the bed right below a jet is struck in pulses (mean stress right, fluctuation about half of the mean). After a
+thruster has stopped, its wake dies sooner than the lattice's: the speed lasts 16 to 22 % less, the volume flux 10 to
+14 %, the half-time at six diameters is 29 % and the energy's life 34 to 46 % shorter. How far each law is met is told
+in `wakewise.tank.limits`.
 """
 
 from __future__ import annotations
