@@ -237,9 +237,9 @@ def leaves(model: type[BaseModel], prefix: str = "") -> list[str]:
     return names
 
 
-def test_a_scenario_has_at_most_156_fields() -> None:
+def test_a_scenario_has_at_most_157_fields() -> None:
     """What nobody would set, and no test, bench, study or document varies, is a constant with its argument."""
-    assert len(leaves(Scenario)) <= 156
+    assert len(leaves(Scenario)) <= 157
 
 
 def test_every_field_of_an_older_scenario_is_still_one_or_is_told_what_became_of_it() -> None:
