@@ -47,6 +47,8 @@ def test_a_tissue_can_be_given_numbers_of_its_own():
     """Each replaces the tissue's own; without a tissue they are refused in a line that says what would be right."""
     own = scenario(kind="gorgonian", stiffness_Pa=5e6, tissue_kg_m3=1100.0, drag=1.0, damping=0.2).target.tissue
     assert (own.stiffness_Pa, own.density_kg_m3, own.drag, own.damping) == (5e6, 1100.0, 1.0, 0.2)
+    with pytest.raises(InputError, match="drag is of a target that bends or lies loose"):
+        scenario(drag=1.0)
     with pytest.raises(InputError, match="stiffness_Pa is of a target that bends: let sway be one of anemone"):
         scenario(stiffness_Pa=5e6)
 
@@ -114,6 +116,9 @@ def test_what_cannot_be_moved_is_refused_beforehand():
     fast = scenario(kind="seagrass").replace(**{"tank.current.velocity_m_s": [0.1, 0.0, 0.0]})
     with pytest.raises(InputError, match=r"current of 0\.1 m/s bends seagrass"):
         check_target(fast.parts())
+    check_target(scenario(loose={"weight_N": 1.0}).parts())
+    with pytest.raises(InputError, match=r"target.loose: a current of 0\.036 m/s pushes branching"):
+        check_target(scenario(loose={"weight_N": 0.001}).parts())
 
 
 @pytest.mark.parametrize("world", ["paper", "lattice"])

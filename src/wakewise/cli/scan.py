@@ -93,7 +93,7 @@ def _print_figures(scenario: Scenario, figures: dict[str, Any]) -> None:
     """The headlines of a trial as a table, and why some are missing."""
     from rich.table import Table
 
-    table = Table(title=f"{scenario.method}, {Path(scenario.target.kind).stem} coral, seed {scenario.seed}")
+    table = Table(title=f"{scenario.method}, {Path(scenario.target.kind).stem}, seed {scenario.seed}")
     table.add_column("figure")
     table.add_column("value", justify="right")
     table.add_column("unit")

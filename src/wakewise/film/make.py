@@ -30,7 +30,7 @@ from wakewise.operation.recorder import ExposureRecord
 from wakewise.reports import figures
 from wakewise.reports.trial import Trial, read_trial
 from wakewise.reports.vehicle.hull import hull_of
-from wakewise.targets import coral_kinds
+from wakewise.targets import stony_kinds
 
 FPS = 12.0
 SECONDS = 20.0
@@ -195,7 +195,7 @@ def story_of(trial: Trial, scenario: Scenario, duration_s: float, pace: float) -
     steps = trial.steps
     time_s = np.zeros(0) if speed is None or steps is None else steps["time_s"].to_numpy().astype(np.float64)
     kind = scenario.target.kind
-    target = f"{kind} coral" if kind in coral_kinds() else Path(kind).stem
+    target = f"{kind} coral" if kind in stony_kinds() else Path(kind).stem
     return Story(
         title=scenario.method,
         subtitle=f"{target}, vehicle {Path(scenario.vehicle).stem}, seed {scenario.seed}",

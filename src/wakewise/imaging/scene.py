@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -82,18 +83,28 @@ class Scene:
         rest = self.vertices_F_m[:n] - (self.moved_m if len(self.moved_m) else np.float32(0.0))
         vertices, normals = self.vertices_F_m.copy(), self.normals.copy()
         vertices[:n], normals[:n] = rest + moved_m.astype(np.float32), target_normals
-        own, stones = self.faces[: self.first_face[1]], self.faces[self.first_face[2] :]
-        crossings = len(self.bed.lines_m) ** 2
-        parts = [(vertices[:n], own), (vertices[n + crossings :], stones - (n + crossings))]
+        own = self.faces[: self.first_face[1]]
+        spheres = bounding_spheres([(vertices[:n].astype(np.float64), own.astype(np.int64))])
         return replace(
             self,
             vertices_F_m=vertices,
             normals=normals,
             top_m=float(min(v[:, 2].min(initial=np.inf) for v in (vertices[:n], vertices[n:]))),
-            spheres_F_m=bounding_spheres([(v.astype(np.float64), f.astype(np.int64)) for v, f in parts]),
-            solids=_embree(parts),
+            spheres_F_m=np.concatenate([spheres, self._stone_spheres]),
+            solids=_embree([(vertices[:n], own), self._stones]),
             moved_m=np.ascontiguousarray(moved_m, np.float32),
         )
+
+    @cached_property
+    def _stones(self) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """Vertices and faces of the stones by themselves."""
+        first = self.first_bed_vertex + len(self.bed.lines_m) ** 2
+        return self.vertices_F_m[first:], self.faces[self.first_face[2] :] - np.int32(first)
+
+    @cached_property
+    def _stone_spheres(self) -> Array:
+        vertices, faces = self._stones
+        return bounding_spheres([(vertices.astype(np.float64), faces.astype(np.int64))])
 
     @property
     def target_normals(self) -> NDArray[np.float32]:

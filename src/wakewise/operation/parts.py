@@ -151,10 +151,10 @@ class Parts:
         """How the target gives way to the water; None of one that nothing moves."""
         settings = self.scenario.target
         tissue = settings.tissue
-        if tissue is None and settings.loose is None:
+        weight_N = settings.loose.weight_N
+        if tissue is None and weight_N is None:
             return None
-        lies = settings.loose
-        loose = None if lies is None else Loose(weight_N=lies.weight_N, friction=lies.friction)
+        loose = None if weight_N is None else Loose(weight_N=weight_N, friction=settings.loose.friction)
         drag = tissue.drag if tissue is not None else settings.drag or DRAG
         sway = None if tissue is None else Sway.of(self.target, tissue, self.scenario.tank.density_kg_m3)
         return Yielding(drag=drag, sway=sway, loose=loose)

@@ -13,7 +13,7 @@ from wakewise.operation.surroundings import surroundings_of
 from wakewise.planning import check_start, state_of
 from wakewise.tank import Holding, holding, tank_ambient
 from wakewise.tank.preflight import check_fit
-from wakewise.tank.swaying import check_sway
+from wakewise.tank.swaying import check_loose, check_sway
 from wakewise.vehicles import possible_drags, with_drag
 
 if TYPE_CHECKING:
@@ -56,22 +56,24 @@ def preflight(parts: Parts) -> Preflight:
 
 
 def check_target(parts: Parts, looks: int = 200) -> None:
-    """Refuse a soft target that cannot be moved by the water's steps, or that lies down in its current.
+    """Refuse a soft target that the water's steps cannot move or that lies down, a loose one that is carried away.
 
     Raises
     ------
     InputError
-        See `wakewise.tank.swaying.check_sway`.
+        See `wakewise.tank.swaying.check_sway` and `check_loose`.
     """
     yielding, tank, target = parts.yielding, parts.scenario.tank, parts.target
-    if yielding is None or yielding.sway is None:
+    if yielding is None:
         return
     ambient = tank_ambient(tank, parts.seeds.tank())
     top = np.array([[target.centre_W_m[0], target.centre_W_m[1], target.mesh.vertices_m[:, 2].min()]])
     times_s = np.linspace(0.0, min(parts.route.duration_s, ambient.end_s), looks)
     passing = np.array([ambient.velocity(top, float(time_s))[0] for time_s in times_s])
     fastest = passing[np.argmax(np.linalg.norm(passing, axis=1))]
-    check_sway(target, yielding.sway, yielding.drag, fastest, tank.density_kg_m3, tank.flow_step_s)
+    if yielding.sway is not None:
+        check_sway(target, yielding.sway, yielding.drag, fastest, tank.density_kg_m3, tank.flow_step_s)
+    check_loose(target, yielding, fastest, tank.density_kg_m3)
 
 
 def check_way(parts: Parts) -> None:

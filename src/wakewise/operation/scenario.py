@@ -47,9 +47,11 @@ PRESETS = ("quick", "standard")
 
 
 class LooseSettings(Settings):
-    """A target that lies on the bed without being held."""
+    """Whether the target lies on the bed without being held, and how."""
 
-    weight_N: float = Field(..., gt=0.0, le=1e4, description="its weight in water, N")
+    weight_N: float | None = Field(
+        None, gt=0.0, le=1e4, description="its weight in water, N, if it lies loose and slides when pushed; null: held"
+    )
     friction: float = Field(
         0.65,
         gt=0.0,
@@ -80,7 +82,7 @@ class TargetSettings(Settings):
     damping: float | None = Field(
         None, ge=0.0, le=2.0, description="damping by the tissue itself, relative to critical, instead of its own"
     )
-    loose: LooseSettings | None = Field(None, description="it lies loose on the bed: weight_N in water, friction")
+    loose: LooseSettings = LooseSettings()
 
     @property
     def tissue(self) -> Tissue | None:
@@ -101,6 +103,8 @@ class TargetSettings(Settings):
         for name in ("stiffness_Pa", "tissue_kg_m3", "damping"):
             if getattr(self, name) is not None and self.tissue is None:
                 raise ValueError(f"{name} is of a target that bends: let sway be one of {', '.join(TISSUES)}")
+        if self.drag is not None and self.tissue is None and self.loose.weight_N is None:
+            raise ValueError("drag is of a target that bends or lies loose: set sway or loose.weight_N too")
         return self
 
 

@@ -223,6 +223,26 @@ def check_sway(target: Target, sway: Sway, drag: float, water_m_s: Array, densit
         )
 
 
+def check_loose(target: Target, yielding: Yielding, water_m_s: Array, density_kg_m3: float) -> None:
+    """Refuse a target that its current, (3,), carries away before any thruster turns.
+
+    Raises
+    ------
+    InputError
+        With the drag and the friction.
+    """
+    if yielding.loose is None:
+        return
+    areas = Pieces.of(target, None).areas_m2
+    push_N = drag_N(np.broadcast_to(water_m_s, areas.shape), areas, yielding.drag * density_kg_m3)
+    pushed, holds = float(np.hypot(push_N[0], push_N[1])), yielding.loose.friction * yielding.loose.weight_N
+    if pushed > holds:
+        raise InputError(
+            f"target.loose: a current of {np.linalg.norm(water_m_s):.2g} m/s pushes {target.name} with {pushed:.2g} N, "
+            f"friction holds {holds:.2g} N; let target.loose.weight_N be more"
+        )
+
+
 def standing_m(pieces: Pieces, sway: Sway, drag_kg_m3: float, water_m_s: Array) -> Array:
     """Ways of the tips, shape (k, 2), in which a stream of even velocity, (3,), or (n, 3) at the pieces, holds them."""
     tips, speeds = np.zeros((len(sway.height_m), 2)), np.zeros((len(sway.height_m), 2))
