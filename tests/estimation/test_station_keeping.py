@@ -99,14 +99,16 @@ def test_the_loop_keeps_its_gain_margin_in_flight():
 
 @pytest.mark.parametrize("name", ["paper", "bluerov2-heavy"])
 def test_the_loop_keeps_its_phase_margin_in_flight(name):
-    """Commands late by 30 degrees of phase where the stiffest axis crosses over: the station is held without growth."""
+    """Commands late by 15 degrees of phase where the stiffest axis crosses over: the station is held without growth."""
     vehicle, settings = load_vehicle(name), ControlSettings()
     axes, scale = vehicle_axes(vehicle)[:3], make_tracker(vehicle, settings).gain_scale[:3]
     # Above the corner of the PD the loop is kd/(m s): it crosses one there.
     wished = wished_gains(vehicle_axes(vehicle), Gains(kp=0.0, kd=settings.kd_N_s_m, ki=0.0))
     crossover = max(g.kd * s / axis.mass for g, s, axis in zip(wished[:3], scale, axes, strict=True))
-    late = round(np.radians(30.0) / crossover * settings.rate_hz)
-    assert late >= 2
+    late = round(np.radians(15.0) / crossover * settings.rate_hz)
+    assert late >= 1
     errors, _ = hold(name, "dp", trim_N=0.0, current_m_s=0.0, late_steps=late, seconds=30.0)
+    # Of the 30 deg that the tracker is designed for the filter takes half: reckoning with slow errors of poses, it
+    # believes its model for longer, which knows of no lateness (docs/decisions/0030).
     assert rms(errors[750:]) < 0.01
     assert rms(errors[1125:]) < 1.5 * rms(errors[750:1125])
