@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wakewise.geometry import Pose
-from wakewise.imaging import Lights, PinholeCamera, water_optics
+from wakewise.imaging import Lights, PinholeCamera, Shutter, water_optics
 from wakewise.imaging.particles import FARTHEST_M, NEAREST_M, Seen, draw_flakes, flake_positions, flakes_before
 from wakewise.interfaces import FlakeCloud, ScalarGrid
 
@@ -129,3 +129,24 @@ def test_new_flakes_move_as_their_neighbours_do():
     )
     assert len(seen.p_C_m) > 500
     assert seen.v_W_m_s == pytest.approx(np.tile([0.1, 0.0, -0.02], (len(seen.p_C_m), 1)))
+
+
+def test_a_rolling_shutter_shifts_flakes_as_it_shifts_the_scene():
+    """A flake at the top is seen before the middle of the window and one at the bottom after: skewed by the motion."""
+    heights = np.array([-0.12, 0.0, 0.12])
+    points = np.column_stack([np.zeros(3), heights, np.full(3, 0.2)])
+    poses = [Pose(np.array([x, 0.0, 0.0])) for x in np.linspace(-0.01, 0.01, 5)]
+    dark, far = np.zeros((120, 160, 3), np.float32), np.full((120, 160), 1.0, np.float32)
+    water = water_optics("IB")
+
+    def columns(shutter):
+        lit = draw_flakes(dark, far, CAMERA, poses, _seen(points), 0.02, water, LIGHTS, shutter)[..., 1]
+        bands = [lit[:40], lit[40:80], lit[80:]]
+        return np.array([band.sum(axis=0) @ (np.arange(160) + 0.5) / band.sum() for band in bands])
+
+    rows = CAMERA.project(points)[:, 1] / 120
+    motion_px = CAMERA.focal_px * 0.02 / 0.2
+    np.testing.assert_allclose(
+        columns(Shutter(open=0.02, rolling=0.98)) - 80.0, -0.98 * motion_px * (rows - 0.5), atol=0.4
+    )
+    np.testing.assert_allclose(columns(Shutter()), 80.0, atol=0.2)

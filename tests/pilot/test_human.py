@@ -98,6 +98,17 @@ def test_the_crossover_leaves_the_phase_that_is_kept_in_hand():
     np.testing.assert_allclose(np.degrees(0.5 * np.pi - who.crossover_rad_s * late_s), 40.0)
 
 
+def test_a_vehicle_that_coasts_for_ever_is_steered_with_less_gain():
+    """Inertia beyond the lead that can be made costs phase, so the crossover is lower, at the same margin."""
+    sticks = Sticks(inertia=STICKS.inertia, drag=np.zeros(4), full=STICKS.full, lag_s=STICKS.lag_s)
+    plain = {"phase_margin_deg": (30.0, 30.0), "lead_most_s": (4.0, 4.0)}
+    who, coasting = person(1, **plain), draw_person(1, sticks, People(**plain))
+    late_s, omega = coasting.delay_s + coasting.video_s + 0.1, coasting.crossover_rad_s[:2]
+    assert np.all(omega < who.crossover_rad_s[:2]) and np.all(omega * 4.0 > 1.0)
+    np.testing.assert_allclose(np.degrees(np.arctan(omega * 4.0) - omega * late_s), 30.0, atol=1e-6)
+    np.testing.assert_allclose(coasting.crossover_rad_s[2:], who.crossover_rad_s[2:])
+
+
 def test_two_draws_of_one_seed_are_one_person():
     """Person and pushes follow from the seed alone; another seed is someone else."""
     rng = np.random.default_rng(0)

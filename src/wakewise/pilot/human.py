@@ -92,8 +92,9 @@ class View:
 class Person:
     """One person, drawn; times in s, shares of the distance to the target where no unit is named.
 
-    `crossover_rad_s`, shape (4,); `step`, shape (4,), what is let be (forward, right, down as shares, turn in rad), and
-    `drift`, shape (4,), the rms of the errors of the eye, likewise.
+    `crossover_rad_s`, shape (4,), and `rate_gain`, what a rate that is seen is answered with, N/(m/s), or an offset
+    where the stick asks for a rate, 1/s; `step`, shape (4,), what is let be (forward, right, down as shares, turn in
+    rad), and `drift`, shape (4,), the rms of the errors of the eye, likewise.
     """
 
     seed: int
@@ -102,6 +103,7 @@ class Person:
     video_s: float
     crossover_rad_s: Array
     lead_s: Array
+    rate_gain: Array
     remnant: float
     attended: int
     dwell_s: tuple[float, float]
@@ -115,7 +117,7 @@ class Person:
     stick_step: float
 
     def __post_init__(self) -> None:
-        freeze(self, crossover_rad_s=(4,), lead_s=(4,), step=(4,), drift=(4,))
+        freeze(self, crossover_rad_s=(4,), lead_s=(4,), rate_gain=(4,), step=(4,), drift=(4,))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -157,14 +159,26 @@ def draw_person(seed: int, sticks: Sticks, people: People = PEOPLE) -> Person:
     margin_rad, lead_most_s = math.radians(one(people.phase_margin_deg)), one(people.lead_most_s)
     late_s = delay_s + video_s + sticks.lag_s
     image, size = one(people.image_step), one(people.size_step)
-    drag = np.maximum(sticks.drag, 1e-9)
+    forced = sticks.inertia > 0.0
+    # A vehicle's own time constant, and the lead that a person makes of as much of it as can be made.
+    coast_s = np.where(forced, sticks.inertia / np.maximum(sticks.drag, 1e-9), 0.0)
+    lead_s = np.minimum(coast_s, lead_most_s)
+    crossover = _crossover(margin_rad, late_s, coast_s, lead_s)
     return Person(
         seed=seed,
         sticks=sticks,
         delay_s=delay_s,
         video_s=video_s,
-        crossover_rad_s=(0.5 * math.pi - margin_rad) / late_s,
-        lead_s=np.where(sticks.inertia > 0.0, np.minimum(sticks.inertia / drag, lead_most_s), 0.0),
+        crossover_rad_s=crossover,
+        lead_s=lead_s,
+        # So that the open loop is one at the crossover.
+        rate_gain=np.where(
+            forced,
+            crossover
+            * np.hypot(sticks.inertia * crossover, sticks.drag)
+            / np.hypot(crossover, 1.0 / np.where(forced, lead_s, 1.0)),
+            crossover,
+        ),
         remnant=one(people.remnant),
         attended=people.attended,
         dwell_s=people.dwell_s,
@@ -262,10 +276,10 @@ def steer(
     looked = _beyond(offset, scale * person.step) + loud * np.sqrt(square) * noise[4:8]
     moving = _beyond(rate, scale * person.rate_step_per_s) + loud * np.sqrt(rate_square) * noise[8:12]
 
-    crossover, sticks = person.crossover_rad_s, person.sticks
+    sticks = person.sticks
     forced = sticks.inertia > 0.0
     lead = np.where(forced, person.lead_s, 1.0)
-    answer = np.where(forced, sticks.inertia * crossover * (moving + looked / lead), crossover * looked)
+    answer = person.rate_gain * np.where(forced, moving + looked / lead, looked)
     answer = np.where(minded, answer, 0.0)
     trim = state.trim + np.where(minded & forced, dt_s / person.trim_s, 0.0) * answer
     # The pace of the mission, as the person would begin it; where the stick asks for a force, its drag.
@@ -294,6 +308,26 @@ def steer(
         until_s=until_s,
     )
     return next_state, pushed * full
+
+
+def _crossover(margin_rad: float, late_s: Array, coast_s: Array, lead_s: Array) -> Array:
+    """Frequency, shape (4,), at which delays, and inertia beyond the lead, leave the phase that is kept in hand.
+
+    Slow steering of a vehicle that coasts beyond the lead has little phase, too: of two such frequencies it is the
+    upper one, and where no frequency leaves as much, that which leaves most.
+    """
+
+    def left_rad(omega: Array) -> Array:
+        return np.asarray(0.5 * math.pi - omega * late_s - np.arctan(omega * coast_s) + np.arctan(omega * lead_s))
+
+    grid = np.geomspace(1e-2, 1e2, 400)[:, None]
+    low = np.where(coast_s > lead_s, grid[np.argmax(left_rad(grid), axis=0), 0], 0.0)
+    high = np.where(left_rad(low) > margin_rad, 1e3, low)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        enough = left_rad(middle) > margin_rad
+        low, high = np.where(enough, middle, low), np.where(enough, high, middle)
+    return low
 
 
 def _offsets(seen: Array, wished: Array, watch_W_m: Array | None) -> tuple[Array, Array, Array, float]:
