@@ -27,6 +27,10 @@ Flows = Annotated[str, typer.Option(help="gentle: parcels (the tank) or paper; b
 Levers = Annotated[
     str, typer.Option(help="gentle: levers, with commas between, or none; all if not given.", show_default=False)
 ]
+Judge = Annotated[
+    int,
+    typer.Option(help="worlds: seeds flown in the lattice as well, minutes of a core each.", min=0, max=1000),
+]
 Fresh = Annotated[bool, typer.Option("--fresh", help="gentle, worlds: fly anew what an earlier run has flown.")]
 Workers = Annotated[int, typer.Option(help="gentle, worlds: processes that fly side by side.", min=1, max=64)]
 Store = Annotated[
@@ -48,6 +52,7 @@ def bench(
     levers: Levers = "",
     worlds: Worlds = "",
     models: Models = 1,
+    judge: Judge = 0,
     fresh: Fresh = False,
     workers: Workers = 2,
     store: Store = None,
@@ -82,6 +87,7 @@ def bench(
                 levers=_listed(levers),
                 worlds=_listed(worlds),
                 models=models,
+                judge=judge,
                 fresh=fresh,
                 workers=workers,
                 store=store,

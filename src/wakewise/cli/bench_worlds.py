@@ -40,10 +40,27 @@ def show_worlds(result: dict[str, Any]) -> None:
             cells = [shown(None if row[key] is None else scale * row[key]) for key, _, scale in _COLUMNS]
             table.add_row(method, *cells, _less(row["against"].get(first)))
         print_table(table)
+    if result["judge"]:
+        _show_judge(result["judge"])
     typer.echo(f"{result['flights']} flights, {result['models']} models, {result['failed']} failed")
     for failure in result["failures"]:
         typer.echo(f"failed: {failure['flow']}, {failure['name']}, seed {failure['seed']}: {failure['reason']}")
     typer.echo(f"emergent: {result['emergent']}\ntyped in: {result['typed_in']}")
+
+
+def _show_judge(judge: dict[str, Any]) -> None:
+    """The same flights in the tank and in the lattice."""
+    from rich.table import Table
+
+    table = Table(title="the second judge: hovers in tank and lattice, target held still", title_justify="left")
+    for title in ("world", "method", "tank mm/s", "lattice mm/s", "tank: less than dp", "lattice: less than dp"):
+        table.add_column(title, justify="left" if title in ("world", "method") else "right")
+    for world, methods in judge.items():
+        for method, row in methods.items():
+            speeds = [shown(None if row[flow] is None else 1e3 * row[flow]) for flow in ("tank_m_s", "lattice_m_s")]
+            less = ["—" if row[key] is None else f"{row[key]:.0f} %" for key in ("tank_less_pct", "lattice_less_pct")]
+            table.add_row(world, method, *speeds, *less)
+    print_table(table)
 
 
 def _less(ratios: dict[str, Any] | None) -> str:

@@ -31,6 +31,8 @@ class BenchOptions:
         Which worlds such a bench flies in; None for all.
     models : int
         Seeds, from 1, for which a bench of worlds also scans and makes a model.
+    judge : int
+        Seeds, from 1, that such a bench also flies in the lattice.
     fresh : bool
         Fly anew what an earlier run has flown.
     workers : int
@@ -47,6 +49,7 @@ class BenchOptions:
     levers: tuple[str, ...] | None = None
     worlds: tuple[str, ...] | None = None
     models: int = 1
+    judge: int = 0
     fresh: bool = False
     workers: int = 2
     store: Path | None = None
@@ -55,8 +58,9 @@ class BenchOptions:
         for name, value, most in (("seeds", self.seeds, 1000), ("workers", self.workers, 64)):
             if not 1 <= value <= most:
                 raise InputError(f"{name}: {value}, allowed 1 to {most}")
-        if not 0 <= self.models <= 1000:
-            raise InputError(f"models: {self.models}, allowed 0 to 1000")
+        for name, value in (("models", self.models), ("judge", self.judge)):
+            if not 0 <= value <= 1000:
+                raise InputError(f"{name}: {value}, allowed 0 to 1000")
 
 
 def timed_us(work: Callable[[], Any], repeats: int) -> dict[str, float]:

@@ -10,6 +10,7 @@ from wakewise.errors import InputError, StageError
 from wakewise.studies.worlds import bench
 from wakewise.studies.worlds.figures import method_figures, ratios
 from wakewise.studies.worlds.flight import FLIGHT_FIGURES, MODEL_FIGURES, WorldTrial, fly_trial, short_flight
+from wakewise.studies.worlds.judge import judge_table, judge_trials
 from wakewise.trials import BenchOptions
 
 SPEED = "target_speed_mean_m_s"
@@ -101,6 +102,21 @@ def test_a_run_that_was_stopped_goes_on(made_up, monkeypatch):
     monkeypatch.setattr(bench, "fly_trial", lambda trial: (again.append(trial), flight(trial))[1])
     bench.run(options)
     assert [(t.method, t.seed) for t in again] == [("dp", 2)]
+
+
+def test_the_second_judge_flies_the_same_hovers_in_both_waters(made_up, capsys):
+    """Every judged world and method in tank and lattice; gains are within one water and null where a flight failed."""
+    trials = judge_trials(2)
+    assert {t.flow for t in trials.values()} == {"tank", "lattice"} and len(trials) == 2 * 3 * 3 * 2
+    assert {t.scenario().target.sway for t in judge_trials(1, ("close",)).values()} == {"none"}
+    found = bench.run(BenchOptions(seeds=1, models=0, judge=1, worlds=("close",), methods=("dp",), store=made_up))
+    table = found["judge"]["close"]
+    assert table["wake-aware"]["tank_less_pct"] == pytest.approx(75.0) == table["wake-aware"]["lattice_less_pct"]
+    assert table["dp"]["seeds"] == 1
+    show_worlds(found)
+    assert "the second judge" in capsys.readouterr().out
+    lost = judge_table({("tank: close", "dp", 1): {SPEED: 1.0}})
+    assert lost["close"]["dp"]["tank_m_s"] is None and lost["close"]["dp"]["tank_less_pct"] is None
 
 
 def test_worlds_and_methods_that_are_not_known_are_refused():

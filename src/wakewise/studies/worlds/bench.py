@@ -23,6 +23,7 @@ from wakewise.studies.flight_store import PHOTOGRAPHS, FlightStore, store_folder
 from wakewise.studies.side_by_side import Failure, Key, Row
 from wakewise.studies.worlds.figures import method_figures, ratios
 from wakewise.studies.worlds.flight import FLIGHT_FIGURES, MODEL_FIGURES, WorldTrial, fly_trial, scan_trial
+from wakewise.studies.worlds.judge import JUDGED, judge_table, judge_trials
 from wakewise.trials.timing import BenchOptions
 
 METHODS = ("dp", "manual", "unaware", "smooth", "bow-rule", "wake-aware")
@@ -57,6 +58,13 @@ def run(options: BenchOptions) -> dict[str, Any]:
     models, failed, had = side_by_side.fly_all(
         scans, scan_trial, FlightStore(folder / "models", options.fresh, PHOTOGRAPHS), options, _pool
     )
+    judged, unjudged, seen = side_by_side.fly_all(
+        judge_trials(options.judge, tuple(name for name in JUDGED if name in worlds)),
+        fly_trial,
+        FlightStore(folder / "judge", options.fresh),
+        options,
+        _pool,
+    )
     known = FlightStore(folder / "models", False, PHOTOGRAPHS)
     for name in worlds:  # models of an earlier run count, too
         for method in methods:
@@ -67,13 +75,15 @@ def run(options: BenchOptions) -> dict[str, Any]:
     return {
         "default_world": load_scenario("quick", None, {}).world,
         "worlds": {name: world_figures(name, methods, flown, models, lost + failed) for name in worlds},
+        "judge": judge_table(judged) if options.judge else None,
+        "why": {} if options.judge else {"judge": "not flown; --judge sets for how many seeds"},
         "emergent": EMERGENT,
         "typed_in": TYPED_IN,
         "flights": len(flights),
         "models": len(models),
-        "failed": len(lost) + len(failed),
-        "failures": [vars(failure) for failure in (*lost, *failed)],
-        "flown": len(flights) + len(scans) - kept - had - len(lost) - len(failed),
+        "failed": len(lost) + len(failed) + len(unjudged),
+        "failures": [vars(failure) for failure in (*lost, *failed, *unjudged)],
+        "known_already": kept + had + seen,
         "wall_s": time.monotonic() - began,
     }
 
