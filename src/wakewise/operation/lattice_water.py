@@ -5,9 +5,10 @@ so that a vehicle that hovers leaves no momentum), target and bed are solid, and
 flight is a large-eddy simulation with the loop closed. Vehicle, sensors and the places at which water is judged are
 those of the tank.
 
-What it has not: silt, waves, a pump, turbulence of the water's own; the hull lets jets through. Cells of 2.5 cm are three
-to a thruster's diameter: a jet's speed times distance is then 20 % low at 0.4 m and 20 % high at 0.9 m (cells of 2 cm
-come nearer, at 2.4 times the work), and sheets on the bed and the thin water at the target's surface are coarser still. The target's excess speed is held against the same water just before the thrusters start, once the current has
+What it has not: silt, waves, a pump, turbulence of the water's own; the hull lets jets through. Cells of 2.5 cm are
+three to a thruster's diameter: a jet's speed times distance is then 20 % low at 0.4 m and 20 % high at 0.9 m (cells of
+2 cm come nearer, at 2.4 times the work), and sheets on the bed and the thin water at the target's surface are coarser
+still. The target's excess speed is held against the same water just before the thrusters start, once the current has
 gone round the target for a while.
 """
 
