@@ -15,12 +15,12 @@ from wakewise.vehicles import load_draft
 
 
 @dataclass(frozen=True)
-class BowRule:
+class SternOnly:
     """Controller: the PID of `dp`; the two bow thrusters never blow forward."""
 
     tracker: object
     layout: object
-    name: str = "bow-rule"
+    name: str = "stern-only"
 
     def init(self):
         return self.tracker.init()
@@ -30,7 +30,7 @@ class BowRule:
         return state, ww.Command(thrusts_N=least_thrusts(self.layout, wrench_B).thrusts_N, wrench_B=wrench_B)
 
 
-def bow_rule(task):
+def stern_only(task):
     """Make the controller for what is to be controlled: vehicle, region, wake, settings, surroundings."""
     layout = vehicle_layout(task.vehicle)
     lower, upper = layout.lower_N.copy(), layout.upper_N.copy()
@@ -38,7 +38,7 @@ def bow_rule(task):
     # A jet leaves against the force: forward jets push astern.
     astern = task.vehicle.thruster_axes_B[:, 0] < 0
     upper[bow & astern], lower[bow & ~astern] = 0.0, 0.0
-    return BowRule(make_tracker(task.vehicle, task.settings), replace(layout, lower_N=lower, upper_N=upper))
+    return SternOnly(make_tracker(task.vehicle, task.settings), replace(layout, lower_N=lower, upper_N=upper))
 
 
 @dataclass(frozen=True)
@@ -83,10 +83,10 @@ def hover(parts):
     return Hover(parts.start.X_WB)
 
 
-def still_tank(parts):
+def quiet_tank(parts):
     """World: the tank without any current."""
     still = parts.scenario.replace(**{"tank.current.velocity_m_s": [0, 0, 0]})
-    return replace(tank_world(parts), settings=still.tank, name="still-tank")
+    return replace(tank_world(parts), settings=still.tank, name="quiet-tank")
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from wakewise.errors import InputError
 
 ENTRY_POINTS = """
 [wakewise.controllers]
-bow-rule = reef_parts:bow_rule
+stern-only = reef_parts:stern_only
 [wakewise.wake_models]
 top-hat = reef_parts:TopHat
 [wakewise.vehicle_formats]
@@ -25,7 +25,7 @@ pyramid = reef_parts:pyramid
 [wakewise.pilots]
 hover = reef_parts:hover
 [wakewise.worlds]
-still-tank = reef_parts:still_tank
+quiet-tank = reef_parts:quiet_tank
 [wakewise.currents]
 tide = reef_parts:Tide
 """
@@ -65,21 +65,21 @@ def test_each_kind_is_found_by_its_name(installed: Path, tmp_path: Path) -> None
     scenario = ww.Scenario.preset(
         "quick",
         **{
-            "method": "bow-rule",
+            "method": "stern-only",
             "vehicle": str(tmp_path / "heavy.mass"),
-            "world": "still-tank",
+            "world": "quiet-tank",
             "pilot": "hover",
             "target.kind": "pyramid",
             "control.wake.model": "top-hat",
             "tank.current.file": "tide",
         },
     )
-    assert "bow-rule" in ww.methods()
+    assert "stern-only" in ww.methods()
     parts = scenario.parts()
     assert (parts.vehicle.name, parts.vehicle.mass_kg) == ("heavy", 14.0)
-    assert (parts.target.name, parts.wake.name, parts.world.name) == ("pyramid", "top-hat", "still-tank")
+    assert (parts.target.name, parts.wake.name, parts.world.name) == ("pyramid", "top-hat", "quiet-tank")
     flight = ww.fly(parts, duration_s=2.0)
-    assert flight.parts.method == "bow-rule" and flight.figures["fallbacks"] == 0
+    assert flight.parts.method == "stern-only" and flight.figures["fallbacks"] == 0
     assert set(parts.from_outside) == {"controller", "wake", "world", "pilot", "target", "vehicle", "current"}
     assert "reef-parts 1.0" in parts.from_outside["controller"]
     assert "differences" in parts.from_outside["wake"]
@@ -106,15 +106,15 @@ def test_the_foreign_controllers_trial_says_so(installed: Path, tmp_path: Path, 
     """Scenario, figures, report and comparison name the method and that it came from outside."""
     sets = [word for key, value in SMALL.items() for word in ("--set", f"{key}={json.dumps(value)}")]
     out = tmp_path / "both"
-    assert run(["compare", "--methods", "dp,bow-rule", "--out", str(out), *sets, "--json"]) == 0
+    assert run(["compare", "--methods", "dp,stern-only", "--out", str(out), *sets, "--json"]) == 0
     figures = json.loads(capsys.readouterr().out)
-    assert set(figures["methods"]) == {"dp", "bow-rule"}
-    assert "reef-parts 1.0" in figures["methods"]["bow-rule"]["from_outside"]["controller"]
+    assert set(figures["methods"]) == {"dp", "stern-only"}
+    assert "reef-parts 1.0" in figures["methods"]["stern-only"]["from_outside"]["controller"]
     assert figures["methods"]["dp"]["from_outside"] == {}
-    assert "method: bow-rule" in (out / "bow-rule" / "scenario.yaml").read_text()
-    for page in (out / "bow-rule" / "report.html", out / "comparison.html"):
+    assert "method: stern-only" in (out / "stern-only" / "scenario.yaml").read_text()
+    for page in (out / "stern-only" / "report.html", out / "comparison.html"):
         text = page.read_text(encoding="utf-8")
-        assert "bow-rule" in text and "from outside" in text, page
+        assert "stern-only" in text and "from outside" in text, page
 
 
 def test_a_part_given_in_python_is_named_in_the_record(installed: Path, tmp_path: Path) -> None:
@@ -126,10 +126,10 @@ def test_a_part_given_in_python_is_named_in_the_record(installed: Path, tmp_path
 
     parts = ww.Scenario.preset("quick").parts()
     task = ControlTask(vehicle=parts.vehicle, region=parts.region, wake=parts.wake, settings=parts.control)
-    mine = parts.replace(controller=reef_parts.bow_rule(task))
+    mine = parts.replace(controller=reef_parts.stern_only(task))
     left = as_flown(mine)
-    assert left.method == "bow-rule"
-    assert left.replaced == {"controller": "bow-rule (reef_parts.BowRule)"}
+    assert left.method == "stern-only"
+    assert left.replaced == {"controller": "stern-only (reef_parts.SternOnly)"}
     assert ww.Scenario.model_validate(left.model_dump()) == left
 
 
@@ -138,8 +138,8 @@ def test_a_part_given_in_python_is_named_in_the_record(installed: Path, tmp_path
     [
         ({"method": "reef_parts:nothing"}, "cannot be loaded, AttributeError"),
         ({"method": "no_such_package:make"}, "cannot be loaded, ModuleNotFoundError"),
-        ({"method": "bow-role"}, "did you mean bow-rule"),
-        ({"world": "moon"}, "allowed are tank, paper, lattice, still-tank"),
+        ({"method": "stern-onli"}, "did you mean stern-only"),
+        ({"world": "moon"}, "reef, still-tank, quiet-tank"),
         ({"control.wake.model": "top-cat"}, "top-hat"),
         ({"target.kind": "pyramids"}, "pyramids"),
     ],

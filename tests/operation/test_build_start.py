@@ -75,7 +75,7 @@ def test_the_planner_knows_the_tank_and_the_target():
     table = parts.controller.model.table
     assert table.planes.shape == (6, 4)
     assert table.spheres[0].tolist() == [2.0, 0.0, 1.0, 0.1]
-    vertices = parts.target.mesh.vertices_m
+    vertices = parts.found_target.mesh.vertices_m
     inside = [np.linalg.norm(vertices - sphere[:3], axis=1) <= sphere[3] + 1e-9 for sphere in table.spheres[1:]]
     assert np.all(np.any(inside, axis=0))
 

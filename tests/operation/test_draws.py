@@ -45,18 +45,18 @@ def test_a_seed_draws_a_field_alike_whatever_else_is_drawn():
 def test_a_draw_that_says_nothing_or_nonsense_is_refused(given, words):
     """In one line that names the field."""
     with pytest.raises(InputError, match=rf"draws\.tank\.mismatch\.trim_N.*{words}"):
-        load_scenario("quick", None, {"draws": {TRIM: given}})
+        load_scenario("quick", None, {"world": "tank", "draws": {TRIM: given}})
 
 
 def test_a_draw_of_no_field_is_refused():
     """A misspelt field is told of when the scenario is read, not when it is flown."""
     with pytest.raises(InputError, match=r"draws: tank\.mismatch\.trim_n: no such field, did you mean trim_N"):
-        load_scenario("quick", None, {"draws": {"tank.mismatch.trim_n": [0.0, 1.0]}})
+        load_scenario("quick", None, {"world": "tank", "draws": {"tank.mismatch.trim_n": [0.0, 1.0]}})
 
 
 def test_parts_fly_what_the_seed_draws_and_another_seed_draws_anew():
     """The scenario that is flown holds numbers and no draws; parts of another seed draw from where the first did."""
-    scenario = Scenario.preset("quick", draws={TRIM: [-5.0, -2.0]})
+    scenario = Scenario.preset("quick", world="tank", draws={TRIM: [-5.0, -2.0]})
     one = scenario.parts()
     two = one.replace(seed=scenario.seed + 1)
     trims = [parts.scenario.tank.mismatch.trim_N for parts in (one, two)]
@@ -67,8 +67,10 @@ def test_parts_fly_what_the_seed_draws_and_another_seed_draws_anew():
 
 def test_what_is_said_of_a_field_ends_its_draw():
     """A value laid over a draw wins; a draw laid over a value wins; whole groups count as their fields."""
-    scenario = Scenario.preset("quick", draws={TRIM: [-5.0, -2.0], "mission.standoff_m": [0.4, 0.5]})
+    scenario = Scenario.preset("quick", world="tank", draws={TRIM: [-5.0, -2.0], "mission.standoff_m": [0.4, 0.5]})
     assert set(scenario.replace(**{TRIM: 1.0}).draws) == {"mission.standoff_m"}
     assert set(scenario.replace(tank=scenario.tank).draws) == {"mission.standoff_m"}
+    other = Scenario.preset("quick", world="payload").replace(draws={TRIM: {"any_of": [1.0]}})
+    assert other.drawn().tank.mismatch.trim_N == 1.0 and len(other.draws) > 3  # another draw takes the whole place
     again = scenario.replace(**{TRIM: 1.0}).replace(draws={TRIM: [2.0, 3.0]})
     assert 2.0 <= again.drawn().tank.mismatch.trim_N <= 3.0

@@ -25,7 +25,7 @@ BENT = replace(
 
 
 def scenario(**target):
-    return ww.Scenario.preset("quick", **{f"target.{name}": value for name, value in target.items()})
+    return ww.Scenario.preset("quick", world="tank", **{f"target.{name}": value for name, value in target.items()})
 
 
 @pytest.fixture(scope="module")

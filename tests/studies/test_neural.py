@@ -32,7 +32,7 @@ def test_a_model_without_truth_has_no_score(tmp_path, monkeypatch):
 
 def test_points_of_a_trial_are_measured_against_the_truth(tmp_path, monkeypatch):
     """True points with 1 mm of noise score what they must; the region is the plan's; a missing dense cloud is said."""
-    scenario = load_scenario("quick", None, {})
+    scenario = load_scenario("quick", None, {"world": "tank"})
     parts = scenario.parts()
     write_scenario(tmp_path / "scenario.yaml", scenario, {})
     (tmp_path / "images.csv").write_text("name,true_x_m,true_y_m,true_z_m\na,0.5,0,1.2\nb,-0.5,0,1.2\nc,0,0.5,1.2\n")
@@ -50,7 +50,7 @@ def test_points_of_a_trial_are_measured_against_the_truth(tmp_path, monkeypatch)
     assert neural.is_trial(tmp_path)
     out = tmp_path / "nerf"
     figures = neural.field_of_trial(tmp_path, tmp_path / "images", out, PROFILES["cpu"], **ALIKE)
-    np.testing.assert_allclose(asked["region"][0], parts.target.centre_W_m)
+    np.testing.assert_allclose(asked["region"][0], parts.found_target.centre_W_m)
     assert asked["region"][1] > parts.target.radius_m
     assert figures["rmse_mm"] == pytest.approx(1.0, abs=0.35)
     assert figures["completeness_pct"] > 95.0 and figures["success"] is True

@@ -24,6 +24,7 @@ from wakewise.trials import run_trial
 from wakewise.wake import point_disturbance
 
 SMALL = {
+    "world": "tank",
     "name": "small",
     "mission.elevations_deg": [30, 50],
     "mission.views": [10, 8],

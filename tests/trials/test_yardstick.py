@@ -45,7 +45,7 @@ def test_the_waters_own_speed_is_that_of_its_current(parts: Parts) -> None:
     """A steady current has its own speed, still water has none."""
     times = np.linspace(0.0, 60.0, 50)
     assert ambient_speed_m_s(parts, times) == pytest.approx(np.hypot(0.03, 0.02), rel=1e-9)
-    still = load_scenario("quick", None, {"tank.current.velocity_m_s": [0, 0, 0]})
+    still = load_scenario("quick", None, {"world": "tank", "tank.current.velocity_m_s": [0, 0, 0]})
     assert ambient_speed_m_s(still.parts(), times) == 0.0
 
 

@@ -76,7 +76,7 @@ class Parts:
     >>> import wakewise as ww
     >>> parts = ww.Scenario.preset("quick").parts()
     >>> parts.vehicle.name, parts.target.name, round(parts.route.duration_s)
-    ('paper', 'branching', 96)
+    ('paper', 'soft-coral', 96)
     >>> parts.replace(vehicle=ww.load_vehicle("bluerov2-heavy")).controller.name
     'wake-aware'
     """

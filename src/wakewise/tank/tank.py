@@ -104,7 +104,7 @@ class Tank:
             size_m=settings.size_m,
             target_W_m=np.concatenate([target.mesh.vertices_m, more]),
             failures=settings.failures,
-            tether=_tether(settings),
+            tether=Tether.of(settings),
         )
         self._water = Water(
             vehicle.disk_areas_m2,
@@ -370,19 +370,6 @@ def tank_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSum
 def _streams(rng: np.random.Generator) -> list[np.random.Generator]:
     """Generators of water, silt, sensors, probes and the water's own motion."""
     return rng.spawn(5)
-
-
-def _tether(settings: TankSettings) -> Tether | None:
-    """The cable that the settings ask for, if any."""
-    if settings.tether.diameter_m == 0.0:
-        return None
-    return Tether(
-        winch_W_m=np.array(settings.tether.from_m),
-        p_BT_m=np.array(settings.tether.at_B_m),
-        diameter_m=settings.tether.diameter_m,
-        length_m=settings.tether.length_m,
-        density_kg_m3=settings.density_kg_m3,
-    )
 
 
 def _swell(ambient: AmbientSum, laws: SiltLaws) -> Swell | None:

@@ -10,6 +10,7 @@ from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.interfaces import Current
+from wakewise.tank.settings import TankSettings
 
 DRAG_COEFFICIENT = 1.1
 """Of a smooth circular cylinder across the flow, Reynolds numbers 1e3 to 2e5 (S. F. Hoerner, Fluid-Dynamic Drag, 1965,
@@ -46,6 +47,20 @@ class Tether:
     diameter_m: float
     length_m: float
     density_kg_m3: float
+
+    @classmethod
+    def of(cls, settings: TankSettings) -> Tether | None:
+        """The cable that a tank's settings ask for, if any."""
+        asked = settings.tether
+        if asked.diameter_m == 0.0:
+            return None
+        return cls(
+            winch_W_m=np.array(asked.from_m),
+            p_BT_m=np.array(asked.at_B_m),
+            diameter_m=asked.diameter_m,
+            length_m=asked.length_m,
+            density_kg_m3=settings.density_kg_m3,
+        )
 
     def __post_init__(self) -> None:
         freeze(self, winch_W_m=(3,), p_BT_m=(3,))

@@ -35,7 +35,6 @@ from wakewise.operation import (
     write_scenario,
 )
 from wakewise.operation.flying import FLIGHT_JOBS
-from wakewise.operation.photography import moved_m
 from wakewise.processes import alone
 from wakewise.reconstruction import read_cloud, read_lens, reconstruct
 from wakewise.targets import Mesh, write_mesh
@@ -310,6 +309,8 @@ def _rmse_mean_shape_mm(parts: Parts, folder: Path) -> float | None:
     """`rmse_mm` against the mean of the shapes that were photographed; None of a target that does not yield."""
     if parts.yielding is None:
         return None
+    from wakewise.operation.photography import moved_m
+
     exposures = read_exposures(folder / "exposures.npz")
     moved = np.mean([moved_m(parts, exposure) for exposure in exposures], axis=0)
     mesh = parts.target.mesh
