@@ -167,7 +167,7 @@ ABSENT: tuple[str, ...] = (
 
 
 def limits_table() -> list[dict[str, str]]:
-    """The laws as rows of words, for a page: law, asked, reached, met, source, what it means."""
+    """The laws as rows of words, for a page, the missed ones first: law, asked, reached, met, source, what it means."""
 
     def span(ends: tuple[float, float]) -> str:
         return f"{ends[0]:.3g} to {ends[1]:.3g}"
@@ -182,5 +182,5 @@ def limits_table() -> list[dict[str, str]]:
             "met": "yes" if limit.met else "no",
             "means": limit.means,
         }
-        for limit in LIMITS
+        for limit in sorted(LIMITS, key=lambda limit: limit.met)
     ]
