@@ -11,7 +11,7 @@ import typer
 from wakewise.cli.main import app
 
 ROOT = Path(__file__).parents[1]
-PAGES = ["README.md", "CONTRIBUTING.md", "docs/README.md", "docs/python.md", "docs/extending.md"]
+PAGES = ["README.md", "CONTRIBUTING.md", "docs/README.md", "docs/python.md", "docs/extending.md", "docs/worlds.md"]
 
 
 def blocks(page, language=""):
@@ -136,3 +136,60 @@ def test_every_kind_of_plugin_is_in_the_docs():
 
     text = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
     assert [group for group in GROUPS.values() if f"`{group}`" not in text] == []
+
+
+def table(page, heads):
+    """Rows of the table of a page whose head row this is, as lists of cells."""
+    lines = (ROOT / page).read_text(encoding="utf-8").splitlines()
+    (start,) = (i for i, line in enumerate(lines) if line == heads)
+    rows = []
+    for line in lines[start + 2 :]:
+        if not line.startswith("|"):
+            break
+        rows.append([cell.strip() for cell in line.strip("|").split("|")])
+    return rows
+
+
+def test_the_readme_says_what_the_tank_gets_wrong():
+    """Its table is the tank's own, row by row, and nothing that the water has not is left out; misses are called so."""
+    from wakewise.tank.limits import ABSENT, limits_table
+
+    rows = table("README.md", "| | law | asked | reached | what it means for a claim |")
+    told = limits_table()
+    assert [row[1:] for row in rows] == [
+        [f"*{row['name']}*: {row['law']}", row["asked"], row["reached"], row["means"]] for row in told
+    ]
+    assert [row[0] for row in rows] == [{"no": "**missed**", "yes": "kept"}[row["met"]] for row in told]
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert [line for line in ABSENT if f"\n- {line}\n" not in text] == []
+
+
+def test_the_page_of_worlds_lists_those_that_there_are():
+    """Names and titles are those of the library, and each world's water is what the page says."""
+    from wakewise.operation import load_scenario
+    from wakewise.operation.worlds.library import load_world, world_names
+    from wakewise.operation.worlds.makers import WORLDS
+
+    rows = table("docs/worlds.md", "| world | what |")
+    assert rows == [[f"`{name}`", load_world(name).file.title] for name in world_names()]
+    assert {load_world(name).file.flow for name in world_names()} == {"tank"}
+    assert {row[0].strip("`") for row in table("docs/worlds.md", "| flow | what |")} == set(WORLDS)
+    default = load_scenario("quick", None, {}).world
+    assert f"Presets fly in `{default}`" in (ROOT / "docs" / "worlds.md").read_text(encoding="utf-8")
+
+
+def test_the_draws_of_the_page_of_worlds_are_taken(tmp_path):
+    """The scenario shown there can be loaded, keeps the world's other draws, and two seeds draw two worlds from it."""
+    from wakewise.operation import load_scenario
+    from wakewise.operation.worlds.library import load_world
+
+    (shown,) = blocks("docs/worlds.md", "yaml")
+    (tmp_path / "my.yaml").write_text(shown, encoding="utf-8")
+    scenario = load_scenario("quick", tmp_path / "my.yaml", {})
+    assert set(load_world("reef").draws) < set(scenario.draws)
+    first, second = (scenario.replace(seed=seed).drawn() for seed in (3, 4))
+    assert scenario.mission.standoff_m == first.mission.standoff_m == 0.6
+    for seen in (first, second):
+        assert -4.0 <= seen.tank.mismatch.trim_N <= 0.0
+        assert seen.target.kind in ("gorgonian", "soft-coral")
+    assert first.tank != second.tank

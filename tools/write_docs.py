@@ -1,6 +1,7 @@
-"""Write docs/commands.md from the commands' own help and docs/scenario.md from the settings' own descriptions.
+"""Write docs/commands.md from the commands' own help, docs/scenario.md from the settings' own descriptions, and
+README's table of what the tank gets wrong from that of the tank.
 
-A test fails when either is stale.
+A test fails when any is stale.
 """
 
 from __future__ import annotations
@@ -115,7 +116,30 @@ def _allowed(field: Any) -> str:
     return ", ".join(words)
 
 
-PAGES = {"commands.md": commands_page, "scenario.md": scenario_page}
+def limits_lines() -> list[str]:
+    """What the tank gets wrong, as lines of Markdown: a table and what the water has not."""
+    from wakewise.tank.limits import ABSENT, limits_table
+
+    said = {"no": "**missed**", "yes": "kept"}
+    rows = ["| | law | asked | reached | what it means for a claim |", "|---|---|---|---|---|"]
+    for row in limits_table():
+        law = f"*{row['name']}*: {row['law']}".replace("|", r"\|")
+        rows.append(f"| {said[row['met']]} | {law} | {row['asked']} | {row['reached']} | {row['means']} |")
+    return [*rows, "", "What it has not at all:", "", *(f"- {line}" for line in ABSENT)]
+
+
+def readme_page() -> str:
+    """Text of README.md with its table as it should be; the rest is as it is."""
+    text = (DOCS.parent / "README.md").read_text(encoding="utf-8")
+    before, mark, rest = text.partition("<!-- limits: ")
+    comment, arrow, rest = rest.partition("-->\n")
+    _, end, after = rest.partition("<!-- limits end -->")
+    if not (mark and arrow and end):
+        raise ValueError("README.md: the two comments round the table of limits are not there")
+    return "".join([before, mark, comment, arrow, "\n".join(limits_lines()), "\n", end, after])
+
+
+PAGES = {"commands.md": commands_page, "scenario.md": scenario_page, "../README.md": readme_page}
 
 if __name__ == "__main__":
     DOCS.mkdir(exist_ok=True)

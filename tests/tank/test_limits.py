@@ -265,7 +265,10 @@ def test_the_table_says_what_is_measured(limit):
 
 
 def test_the_page_tells_misses_as_misses():
-    """Rows have words in every field; some laws are met and some are not, and both are said."""
+    """Rows have words in every field; some laws are met and some are not, both are said, and misses come first."""
     rows = limits_table()
-    assert {row["met"] for row in rows} == {"yes", "no"}
+    assert {row["met"] for row in rows} == {"yes", "no"} and len(rows) == len(LIMITS)
+    assert [row["met"] for row in rows] == sorted(row["met"] for row in rows)
     assert all(all(row.values()) for row in rows) and len(ABSENT) >= 5
+    # Rows are sorted anew, so each has to stand by itself.
+    assert not any("the same" in row["law"] for row in rows)

@@ -8,8 +8,9 @@ as written. Steady jets only: what moving costs does not depend on ballast.
 The advice is the ballast of least effort that is not worse by D than the vehicle as it is. Least D is another one and
 is told beside it (`gentlest`, of least effort among those near to the least D): D always asks for floats, since jets
 then go up, but a float is a load that thrusters must hold all the time, and the water that they draw in and send to
-the surface comes round. In the simulated tank, which knows this, the centre of gravity of the advice made the target's
-water slower and floats of 1.2 N did not (docs/decisions/0013, 0014).
+the surface comes round. In decision 0014's lever flights, which all floated, the centre of gravity of the advice made
+the target's water slower and floats of 1.2 N more did not; what they do for a vehicle that is heavy was not flown
+there.
 """
 
 from __future__ import annotations
@@ -89,8 +90,8 @@ class TrimAdvice:
         row = self.gentlest
         return (
             f"least by the wake model alone: {1e3 * row.speed_m_s:.1f} mm/s with {row.float_N:+.1f} N and the centre "
-            f"of gravity {row.shift_mm:+.0f} mm, at {row.thrust_N:.2f} N of thrust; in the simulated tank floats did "
-            "not make the water slower (docs/decisions/0014)"
+            f"of gravity {row.shift_mm:+.0f} mm, at {row.thrust_N:.2f} N of thrust; in decision 0014's lever flights, "
+            "which all floated, floats did not make the water slower"
         )
 
 

@@ -13,6 +13,7 @@ from wakewise.files import write_text
 from wakewise.reports import figures
 from wakewise.reports.errors import ModelErrors, model_errors
 from wakewise.reports.ink import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, data_uri, error_colours
+from wakewise.reports.limits import limits_section
 from wakewise.reports.looks import coloured_model
 from wakewise.reports.page import absence, error_scale, fold, missing, panel, pictures, plot, section, whole_page
 from wakewise.reports.photos import embed
@@ -73,14 +74,16 @@ def comparison_page(trials: Mapping[str, Trial], rows: Path | None = None) -> st
         ("model", "Models"),
         ("seen", "Seen"),
         ("water", "Water"),
+        ("limits", "Limits"),
         ("figures", "All figures"),
     )
     links = "".join(f'<a href="#{anchor}">{title}</a>' for anchor, title in parts)
     body = (
         f'<header class="top">{_headline(trials)}</header>'
         f'<nav class="parts" aria-label="parts"><div>{links}</div></nav>'
-        f"<main>{_main(trials)}{_models(trials, errors)}{_rows(rows)}{_seen(trials)}{_water(trials)}{_figures(trials)}"
-        "</main><footer>Ratios are to the first method. Made by Wakewise.</footer>"
+        f"<main>{_main(trials)}{_models(trials, errors)}{_rows(rows)}{_seen(trials)}{_water(trials)}"
+        f"{limits_section(trials)}{_figures(trials)}</main>"
+        "<footer>Ratios are to the first method. Made by Wakewise.</footer>"
     )
     return whole_page(f"{' and '.join(trials)} · Wakewise", body)
 

@@ -10,6 +10,7 @@ from wakewise.evaluation.surface import SUCCESS_COMPLETENESS_PCT, SUCCESS_RMSE_M
 from wakewise.files import write_text
 from wakewise.reports import figures
 from wakewise.reports.draft import Draft
+from wakewise.reports.limits import limits_section
 from wakewise.reports.looks import colours_html, film_html
 from wakewise.reports.model import before_colours, before_mesh, model_section
 from wakewise.reports.page import absence, fold, missing, plot, section, tile, whole_page
@@ -25,6 +26,7 @@ PARTS = (
     ("flown", "Flown"),
     ("seen", "Seen"),
     ("water", "Water"),
+    ("limits", "Limits"),
     ("figures", "Figures"),
     ("again", "Reproduce"),
 )
@@ -81,7 +83,8 @@ def report_page(trial: Trial, draft: Draft | None = None) -> str:
     body = (
         f'<header class="top">{_headline(trial)}</header><nav class="parts" aria-label="parts"><div>{links}</div></nav>'
         f"<main>{calm}{model_section(trial, draft)}{_flown(trial, draft)}{_seen(trial, draft)}"
-        f"{_water(trial, draft)}{_figures(trial)}{_again(trial)}</main><footer>{_footer(trial)}</footer>"
+        f"{_water(trial, draft)}{limits_section({trial.name: trial})}{_figures(trial)}{_again(trial)}</main>"
+        f"<footer>{_footer(trial)}</footer>"
     )
     return whole_page(f"{trial.name} · Wakewise", body)
 
