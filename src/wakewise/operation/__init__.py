@@ -1,13 +1,13 @@
 """One vehicle doing one mission: scenario, parts, the fixed-rate loop, the recorder; the same code for tank and sea.
 
 Start reading in `parts.py` (what a flight is built from, and the one place where the controller's world and the true
-one meet) and `loop.py` (the loop itself). `scenario.py` with `target_settings.py` is a maker of parts, read from YAML (`renamed.py` knows the
-names of older files) with `draws.py` (what its seed draws), `seeds.py` its random streams, `regions.py` keeps what
-takes long to draw; `worlds/` and `pilots.py` are worlds and pilots by name (`helm.py` is the pilot who is a person),
-`instant_water.py` and `lattice_water.py` worlds other than the tank, `survey.py` what is known of target and camera
-beforehand; `surroundings.py` is what a planner is told to keep clear of, `preflight.py` refuses what does not fit,
-`foreign.py` guards what comes from outside; `flying.py` flies, `recorder.py` and `telemetry.py` keep what was,
-`photography.py` renders what the camera saw, `darkroom.py` while the flight goes on.
+one meet) and `loop.py` (the loop itself). `scenario.py` with `target_settings.py` is a maker of parts, read from YAML
+(`renamed.py` knows the names of older files) with `draws.py` (what its seed draws), `seeds.py` its random streams,
+`regions.py` keeps what takes long to draw; `worlds/` and `pilots.py` are worlds and pilots by name (`helm.py` is the
+pilot who is a person), `instant_water.py` and `lattice_water.py` worlds other than the tank, `survey.py` what is known
+of target and camera beforehand; `surroundings.py` is what a planner is told to keep clear of, `preflight.py` refuses
+what does not fit, `foreign.py` guards what comes from outside; `flying.py` flies, `recorder.py` and `telemetry.py`
+keep what was, `photography.py` renders what the camera saw, `darkroom.py` while the flight goes on.
 """
 
 from typing import TYPE_CHECKING
