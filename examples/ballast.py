@@ -5,7 +5,7 @@ import sys
 import wakewise as ww
 from wakewise.control.trim import ballasted, net_buoyancy_N, trim_advice
 
-parts = ww.Scenario.preset("quick", vehicle=sys.argv[1] if sys.argv[1:] else "paper", method="dp").parts()
+parts = ww.Scenario.preset("quick", world="tank", vehicle=sys.argv[1] if sys.argv[1:] else "paper", method="dp").parts()
 times = parts.route.exposures_s[:: len(parts.route.exposures_s) // 12]
 poses = tuple(parts.route.body(time, parts.aim).X_WB for time in times)
 advice = trim_advice(

@@ -13,6 +13,7 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any
 
+from wakewise.errors import MissingExtra
 from wakewise.extras import missing_extra
 
 
@@ -28,11 +29,15 @@ class _Door(ModuleType):
             raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
         try:
             value = getattr(import_module(home[0]), home[1])
-        except ModuleNotFoundError as fault:
-            refusal = missing_extra(f"{self.__name__}.{name}", fault, *self._extras)
+        except (ModuleNotFoundError, MissingExtra) as fault:
+            # Another room's door may have refused on the way: what was asked for here is what is told of.
+            missing = fault.__cause__ if isinstance(fault, MissingExtra) else fault
+            if not isinstance(missing, ModuleNotFoundError):
+                raise
+            refusal = missing_extra(f"{self.__name__}.{name}", missing, *self._extras)
             if refusal is None:
                 raise
-            raise refusal from fault
+            raise refusal from missing
         self.__dict__[name] = value
         return value
 

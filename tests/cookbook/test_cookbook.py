@@ -30,6 +30,7 @@ quiet-tank = reef_parts:quiet_tank
 tide = reef_parts:Tide
 """
 SMALL = {
+    "world": "tank",
     "mission.elevations_deg": [40],
     "mission.views": [3],
     "mission.speed_m_s": 0.5,

@@ -10,6 +10,7 @@ import pytest
 from wakewise.operation import fly_trial, load_scenario
 
 SHORT = {
+    "world": "tank",
     "mission.elevations_deg": [40],
     "mission.views": [3],
     "mission.speed_m_s": 0.5,

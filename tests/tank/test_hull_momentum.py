@@ -9,7 +9,7 @@ from wakewise.tank import Tank, TankSettings
 from wakewise.targets import Mesh, place_on_bed
 from wakewise.vehicles import load_vehicle
 
-VEHICLE = load_vehicle("paper")  # as heavy as the water that it displaces
+VEHICLE = load_vehicle("paper").with_ideal_thrusters()  # as heavy as the water that it displaces
 CURRENT_M_S = (0.08, 0.05, 0.0)
 CORNERS = np.array([[0.07, 0.07, 0], [-0.07, 0.07, 0], [0.0, -0.07, 0], [0, 0, 0.15]])
 TARGET = place_on_bed("wedge", Mesh(CORNERS, np.array([[0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 2, 1]])), 1.5)

@@ -13,7 +13,7 @@ from wakewise.trials.yardstick import add_yardsticks, ambient_speed_m_s, grain_t
 
 @pytest.fixture(scope="module")
 def parts() -> Parts:
-    return load_scenario("quick", None, {"target.kind": "brain", "target.points": 60}).parts()
+    return load_scenario("quick", None, {"world": "tank", "target.kind": "brain", "target.points": 60}).parts()
 
 
 def steps_with(parts: Parts, thrusts_N: np.ndarray) -> pl.DataFrame:
