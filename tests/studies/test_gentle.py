@@ -42,6 +42,8 @@ def test_a_reduction_is_that_of_the_means_and_its_interval_holds_it():
     assert value == pytest.approx(50.0) and interval == pytest.approx((50.0, 50.0))
     value, interval = reduction_pct(base, rows([1.2, 0.4, 1.0, 2.5]), SPEED)
     assert interval[0] < value < interval[1]
+    value, interval = reduction_pct(rows([0.0, 2.0]), rows([0.0, 1.0]), SPEED)  # a seed without any has no share
+    assert value == pytest.approx(50.0) and np.isfinite(interval).all()
     assert change(base, rows([2.0, 3.0, 4.0, 3.0]), SPEED) == (pytest.approx(1.0), pytest.approx((1.0, 1.0)))
 
 

@@ -35,6 +35,7 @@ def reduction_pct(
     if len(values) == 1:
         return value, None
     means = _resampled(values)
+    means = means[means[:, 0] > 0.0]  # of no base there is no share
     low, high = np.percentile(100.0 * (1.0 - means[:, 1] / means[:, 0]), [2.5, 97.5])
     return value, (float(low), float(high))
 
