@@ -83,6 +83,12 @@ def test_a_photograph_hangs_on_how_the_target_stood():
     assert len(marks) == 5
 
 
+def test_a_flight_whose_water_is_never_asked_about_has_the_same_columns_in_all_rows():
+    """How the target stands is told from the first row on, also where the water is looked at for no other reason."""
+    steps = ww.fly(scenario(kind="anemone").replace(method="dp"), duration_s=0.2, water_every_s=np.inf).steps
+    assert steps.height == 10 and steps["sway_m"].is_finite().all()
+
+
 def test_a_target_that_yields_has_columns_of_its_own():
     """A rigid target's table is as it was; the others keep their order."""
     rigid = step_columns(2)

@@ -33,7 +33,7 @@ _PAGE_MB = resource.getpagesize() / 1e6
 
 def run(options: BenchOptions) -> dict[str, Any]:
     """Play a recorded flight to the tank and time it, with the processor's time by what it went to."""
-    scenario = load_scenario("standard", None, {"method": "dp"})
+    scenario = load_scenario("standard", None, {"method": "dp", "world": "tank"})
     thrusts = _flown(scenario, FLIGHT_S, options)
     tank = _tank(scenario)
     points = _points(tank)

@@ -132,6 +132,8 @@ class FlightRecorder:
         if self.witness is not None and (exposing or step.time_s >= self._water_time_s + self.water_every_s - 1e-9):
             self._water, self._water_time_s = self.witness.water(), step.time_s
             self._posture = _posture_of(self.witness)
+        elif self.witness is not None and not self._rows:
+            self._posture = _posture_of(self.witness)  # all rows have its columns or none has
         water = [getattr(self._water, name) if self._water is not None else np.nan for name in _WATER]
         truth = step.truth
         lost = np.full(13, np.nan)
