@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from wakewise.allocation import Allocation, Layout, compile_layout, least_thrusts
-from wakewise.arrays import Array
+from wakewise.allocation import Layout, compile_layout
+from wakewise.control.dynamic_positioning import with_least_thrusts
 from wakewise.control.loop import TrackingController
 from wakewise.control.settings import ControlSettings
-from wakewise.control.tracker import make_tracker
 from wakewise.errors import InputError
 from wakewise.interfaces import WakeModel
 from wakewise.planning import Surroundings
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
-from wakewise.wake import WakeView
 
 _LEVEL = 0.5
 """A thruster counts as level if its axis is less than 30 deg off level, and as blowing forward if its jet has more than
@@ -51,14 +49,4 @@ def bow_rule(
     around: Surroundings | None = None,  # noqa: ARG001
 ) -> TrackingController:
     """`bow-rule`: the tracker of `dp` with the least thrusts that keep the rule."""
-    layout = bow_layout(vehicle)
-
-    def allocate(wrench_B: Array, gram: Array | None, _: Array) -> Allocation:
-        return least_thrusts(layout, wrench_B, gram)
-
-    return TrackingController(
-        name="bow-rule",
-        tracker=make_tracker(vehicle, settings),
-        view=WakeView.of(vehicle, region, wake, settings.superposition),
-        allocate=allocate,
-    )
+    return with_least_thrusts("bow-rule", bow_layout(vehicle), vehicle, region, wake, settings)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wakewise.allocation import Allocation, least_thrusts
+from wakewise.allocation import Allocation, Layout, least_thrusts
 from wakewise.arrays import Array
 from wakewise.control.loop import TrackingController, vehicle_layout
 from wakewise.control.settings import ControlSettings
@@ -22,13 +22,19 @@ def dynamic_positioning(
     around: Surroundings | None = None,  # noqa: ARG001
 ) -> TrackingController:
     """`dp`: the tracker with the least thrusts; the wake model is only asked what D they cause."""
-    layout = vehicle_layout(vehicle)
+    return with_least_thrusts("dp", vehicle_layout(vehicle), vehicle, region, wake, settings)
+
+
+def with_least_thrusts(
+    name: str, layout: Layout, vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings
+) -> TrackingController:
+    """The tracker with the least thrusts of a layout, which may allow thrusters less than the vehicle's does."""
 
     def allocate(wrench_B: Array, gram: Array | None, _: Array) -> Allocation:
         return least_thrusts(layout, wrench_B, gram)
 
     return TrackingController(
-        name="dp",
+        name=name,
         tracker=make_tracker(vehicle, settings),
         view=WakeView.of(vehicle, region, wake, settings.superposition),
         allocate=allocate,

@@ -194,17 +194,8 @@ class LatticeWater:
         forces = -each * axes[:, None] + np.abs(each) * uneven
         X_WB = plant.state.X_WB
         hull = X_WB.apply(self._hull_B_m)
-        given = np.broadcast_to(self._drag_W_N() / len(hull), hull.shape)
+        given = np.broadcast_to(plant.drag()[1] / len(hull), hull.shape)
         return np.concatenate([points.reshape(-1, 3), hull]), np.concatenate([forces.reshape(-1, 3), given])
-
-    def _drag_W_N(self) -> Array:
-        """Force of the hull on the water by the vehicle's own damping, shape (3,)."""
-        state, water = self._plant.state, self._plant.vehicle.hydrodynamics
-        nu = state.nu_B.copy()
-        nu[:3] -= np.array(self.settings.current.velocity_m_s) @ state.X_WB.R
-        wrench = water.linear_damping @ nu + water.quadratic_damping @ (np.abs(nu) * nu)
-        force: Array = state.X_WB.R @ wrench[:3]
-        return force
 
     def observe(self) -> Truth:
         """Vehicle, thrusters and collisions now."""
