@@ -13,6 +13,7 @@ from wakewise.errors import InputError
 from wakewise.operation.parts import Parts
 from wakewise.operation.recorder import LOAD
 from wakewise.operation.scenario import read_scenario
+from wakewise.vehicles import Vehicle
 
 LEARNING_S = 4.0
 """The estimator knows a vehicle's load that long after the start: from 1 N unknown to some hundredths."""
@@ -33,13 +34,13 @@ def hovering(steps: pl.DataFrame) -> BoolArray:
     return np.asarray(rested & slow & (time_s >= time_s[0] + LEARNING_S))
 
 
-def flight_trim(parts: Parts, steps: pl.DataFrame) -> HoverTrim:
+def flight_trim(vehicle: Vehicle, steps: pl.DataFrame) -> HoverTrim:
     """What the hovers of a flight say of the trim of its vehicle.
 
     Parameters
     ----------
-    parts : Parts
-        Of the flight: the vehicle as it was believed to be, ballast included.
+    vehicle : Vehicle
+        As it was believed to be, ballast included.
     steps : DataFrame
         Its record, as in steps.parquet.
 
@@ -48,7 +49,7 @@ def flight_trim(parts: Parts, steps: pl.DataFrame) -> HoverTrim:
     InputError
         If the record holds no load (it is of an older version), or no hover of two seconds.
     """
-    n = len(parts.vehicle.thrusters)
+    n = len(vehicle.thrusters)
     needed = [*LOAD, *(f"command_{i + 1}_N" for i in range(n))]
     missing = [name for name in needed if name not in steps.columns]
     if missing:
@@ -63,7 +64,7 @@ def flight_trim(parts: Parts, steps: pl.DataFrame) -> HoverTrim:
         )
     kept = steps.filter(still)
     return hover_trim(
-        parts.vehicle,
+        vehicle,
         _table(kept, [f"est_q{a}" for a in "wxyz"]),
         _table(kept, [*LOAD]),
         _table(kept, needed[len(LOAD) :]),
@@ -86,7 +87,16 @@ def folder_trim(folder: Path) -> tuple[Parts, HoverTrim]:
         steps = pl.read_parquet(folder / "steps.parquet")
     except (OSError, pl.exceptions.PolarsError) as fault:
         raise InputError(f"{folder / 'steps.parquet'}: cannot be read ({str(fault).splitlines()[0]})") from None
-    return parts, flight_trim(parts, steps)
+    return parts, flight_trim(parts.vehicle, steps)
+
+
+def proposal(vehicle: Vehicle, steps: pl.DataFrame) -> str | None:
+    """What a flight proposes for the ballast of the next one, in one line; None where it proposes nothing."""
+    try:
+        found = flight_trim(vehicle, steps)
+    except InputError:  # no hover, or an older record: nothing is known, nothing is proposed
+        return None
+    return found.words if found.blocks else None
 
 
 def _table(steps: pl.DataFrame, names: list[str]) -> Array:
