@@ -27,7 +27,9 @@ from wakewise.vehicles.tilt import TiltJoint
 _STATE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "u_m_s", "v_m_s", "w_m_s", "p_rad_s", "q_rad_s", "r_rad_s")
 _WRENCH = ("wrench_X_N", "wrench_Y_N", "wrench_Z_N", "wrench_K_Nm", "wrench_M_Nm", "wrench_N_Nm")
 _WATER = tuple(figure.name for figure in fields(WaterTruth))
-_POSTURE = ("sway_m", "sway_peak_m", "sway_x_m", "sway_y_m", "sway_z_m", "target_stress_Pa", "shifted_m")
+_POSTURE = (
+    "sway_m", "sway_peak_m", "sway_x_m", "sway_y_m", "sway_z_m", "target_stress_Pa", "shifted_m", "sway_wash_m",
+)  # fmt: skip
 
 
 def step_columns(thrusters: int, yields: bool = False) -> list[str]:
@@ -231,7 +233,7 @@ def _posture_row(posture: Posture | None) -> Array:
         return np.zeros(0)
     far = float(np.hypot(posture.shift_m[0], posture.shift_m[1]))
     mean = posture.sway_mean_W_m
-    return np.array([posture.sway_m, posture.sway_peak_m, *mean, posture.target_stress_Pa, far])
+    return np.array([posture.sway_m, posture.sway_peak_m, *mean, posture.target_stress_Pa, far, posture.sway_wash_m])
 
 
 def _stance(posture: Posture | None) -> dict[str, Array]:
