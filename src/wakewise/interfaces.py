@@ -308,7 +308,8 @@ class Posture:
     (see `wakewise.targets.Sway`), and `shift_m`, shape (2,), how far it has slid north and east. Of the surface above
     the bed, against its shape at rest in still water and without the sliding: `sway_m` is the root mean square
     distance, `sway_peak_m` the largest, and `sway_mean_W_m`, shape (3,), the mean way. `target_stress_Pa` is the
-    largest bending stress.
+    largest bending stress. `sway_wash_m` is the root mean square distance from where the same water without the vehicle
+    would have the surface.
     """
 
     tips_m: Array
@@ -318,6 +319,7 @@ class Posture:
     sway_peak_m: float
     sway_mean_W_m: Array
     target_stress_Pa: float
+    sway_wash_m: float = math.nan
 
     def __post_init__(self) -> None:
         k = len(self.tips_m)

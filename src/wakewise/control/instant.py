@@ -10,6 +10,7 @@ from wakewise.arrays import Array
 from wakewise.control.levers import with_bed_points
 from wakewise.control.loop import TrackingController, vehicle_layout
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
+from wakewise.control.silt import silt_view
 from wakewise.control.spare import meeting_view
 from wakewise.control.tracker import make_tracker
 from wakewise.control.watch import Watch
@@ -61,4 +62,5 @@ def instant(
     seen = with_bed_points(region, levers, bed_of(wake))
     controller = instant_allocator(vehicle, seen, wake, settings)
     view = meeting_view(controller.view, vehicle_layout(vehicle)) if levers.meet else controller.view
-    return replace(controller, view=view, watch=Watch(region=seen, view=view, levers=levers))
+    silt = silt_view(vehicle, region, wake, levers)
+    return replace(controller, view=view, watch=Watch(region=seen, view=view, levers=levers, silt=silt))

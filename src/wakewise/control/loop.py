@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wakewise.allocation import Allocation, Layout, compile_layout
+from wakewise.allocation import Allocation, Layout, compile_layout, disturbance_of
 from wakewise.arrays import Array, freeze
 from wakewise.control.tracker import Tracker, TrackerState
 from wakewise.control.watch import Seen, Watch
@@ -84,10 +84,12 @@ class TrackingController:
         gram = view.gram(estimate.X_WB) / growth
         usable = bool(np.isfinite(gram).all())
         fallback = None if usable else "wake model not finite: least thrusts"
-        found = self.allocate(wrench, gram if usable else None, state.thrusts_N)
+        silt = None if self.watch is None else self.watch.silt_gram(estimate, state.thrusts_N)
+        cost = gram if silt is None else gram + self.view.total_weight * silt
+        found = self.allocate(wrench, cost if usable else None, state.thrusts_N)
         if found.scale < FULL and fallback is None:
             fallback = f"thrusters saturated: {100.0 * found.scale:.0f} % of the wrench"
-        D = None if found.disturbance is None else growth * found.disturbance
+        D = None if found.disturbance is None else growth * disturbance_of(gram, found.thrusts_N)
         command = Command(thrusts_N=found.thrusts_N, wrench_B=wrench, disturbance=D, fallback=fallback)
         after = ControllerState(tracker=tracker_state, thrusts_N=found.thrusts_N, share=found.scale, seen=seen)
         return after, command

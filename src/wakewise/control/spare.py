@@ -18,10 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.allocation.allocate import Allocation, Layout, Weights, gentle_allocation
+from wakewise.allocation.allocate import Allocation, Layout, Weights, disturbance_of, gentle_allocation
 from wakewise.arrays import Array, IntArray
 from wakewise.control.loop import vehicle_layout
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
+from wakewise.control.silt import silt_view
 from wakewise.control.watch import Seen, Watch
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Command, Controller, Goal, WakeModel
@@ -200,16 +201,18 @@ class Respared:
             return SpareState(inner=inner, thrusts_N=command.thrusts_N), replace(command, fallback=words)
         share = self.watch.view.total_weight / seen.view.total_weight
         weights = replace(self.weights, disturbance=share * self.weights.disturbance)
-        found = gentle_allocation(self.layout, command.wrench_B, G, weights, state.thrusts_N)
+        silt = self.watch.silt_gram(estimate, state.thrusts_N)
+        cost = G if silt is None else G + seen.view.total_weight * silt
+        found = gentle_allocation(self.layout, command.wrench_B, cost, weights, state.thrusts_N)
         free_age_s = state.free_age_s + EVERY_S
         if free_age_s + 1e-6 >= FREE_EVERY_S:
-            anew = gentle_allocation(self.layout, command.wrench_B, G, replace(weights, previous=0.0))
+            anew = gentle_allocation(self.layout, command.wrench_B, cost, replace(weights, previous=0.0))
             free_age_s = 0.0
             if _cost(anew, weights) < (1.0 - WORTH) * _cost(found, weights):
                 found = anew
-        told = self._told(inner, found.thrusts_N, dt_s)
-        new = SpareState(told, found.thrusts_N, dt_s, found.disturbance, free_age_s, seen)
-        return new, replace(command, thrusts_N=found.thrusts_N, disturbance=found.disturbance)
+        told, D = self._told(inner, found.thrusts_N, dt_s), disturbance_of(G, found.thrusts_N)
+        new = SpareState(told, found.thrusts_N, dt_s, D, free_age_s, seen)
+        return new, replace(command, thrusts_N=found.thrusts_N, disturbance=D)
 
     def _told(self, inner: Any, thrusts_N: Array, dt_s: float) -> Any:
         """The other controller's state, told what was flown in place of its thrusts, if it can be told."""
@@ -238,7 +241,10 @@ def respared(
         inner=controller,
         layout=layout,
         watch=Watch(
-            region=region, view=meeting_view(view, layout) if settings.levers.meet else view, levers=settings.levers
+            region=region,
+            view=meeting_view(view, layout) if settings.levers.meet else view,
+            levers=settings.levers,
+            silt=silt_view(vehicle, region, wake, settings.levers),
         ),
         weights=Weights(
             disturbance=settings.w_disturbance / view.total_weight,

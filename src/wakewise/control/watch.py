@@ -10,6 +10,7 @@ from wakewise.arrays import Array, freeze
 from wakewise.control.levers import LeverSettings, with_drift
 from wakewise.interfaces import BodyState
 from wakewise.targets import Region
+from wakewise.wake.silt import SiltView
 from wakewise.wake.view import WakeView
 
 MOVED_M_S = 0.004
@@ -29,11 +30,12 @@ class Seen:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Watch:
-    """A region with what the levers add to it but for drift, the view of it, and the levers."""
+    """A region with what the levers add to it but for drift, the view of it, the levers, and the bed if it counts."""
 
     region: Region
     view: WakeView
     levers: LeverSettings
+    silt: SiltView | None = None
 
     def at(self, seen: Seen | None, estimate: BodyState) -> Seen:
         """What to watch now: the same as before while the current is about the same.
@@ -51,9 +53,16 @@ class Watch:
 
     def current_W_m_s(self, estimate: BodyState) -> Array:
         """Current that is reckoned with, shape (3,); zero where drift does not count or nothing is known."""
-        levers, found = self.levers, estimate.current_W_m_s
-        if not levers.drift:
-            return np.zeros(3)
-        if levers.drift_m_s is not None:
-            return np.array(levers.drift_m_s, dtype=np.float64)
+        return self._believed_m_s(estimate) if self.levers.drift else np.zeros(3)
+
+    def silt_gram(self, estimate: BodyState, thrusts_N: Array) -> Array | None:
+        """What silt adds to the matrix of a mean D, shape (2 n, 2 n), after such thrusts; None where it counts not."""
+        if self.silt is None:
+            return None
+        return self.silt.gram(estimate.X_WB, thrusts_N, self._believed_m_s(estimate))
+
+    def _believed_m_s(self, estimate: BodyState) -> Array:
+        stated, found = self.levers.drift_m_s, estimate.current_W_m_s
+        if stated is not None:
+            return np.array(stated, dtype=np.float64)
         return np.zeros(3) if found is None else found

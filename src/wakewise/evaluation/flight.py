@@ -23,6 +23,7 @@ SWAY_FIGURES = (
     "sway_peak_mm",
     "sway_mean_mm",
     "sway_about_mean_mm",
+    "sway_wash_mm",
     "target_stress_peak_Pa",
     "shifted_mm",
 )
@@ -116,14 +117,15 @@ def flight_figures(steps: pl.DataFrame) -> dict[str, float | int | None]:
     ray_optical_depth, of the whole water; exposure_*: speed, pressure and optical depth while the shutter is open.
     exceedance_1cm_s_pct, exceedance_ambient_pct: share of the target's surface, and of time, where the excess is more
     than 1 cm/s, and more than the ambient water's own speed; exposure_exceedance_1cm_s_pct while the shutter is open.
-    silt_lifted_g: given up by the bed until the end, settled again or not. silt_suspended_max_g: most in the water.
+    silt_lifted_g: given up by the bed until the end, settled again or not, so that sand counts at every hop.
+    silt_suspended_max_g: most in the water at once, the figure to compare beds by.
     position_rmse_mm: true position against the goal's at the same instant. path_rmse_mm: against the goal's path.
     estimate_rmse_mm: estimated against true position. velocity_deviation_pct, roll_pitch_rms_deg,
     attitude_rmse_deg: see the functions.
     energy_kJ: electrical. sign_flips_per_s: reversals of all thrusters together per second. fallbacks: steps on which
     the controller fell back. collisions: times that the vehicle touched something. duration_s: length of the flight.
-    Of a target that yields: sway_rms_mm, sway_mean_mm, sway_about_mean_mm (see `sway_figures`), sway_peak_mm and
-    target_stress_peak_Pa, the largest at any time, and shifted_mm, how far it has slid in the end.
+    Of a target that yields: sway_rms_mm, sway_wash_mm, sway_mean_mm, sway_about_mean_mm (see `sway_figures`),
+    sway_peak_mm and target_stress_peak_Pa, the largest at any time, and shifted_mm, how far it has slid in the end.
 
     Raises
     ------
@@ -192,8 +194,9 @@ def sway_figures(steps: pl.DataFrame, exposing: BoolArray | None) -> dict[str, f
     """How far water moved a target that yields; all None of one that nothing moves.
 
     While the shutter is open, over all exposures alike: sway_rms_mm is the root mean square way of the surface from its
-    shape at rest, sway_mean_mm how far the mean shape is from that at rest (the way of the surface's mean), and
-    sway_about_mean_mm the root mean square of how far that mean way is from its own mean.
+    shape at rest, sway_wash_mm that from where the same water without the vehicle would have it, which is all of the
+    sway that a controller can change, sway_mean_mm how far the mean shape is from that at rest (the way of the
+    surface's mean), and sway_about_mean_mm the root mean square of how far that mean way is from its own mean.
     """
     out: dict[str, float | None] = dict.fromkeys(SWAY_FIGURES)
     mean = _maybe(steps, "sway_x_m", "sway_y_m", "sway_z_m")
@@ -207,6 +210,8 @@ def sway_figures(steps: pl.DataFrame, exposing: BoolArray | None) -> dict[str, f
         seen = mean[exposing]
         out["sway_rms_mm"] = 1e3 * rms(values[exposing, 0])
         out["sway_mean_mm"] = 1e3 * float(np.linalg.norm(seen.mean(axis=0)))
+        wash = _maybe(steps, "sway_wash_m")
+        out["sway_wash_mm"] = None if wash is None else 1e3 * rms(wash[exposing])
         out["sway_about_mean_mm"] = 1e3 * rms(np.linalg.norm(seen - seen.mean(axis=0), axis=1))
     return out
 

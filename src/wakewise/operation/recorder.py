@@ -29,7 +29,9 @@ _WRENCH = ("wrench_X_N", "wrench_Y_N", "wrench_Z_N", "wrench_K_Nm", "wrench_M_Nm
 LOAD = ("load_X_N", "load_Y_N", "load_Z_N", "load_K_Nm", "load_M_Nm", "load_N_Nm")
 """What the estimator says that pulls at the vehicle, in B (see `wakewise.interfaces.BodyState`)."""
 _WATER = tuple(figure.name for figure in fields(WaterTruth))
-_POSTURE = ("sway_m", "sway_peak_m", "sway_x_m", "sway_y_m", "sway_z_m", "target_stress_Pa", "shifted_m")
+_POSTURE = (
+    "sway_m", "sway_peak_m", "sway_x_m", "sway_y_m", "sway_z_m", "target_stress_Pa", "shifted_m", "sway_wash_m",
+)  # fmt: skip
 
 
 def step_columns(thrusters: int, yields: bool = False) -> list[str]:
@@ -235,7 +237,7 @@ def _posture_row(posture: Posture | None) -> Array:
         return np.zeros(0)
     far = float(np.hypot(posture.shift_m[0], posture.shift_m[1]))
     mean = posture.sway_mean_W_m
-    return np.array([posture.sway_m, posture.sway_peak_m, *mean, posture.target_stress_Pa, far])
+    return np.array([posture.sway_m, posture.sway_peak_m, *mean, posture.target_stress_Pa, far, posture.sway_wash_m])
 
 
 def _stance(posture: Posture | None) -> dict[str, Array]:

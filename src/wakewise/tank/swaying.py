@@ -10,6 +10,9 @@ currents and waves; of jets it is left out.
 Each step is exact for a load that changes with the velocity alone: drag is made linear in the tip's velocity, the
 restoring force in its way, and the linear oscillator is solved in closed form, so that no stiffness and no drag makes
 it unstable. The vehicle's water does not feel that the target moves.
+
+A second set of stems stands in the water's own motion alone. What lies between the two is what the vehicle did, and all
+that a controller can change: most of a soft target's sway may be the current's and the swell's.
 """
 
 from __future__ import annotations
@@ -108,10 +111,13 @@ class Swaying:
     ambient: Current
     tips_m: Array = field(init=False)
     speeds_m_s: Array = field(init=False)
+    alone_m: Array = field(init=False)
     shift_m: Array = field(init=False)
     _pieces: Pieces = field(init=False)
     _before: Array | None = field(init=False, default=None)
     _ambient_before: Array | None = field(init=False, default=None)
+    _alone_m_s: Array = field(init=False)
+    _alone_before: Array | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         self.sway, self.loose = self.yielding.sway, self.yielding.loose
@@ -125,36 +131,51 @@ class Swaying:
         if self.sway is not None:  # it has stood in its current long before the flight
             water = self.ambient.velocity(pieces.points_W_m, 0.0)
             self.tips_m = standing_m(pieces, self.sway, self.drag_kg_m3, water)
+        self.alone_m, self._alone_m_s = self.tips_m, self.speeds_m_s
 
     def step(self, now: Instant, dt_s: float) -> None:
         """Go on by the water's step that ends at this instant."""
         points = self._pieces.points_W_m + np.append(self.shift_m, 0.0)
-        water = now.jets(points) + self.ambient.velocity(points, now.time_s)
+        ambient = self.ambient.velocity(points, now.time_s)
+        water = now.jets(points) + ambient
         before = water if self._before is None else self._before
         load = self._push(now.time_s, dt_s)
         self._before = water
-        force = np.zeros(3)
         if self.sway is None:
             force = drag_N(water, self._pieces.areas_m2, self.drag_kg_m3)
         else:
-            steps = substeps(self.sway, dt_s)
-            pieces = self._pieces
-            self.tips_m, self.speeds_m_s = self.tips_m.copy(), self.speeds_m_s.copy()
-            swing(
-                self.tips_m, self.speeds_m_s, force, self._modes, self.sway.axes_W, load, pieces.stem, pieces.areas_m2,
-                pieces.shape, pieces.slope, pieces.drop, np.ascontiguousarray(before), np.ascontiguousarray(water),
-                self.drag_kg_m3, dt_s, steps,
-            )  # fmt: skip
+            self.tips_m, self.speeds_m_s, force = self._swung(
+                self.sway, self.tips_m, self.speeds_m_s, load, before, water, dt_s
+            )
+            alone_before = ambient if self._alone_before is None else self._alone_before
+            self._alone_before = ambient
+            self.alone_m, self._alone_m_s, _ = self._swung(
+                self.sway, self.alone_m, self._alone_m_s, load, alone_before, ambient, dt_s
+            )
         if self.loose is not None:
             slid = slide_m_s(force[:2], water[:, :2].mean(axis=0), self.loose.friction * self.loose.weight_N)
             self.shift_m = self.shift_m + dt_s * slid
 
+    def _swung(
+        self, sway: Sway, tips: Array, speeds: Array, load: Array, before: Array, water: Array, dt_s: float
+    ) -> tuple[Array, Array, Array]:
+        """Tips and their speeds after a step through water, shape (n, 3) each, and the drag on the whole, (3,)."""
+        pieces, force = self._pieces, np.zeros(3)
+        tips, speeds = tips.copy(), speeds.copy()
+        swing(
+            tips, speeds, force, self._modes, sway.axes_W, load, pieces.stem, pieces.areas_m2,
+            pieces.shape, pieces.slope, pieces.drop, np.ascontiguousarray(before), np.ascontiguousarray(water),
+            self.drag_kg_m3, dt_s, substeps(sway, dt_s),
+        )  # fmt: skip
+        return tips, speeds, force
+
     def posture(self) -> Posture:
         """Where the target is now, and how far its surface has come from its shape at rest."""
-        away = np.zeros((len(self._pieces.points_W_m), 3))
+        away = alone = np.zeros((len(self._pieces.points_W_m), 3))
         stress = 0.0
         if self.sway is not None:
             away = self.sway.moved(self._pieces.stem, self._pieces.points_W_m, self.tips_m)
+            alone = self.sway.moved(self._pieces.stem, self._pieces.points_W_m, self.alone_m)
             stress = float(np.hypot.reduce(self.tips_m * self.sway.stress_Pa_m, axis=1).max())
         far = np.linalg.norm(away, axis=1)
         return Posture(
@@ -165,6 +186,7 @@ class Swaying:
             sway_peak_m=float(far.max()),
             sway_mean_W_m=away.mean(axis=0),
             target_stress_Pa=stress,
+            sway_wash_m=float(np.sqrt(np.mean(np.sum((away - alone) ** 2, axis=1)))),
         )
 
     def _push(self, time_s: float, dt_s: float) -> Array:

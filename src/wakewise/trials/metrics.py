@@ -73,10 +73,13 @@ _FIGURES: dict[str, tuple[str, str, Better]] = {
     "ray_optical_depth": ("", "beam attenuation by silt along the rays from camera to target, end to end, mean over "
                           "rays and time", "less"),
     "exposure_optical_depth": ("", "ray_optical_depth while the shutter is open", "less"),
-    "silt_lifted_g": ("g", "what the bed gave up by the end of the flight, settled again or not", "less"),
+    "silt_lifted_g": ("g", "what the bed gave up by the end of the flight, settled again or not; sand at every hop",
+                      "less"),
     "silt_suspended_max_g": ("g", "most silt in the water at any time of the flight", "less"),
     "sway_rms_mm": ("mm", "rms way of the target's surface from its shape at rest in still water, sliding not counted, "
                     "while the shutter is open", "less"),
+    "sway_wash_mm": ("mm", "rms way of the target's surface from where the same water without the vehicle would have "
+                     "it, while the shutter is open: what of the sway is the wash's", "less"),
     "sway_peak_mm": ("mm", "largest way of any place of the surface from there at any time", "less"),
     "sway_mean_mm": ("mm", "how far the mean of the surface is from its place at rest, mean over the exposures: the "
                      "steady part of the sway", "less"),

@@ -129,7 +129,7 @@ def why(figures: dict[str, Any]) -> dict[str, str]:
     for key in (*FLIGHT_FIGURES, *MODEL_FIGURES, "success_pct"):
         if key not in figures or figures[key] is not None:
             continue
-        if key == "sway_rms_mm":
+        if key in ("sway_rms_mm", "sway_wash_mm"):
             reasons[key] = "the target is rigid"
         elif key in (*MODEL_FIGURES, "success_pct"):
             reasons[key] = "no scan was made; --models sets for how many seeds" if not figures["models"] else "no model"

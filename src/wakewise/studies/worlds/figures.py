@@ -17,8 +17,10 @@ RATIOS = (
     ("exposure_speed_mean_m_s", "exposure_speed"),
     ("bed_shear_p95_Pa", "bed_shear"),
     ("silt_lifted_g", "silt_lifted"),
+    ("silt_suspended_max_g", "silt_suspended"),
     ("ray_optical_depth", "ray_optical_depth"),
     ("sway_rms_mm", "sway"),
+    ("sway_wash_mm", "sway_wash"),
     ("position_rmse_mm", "position"),
     ("energy_kJ", "energy"),
 )
