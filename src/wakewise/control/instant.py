@@ -61,4 +61,4 @@ def instant(
     seen = with_bed_points(region, levers, bed_of(wake))
     controller = instant_allocator(vehicle, seen, wake, settings)
     view = meeting_view(controller.view, vehicle_layout(vehicle)) if levers.meet else controller.view
-    return replace(controller, view=view, watch=Watch(region=seen, view=view, levers=levers))
+    return replace(controller, view=view, watch=Watch(view=view, levers=levers))
