@@ -106,7 +106,7 @@ def test_a_cable_pulls_down_the_current_as_hard_as_drawn():
     parts, what = parts_of(Trial(scenario="tether/paper", method="dp", seed=2)), drawn("tether", 2)
     current = np.array(what.current_W_m_s)
     force = Tether.of(parts.scenario.tank).force_W_N(
-        parts.start.X_WB, np.zeros(6), SteadyCurrent(velocity_m_s=current), 0.0
+        parts.start.X_WB, np.zeros(6), SteadyCurrent(velocity_W_m_s=current), 0.0
     )
     assert np.linalg.norm(force) == pytest.approx(what.pull_N, rel=0.02)
     assert force @ current == pytest.approx(np.linalg.norm(force) * np.linalg.norm(current), rel=1e-3)
