@@ -16,7 +16,7 @@ from wakewise.operation.pilots import PILOTS
 from wakewise.operation.worlds.makers import WORLDS, flow_name
 from wakewise.plugins import find, offered
 from wakewise.targets import coral_kinds
-from wakewise.wake.models import OWN_MODELS
+from wakewise.wake.models import OWN_MODELS, RIVALS
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
@@ -59,7 +59,7 @@ def _named(scenario: Scenario) -> dict[str, tuple[str, str, Mapping[str, Any]]]:
     """Kind, name and our own ones of each part that a scenario names."""
     return {
         "controller": ("method", scenario.method, MAKERS),
-        "wake": ("wake model", scenario.control.wake.model, dict.fromkeys(OWN_MODELS)),
+        "wake": ("wake model", scenario.control.wake.model, dict.fromkeys((*OWN_MODELS, *RIVALS))),
         "world": ("world", flow_name(scenario), WORLDS),
         "pilot": ("pilot", scenario.pilot, PILOTS),
         "target": ("target", scenario.target.kind, dict.fromkeys(coral_kinds())),
