@@ -269,7 +269,9 @@ class WaterTruth:
     of one picture. `turbidity_per_m` is the mean beam attenuation by silt in the water within 0.3 m of the target's
     centre, and `ray_optical_depth` that attenuation along the rays from the camera to the side of the target that it
     faces, from end to end, a mean without unit. `silt_lifted_g` is what the bed has given up since the start, settled
-    again or not, `silt_suspended_g` what is in the water now. NaN where a witness does not know.
+    again or not, `silt_suspended_g` what is in the water now. `target_over_1cm_s` and
+    `target_over_ambient` are the shares of the surface where the excess is more than 1 cm/s, and more than the mean
+    speed there of the same water without the vehicle (NaN where that is still). NaN where a witness does not know.
     """
 
     target_speed_mean_m_s: float
@@ -283,6 +285,8 @@ class WaterTruth:
     ray_optical_depth: float = math.nan
     silt_lifted_g: float = math.nan
     silt_suspended_g: float = math.nan
+    target_over_1cm_s: float = math.nan
+    target_over_ambient: float = math.nan
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -14,7 +14,7 @@ BENCHES = {
     "disturbance": "the Gram matrix of D against the sum over points",
     "estimator": "the filter in the default tank: error, consistency, ten seconds without a camera",
     "dynamics": "one step of the vehicle, with and without Jacobians, and of many vehicles at once",
-    "gentle": "what each method and each lever does to the target's water, in the tank and in the paper's own world",
+    "gentle": "what each method does to the target's water where users have the trouble, and what each lever is worth",
     "planner": "the planner against the paper's recipe and IPOPT",
     "reconstruction": "models of three corals from clear photographs: accuracy, completeness, time and memory",
     "operator": "an operator's velocity obeyed, against the water's disturbance, by w_track",

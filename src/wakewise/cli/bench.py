@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from wakewise.cli.bench_gentle import show_gentle
 from wakewise.cli.bench_worlds import show_worlds
 from wakewise.cli.console import Bars, print_json, shown
 from wakewise.cli.options import Json
@@ -15,7 +16,15 @@ Name = Annotated[str, typer.Argument(help="Which bench; without a name, all of t
 Data = Annotated[
     Path, typer.Option(help="Folder of reference data that some figures are held against.", envvar="WAKEWISE_DATA")
 ]
-Seeds = Annotated[int, typer.Option(help="gentle, worlds: flights per method, seeds 1 to this.", min=1, max=1000)]
+Seeds = Annotated[
+    int | None,
+    typer.Option(
+        help="gentle, worlds: flights per method, seeds 1 to this; 3 and 10 if not given.",
+        min=1,
+        max=1000,
+        show_default=False,
+    ),
+]
 Methods = Annotated[
     str, typer.Option(help="gentle, worlds: methods, with commas between; all if not given.", show_default=False)
 ]
@@ -23,9 +32,17 @@ Worlds = Annotated[str, typer.Option(help="worlds: which, with commas between; a
 Models = Annotated[
     int, typer.Option(help="worlds: seeds for which a whole scan is made and its model judged.", min=0, max=1000)
 ]
-Flows = Annotated[str, typer.Option(help="gentle: parcels (the tank) or paper; both if not given.", show_default=False)]
+Scenarios = Annotated[
+    str,
+    typer.Option(
+        help="gentle: which, with commas between: orbit (both vehicles), orbit/paper, worlds, world/mud, paper (the "
+        "paper's own world); all if not given.",
+        show_default=False,
+    ),
+]
 Levers = Annotated[
-    str, typer.Option(help="gentle: levers, with commas between, or none; all if not given.", show_default=False)
+    str,
+    typer.Option(help="gentle: levers to switch, with commas between, or all; none if not given.", show_default=False),
 ]
 Judge = Annotated[
     int,
@@ -42,13 +59,16 @@ Plot = Annotated[
     typer.Option(help="gentle, operator: draw the figures into this file (.png, .svg).", show_default=False),
 ]
 
+_SEEDS = {"gentle": 3}
+"""Seeds of a bench that flies, if not given; 10 of the others."""
+
 
 def bench(
     name: Name = "",
     data: Data = Path("../shared/data"),
-    seeds: Seeds = 10,
+    seeds: Seeds = None,
     methods: Methods = "",
-    flows: Flows = "",
+    scenarios: Scenarios = "",
     levers: Levers = "",
     worlds: Worlds = "",
     models: Models = 1,
@@ -61,8 +81,9 @@ def bench(
 ) -> None:
     """Measure speed and quality of one part: thread CPU, median and p99 after warm-up.
 
-    A figure that needs reference data which is not there is null, with the reason in `why`. `gentle` flies for a
-    quarter of an hour on two free cores; a run that was stopped goes on where it was.
+    A figure that needs reference data which is not there is null, with the reason in `why`. `gentle` flies all of its
+    scenarios and worlds for more than an hour on two free cores, some minutes with `--scenarios orbit/paper`; a run
+    that was stopped goes on where it was.
     """
     from wakewise.benches import BENCHES, run_bench
     from wakewise.errors import InputError
@@ -81,9 +102,9 @@ def bench(
             options = BenchOptions(
                 data=data if data.is_dir() else None,
                 progress=progress,
-                seeds=seeds,
+                seeds=seeds or _SEEDS.get(each, 10),
                 methods=_listed(methods),
-                flows=_listed(flows),
+                scenarios=_listed(scenarios),
                 levers=_listed(levers),
                 worlds=_listed(worlds),
                 models=models,
@@ -94,10 +115,10 @@ def bench(
             )
             results[each] = run_bench(each, options)
     if plot is not None:
-        from wakewise.reports.levers import draw_levers
+        from wakewise.reports.gentle import draw_gentle
         from wakewise.reports.operator import draw_operator
 
-        draw = {"gentle": draw_levers, "operator": draw_operator}[name]
+        draw = {"gentle": draw_gentle, "operator": draw_operator}[name]
         draw(results[name], plot)
     if json:
         print_json(results[name] if name else results)
@@ -105,7 +126,7 @@ def bench(
     for each, result in results.items():
         typer.echo(f"\n{each}: {BENCHES[each]}")
         if each == "gentle":
-            _show_gentle(result)
+            show_gentle(result)
         elif each == "worlds":
             show_worlds(result)
         else:
@@ -127,57 +148,3 @@ def _show(result: dict[str, Any], indent: str) -> None:
             _show(value, indent + "  ")
         else:
             typer.echo(f"{indent}{key:<34}{shown(value):>10}")
-
-
-def _show_gentle(result: dict[str, Any]) -> None:
-    """Two tables per flow: methods, and levers."""
-    from rich.table import Table
-
-    from wakewise.cli.console import print_table
-
-    columns = (
-        ("target_speed_mean_m_s", "target mm/s", 1e3),
-        ("exposure_speed_mean_m_s", "exposing mm/s", 1e3),
-        ("position_rmse_mm", "position mm", 1.0),
-        ("path_rmse_mm", "path mm", 1.0),
-        ("velocity_deviation_pct", "velocity %", 1.0),
-        ("energy_kJ", "energy kJ", 1.0),
-        ("sign_flips_per_s", "flips/s", 1.0),
-    )
-    for flow, figures in result["flows"].items():
-        words = "circular: the planner's own model is the water" if figures["circular"] else "the tank's water"
-        table = Table(title=f"{flow} ({words}), {figures['seeds']} seeds", title_justify="left")
-        table.add_column("method")
-        for _, title, _ in columns:
-            table.add_column(title, justify="right")
-        table.add_column("wake-aware moves less by", justify="right")
-        for method, row in figures["methods"].items():
-            less = figures.get(f"reduction_vs_{method.replace('-', '_')}_pct")
-            interval = figures.get(f"reduction_vs_{method.replace('-', '_')}_interval_pct")
-            cells = [shown(None if row[key] is None else scale * row[key]) for key, _, scale in columns]
-            table.add_row(method, *cells, _reduction(less, interval))
-        print_table(table)
-        levers = Table(title=f"{flow}: levers", title_justify="left")
-        for title in ("lever", "kind", "held against", "target speed lower by", "than dp by", "position mm"):
-            levers.add_column(title, justify="left" if title in ("lever", "kind", "held against") else "right")
-        for lever, row in figures["lever_details"].items():
-            levers.add_row(
-                lever,
-                row["group"],
-                row["base"],
-                _reduction(row["reduction_pct"], row["interval_pct"]),
-                _reduction(row["reduction_vs_dp_pct"], row["dp_interval_pct"]),
-                shown(row["position_rmse_mm"]),
-            )
-        print_table(levers)
-    typer.echo(
-        f"{result['flown']} flights flown, {result['flights'] - result['flown']} known, {result['failed']} failed"
-    )
-    for failure in result["failures"]:
-        typer.echo(f"failed: {failure['flow']}, {failure['name']}, seed {failure['seed']}: {failure['reason']}")
-
-
-def _reduction(value: float | None, interval: tuple[float, float] | None) -> str:
-    if value is None:
-        return "—"
-    return f"{value:.0f} %" if interval is None else f"{value:.0f} % ({interval[0]:.0f} to {interval[1]:.0f})"

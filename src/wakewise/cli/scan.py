@@ -86,7 +86,21 @@ def scan(
     folder = out or default_folder(resolved, resolved.method)
     result = trial(resolved, folder, Bars(), print_json if json else partial(_print_figures, resolved))
     if not json:
+        _say_trim(folder)
         typer.echo(f"report: {result.report}")
+
+
+def _say_trim(folder: Path) -> None:
+    """What the flight's hover says of the ballast, where it is worth a block."""
+    from wakewise.errors import InputError
+    from wakewise.operation.trim import folder_trim
+
+    try:
+        _, found = folder_trim(folder)
+    except InputError:  # no hover in it, or a vehicle that was given in Python
+        return
+    if found.blocks:
+        typer.echo(f"before the next flight: {found.words}; wakewise vehicle trim --flight {folder} --write FILE")
 
 
 def _print_figures(scenario: Scenario, figures: dict[str, Any]) -> None:

@@ -63,4 +63,4 @@ def instant(
     controller = instant_allocator(vehicle, seen, wake, settings)
     view = meeting_view(controller.view, vehicle_layout(vehicle)) if levers.meet else controller.view
     silt = silt_view(vehicle, region, wake, levers)
-    return replace(controller, view=view, watch=Watch(region=seen, view=view, levers=levers, silt=silt))
+    return replace(controller, view=view, watch=Watch(view=view, levers=levers, silt=silt))

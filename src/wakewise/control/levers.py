@@ -17,15 +17,6 @@ from wakewise.arrays import Array, IntArray
 from wakewise.settings import Settings
 from wakewise.targets import Region
 
-DRIFT_S, DRIFT_POINTS, DRIFT_WEIGHT = 25.0, 160, 0.5
-"""How long before it arrives the water that drifts is watched: what a jet left has by then a hundredth of its energy,
-(1 + 25)^-1.5. By how many points: about half of the region's own 300. And their weight together, over that of the
-region: what may arrive counts half of what is there."""
-DRIFT_SPREAD_M_S = 0.02
-"""How fast what a jet leaves grows wider on the way: see `with_drift`."""
-DECAY = 1.5
-"""Power of time with which the square of the speed of a jet's remains falls."""
-
 BED_POINTS, BED_RADIUS_M, BED_WEIGHT = 80, 0.3, 0.5
 """How many bed points there are: enough for one in a square of 6 cm; how far from the target's foot they reach: three
 of a coral's own radii; and their weight together, over that of the region: the bed counts half of the target."""
@@ -33,10 +24,6 @@ BED_HEIGHTS_M = (0.01, 0.03)
 """Bed points lie between these heights: where a wall jet half a metre from its strike point is fastest."""
 GOLDEN_RAD = float(np.pi * (3.0 - np.sqrt(5.0)))
 """Angle of a sunflower's spiral, which spreads points evenly over a disk (H. Vogel, Math. Biosci. 44 (1979) 179)."""
-
-KRONECKER = 1.2207440846057596 ** -np.arange(1.0, 4.0)
-"""Steps of a Kronecker sequence that fills a box evenly: powers of the root of x^4 = x + 1."""
-
 
 Component = Annotated[float, Field(ge=-1.0, le=1.0)]
 Velocity = tuple[Component, Component, Component]
@@ -53,7 +40,7 @@ class LeverSettings(Settings):
         default=True, description="count what jets become that meet: they join and run on between them; needs spare"
     )
     drift: bool = Field(
-        default=True, description="also keep the water still that the current will bring to the target; needs spare"
+        default=True, description="follow the jets as the current bends, stops and brings them; needs spare"
     )
     drift_m_s: Velocity | None = Field(
         default=None, description="that current, north, east, down, if it is stated; null: as the estimator finds it"
@@ -93,34 +80,6 @@ def with_bed_points(region: Region, levers: LeverSettings, bed_z_m: float | None
     )
     share = BED_WEIGHT * float(region.weights.sum()) / BED_POINTS
     return _joined(region, ring, np.full(BED_POINTS, share), reach)
-
-
-def with_drift(region: Region, current_W_m_s: Array) -> Region:
-    """The region and the water that a current, shape (3,), will bring to the target within `DRIFT_S`.
-
-    A weak jet that passes the target at a third of a metre is carried on to it by a current of 3 cm/s in ten seconds,
-    by when its water has slowed but not stopped. The water at the target in t seconds is now upstream by t times the
-    current, so the points are those of the target's surface, moved there, t spread evenly, and farther apart the
-    farther they are, since what a jet leaves grows wider meanwhile (a front runs as 2.57 M^(1/4) t^(1/2): for 0.1 N
-    at 15 s with 3 cm/s, its sides with about two thirds of that). Their weight falls with the
-    square of the speed of a patch of water that a jet has left, (1 + t)^(-3/2) with t in s: the front of a jet's
-    remains goes as t^(1/4) when momentum is kept, their speed as t^(-3/4).
-    Without a current the region stays as it is.
-    """
-    current = np.asarray(current_W_m_s, dtype=np.float64)
-    if not current.any():
-        return region
-    near = _surface(region)
-    steps = np.arange(1, DRIFT_POINTS + 1)
-    ages_s = DRIFT_S * ((0.5 + steps * KRONECKER[0]) % 1.0)
-    chosen = near[((0.5 + steps * KRONECKER[1]) % 1.0 * len(near)).astype(np.int64)]
-    weights = region.weights[chosen] * (1.0 + ages_s) ** -DECAY
-    aside = region.points_W_m[chosen] - region.points_W_m[near].mean(axis=0)
-    aside[:, 2] = 0.0
-    aside /= max(float(np.linalg.norm(aside, axis=1).max()), 1e-9)
-    upstream = region.points_W_m[chosen] + ages_s[:, None] * (DRIFT_SPREAD_M_S * aside - current)
-    weights *= DRIFT_WEIGHT * float(region.weights.sum()) / float(weights.sum())
-    return _joined(region, upstream, weights, ages_s * float(np.linalg.norm(current)))
 
 
 def _surface(region: Region) -> IntArray:

@@ -10,7 +10,7 @@ import numpy as np
 from wakewise.allocation import Allocation, Layout, compile_layout, disturbance_of
 from wakewise.arrays import Array, freeze
 from wakewise.control.tracker import Tracker, TrackerState
-from wakewise.control.watch import Seen, Watch
+from wakewise.control.watch import Watch
 from wakewise.interfaces import BodyState, Command, Goal
 from wakewise.vehicles import Vehicle
 from wakewise.wake.view import WakeView
@@ -35,14 +35,12 @@ FULL = 1.0 - 1e-9
 class ControllerState:
     """What a controller remembers between steps.
 
-    The tracker's integral, the thrusts last asked for, shape (n,), the share of the last wrench that they made, and
-    what was watched then.
+    The tracker's integral, the thrusts last asked for, shape (n,), and the share of the last wrench that they made.
     """
 
     tracker: TrackerState
     thrusts_N: Array
     share: float = 1.0
-    seen: Seen | None = None
 
     def __post_init__(self) -> None:
         freeze(self, thrusts_N=(None,))
@@ -53,8 +51,7 @@ class TrackingController:
     """A tracker and a way to allocate; implements `wakewise.interfaces.Controller`.
 
     An estimate or goal that is not finite gives the last thrusts, fading with `HOLD_S`, and says so in `fallback`.
-    Where there is a `watch`, the estimate's current adds points to those of the view; the Gram matrix that is allocated
-    by is divided by the growth of their total weight, so that it stays a mean.
+    Where there is a `watch`, the estimate's current carries the jets.
     """
 
     name: str
@@ -78,20 +75,17 @@ class TrackingController:
         tracker_state, wrench = self.tracker.wrench(state.tracker, dt_s, estimate, goal, saturated=state.share < FULL)
         if not np.isfinite(wrench.sum()):
             return self._hold(state, dt_s, "wrench not finite: holding the last thrusts, fading")
-        seen = None if self.watch is None else self.watch.at(state.seen, estimate)
-        view = self.view if seen is None else seen.view
-        growth = 1.0 if seen is None else view.total_weight / self.view.total_weight
-        gram = view.gram(estimate.X_WB) / growth
+        watch = self.watch
+        gram = self.view.gram(estimate.X_WB) if watch is None else watch.gram(estimate, state.thrusts_N)
         usable = bool(np.isfinite(gram).all())
         fallback = None if usable else "wake model not finite: least thrusts"
-        silt = None if self.watch is None else self.watch.silt_gram(estimate, state.thrusts_N)
-        cost = gram if silt is None else gram + self.view.total_weight * silt
+        cost = gram if watch is None or not usable else watch.with_silt(gram, estimate, state.thrusts_N)
         found = self.allocate(wrench, cost if usable else None, state.thrusts_N)
         if found.scale < FULL and fallback is None:
             fallback = f"thrusters saturated: {100.0 * found.scale:.0f} % of the wrench"
-        D = None if found.disturbance is None else growth * disturbance_of(gram, found.thrusts_N)
+        D = None if found.disturbance is None else disturbance_of(gram, found.thrusts_N)
         command = Command(thrusts_N=found.thrusts_N, wrench_B=wrench, disturbance=D, fallback=fallback)
-        after = ControllerState(tracker=tracker_state, thrusts_N=found.thrusts_N, share=found.scale, seen=seen)
+        after = ControllerState(tracker=tracker_state, thrusts_N=found.thrusts_N, share=found.scale)
         return after, command
 
     def _hold(self, state: ControllerState, dt_s: float, why: str) -> tuple[ControllerState, Command]:

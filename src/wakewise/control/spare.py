@@ -23,11 +23,14 @@ from wakewise.arrays import Array, IntArray
 from wakewise.control.loop import vehicle_layout
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
 from wakewise.control.silt import silt_view
-from wakewise.control.watch import Seen, Watch
+from wakewise.control.watch import Watch
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Command, Controller, Goal, WakeModel
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
+from wakewise.wake import AxialJet, free_jet
+from wakewise.wake.carried import Flow
+from wakewise.wake.disturbance import carried_velocity
 from wakewise.wake.view import WakeView
 
 LEAST_COSINE = -0.5
@@ -56,14 +59,19 @@ class MeetingView(WakeView):
 
     pairs: tuple[tuple[int, int], ...] = field(default=())
 
-    def gram(self, X_WB: Pose) -> Array:
-        """Matrix G of D = s' G s, shape (2 n, 2 n)."""
-        G = np.array(super().gram(X_WB))
+    def gram(self, X_WB: Pose, flow: Flow | None = None) -> Array:
+        """Matrix G of D = s' G s, shape (2 n, 2 n); what two jets become is carried as they are."""
+        G = np.array(super().gram(X_WB, flow))
         origins, axes = X_WB.apply(self.positions_B_m), self.axes_B @ X_WB.R.T
         met = joined_jets(origins, axes, self.pairs)
         if len(met.share):
             areas = self.areas_m2[met.first % len(self.areas_m2)]
-            speed = self.wake.unit_velocity(self.points_W_m, met.origins_m, met.directions, areas)
+            jets = (self.points_W_m, met.origins_m, met.directions, areas)
+            if flow is None or not isinstance(free_jet(self.wake), AxialJet):
+                speed = self.wake.unit_velocity(*jets)
+            else:
+                pushed = met.momentum * np.sqrt(flow.guessed[met.first] * flow.guessed[met.second])
+                speed = carried_velocity(self.wake, *jets, pushed, flow)
             D = met.momentum * met.share * np.einsum("n,inx,inx->i", self.weights, speed, speed)
             np.add.at(G, (met.first, met.second), 0.5 * D)
             np.add.at(G, (met.second, met.first), 0.5 * D)
@@ -144,17 +152,13 @@ def meeting_view(view: WakeView, layout: Layout) -> MeetingView:
 
 @dataclass(frozen=True, eq=False)
 class SpareState:
-    """The other controller's state, the thrusts last told, shape (n,), and when they were last shared out (freely).
-
-    `seen` is what was watched then.
-    """
+    """The other controller's state, the thrusts last told, shape (n,), and when they were last shared out (freely)."""
 
     inner: Any
     thrusts_N: Array
     age_s: float = np.inf
     disturbance: float | None = None
     free_age_s: float = np.inf
-    seen: Seen | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -167,9 +171,6 @@ class Respared:
     The price on change keeps shares near to the last ones, and for good where another minimum lies apart (the load on
     one diagonal pair of verticals or the other). So every `FREE_EVERY_S` they are sought without it, and taken where
     that is better by more than `WORTH`. A step on which the other fell back is flown as it is.
-
-    `weights` are over the view's own points; where a current adds points (`watch`), the disturbance's is divided by
-    the sum of all.
     """
 
     name: str
@@ -186,7 +187,7 @@ class Respared:
         """Decide the thrusts for the next `dt_s` seconds."""
         inner, command = self.inner.step(state.inner, dt_s, estimate, goal)
         if command.fallback is not None:
-            return SpareState(inner=inner, thrusts_N=command.thrusts_N, seen=state.seen), command
+            return SpareState(inner=inner, thrusts_N=command.thrusts_N), command
         if state.age_s + 1e-6 < EVERY_S:
             missing = command.wrench_B - self.layout.B @ state.thrusts_N
             thrusts = state.thrusts_N + self.layout.inverse @ missing
@@ -194,15 +195,11 @@ class Respared:
                 told = self._told(inner, thrusts, dt_s)
                 held = replace(state, inner=told, thrusts_N=thrusts, age_s=state.age_s + dt_s)
                 return held, replace(command, thrusts_N=thrusts, disturbance=state.disturbance)
-        seen = self.watch.at(state.seen, estimate)
-        G = seen.view.gram(estimate.X_WB)
+        G, weights = self.watch.gram(estimate, state.thrusts_N), self.weights
         if not np.isfinite(G).all():
             words = "wake model not finite: thrusts of the plan"
             return SpareState(inner=inner, thrusts_N=command.thrusts_N), replace(command, fallback=words)
-        share = self.watch.view.total_weight / seen.view.total_weight
-        weights = replace(self.weights, disturbance=share * self.weights.disturbance)
-        silt = self.watch.silt_gram(estimate, state.thrusts_N)
-        cost = G if silt is None else G + seen.view.total_weight * silt
+        cost = self.watch.with_silt(G, estimate, state.thrusts_N)
         found = gentle_allocation(self.layout, command.wrench_B, cost, weights, state.thrusts_N)
         free_age_s = state.free_age_s + EVERY_S
         if free_age_s + 1e-6 >= FREE_EVERY_S:
@@ -211,7 +208,7 @@ class Respared:
             if _cost(anew, weights) < (1.0 - WORTH) * _cost(found, weights):
                 found = anew
         told, D = self._told(inner, found.thrusts_N, dt_s), disturbance_of(G, found.thrusts_N)
-        new = SpareState(told, found.thrusts_N, dt_s, D, free_age_s, seen)
+        new = SpareState(told, found.thrusts_N, dt_s, D, free_age_s)
         return new, replace(command, thrusts_N=found.thrusts_N, disturbance=D)
 
     def _told(self, inner: Any, thrusts_N: Array, dt_s: float) -> Any:
@@ -241,7 +238,6 @@ def respared(
         inner=controller,
         layout=layout,
         watch=Watch(
-            region=region,
             view=meeting_view(view, layout) if settings.levers.meet else view,
             levers=settings.levers,
             silt=silt_view(vehicle, region, wake, settings.levers),

@@ -6,16 +6,14 @@ The mean is taken over the trim that nobody knows beforehand, so that advice is 
 as written. Steady jets only: what moving costs does not depend on ballast.
 
 The advice is the ballast of least effort that is not worse by D than the vehicle as it is. Least D is another one and
-is told beside it (`gentlest`, of least effort among those near to the least D): D always asks for floats, since jets
-then go up, but a float is a load that thrusters must hold all the time, and the water that they draw in and send to
-the surface comes round. In decision 0014's lever flights, which all floated, the centre of gravity of the advice made
-the target's water slower and floats of 1.2 N more did not; what they do for a vehicle that is heavy was not flown
-there.
+is told beside it (`gentlest`, of least effort among those near to the least D): D asks for floats beyond neutral, since
+jets then go up, away from target and bed. How much of that the simulated tank bears out stands in decision 0037. What a
+flight says of its own trim is told by `hover_trim`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -31,9 +29,12 @@ from wakewise.interfaces import WakeModel
 from wakewise.physics import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle, compile_body, restoring_wrench
+from wakewise.vehicles.ballast import ballasted, net_buoyancy_N
 from wakewise.wake.view import WakeView
 
-FLOATS_N = (-2.0, -1.0, 0.0, 1.0, 1.5, 2.0, 3.0)
+__all__ = ["TrimAdvice", "TrimRow", "ballasted", "net_buoyancy_N", "trim_advice"]
+
+FLOATS_N = (-2.0, -1.0, 0.0, 0.5, 1.0, 1.5, 2.0, 3.0)
 """Net buoyancies looked at, positive floats."""
 SHIFTS_MM = (-3.0, 0.0, 3.0, 6.0, 9.0)
 """Shifts of the centre of gravity along the vehicle looked at, positive forward."""
@@ -90,32 +91,8 @@ class TrimAdvice:
         row = self.gentlest
         return (
             f"least by the wake model alone: {1e3 * row.speed_m_s:.1f} mm/s with {row.float_N:+.1f} N and the centre "
-            f"of gravity {row.shift_mm:+.0f} mm, at {row.thrust_N:.2f} N of thrust; in decision 0014's lever flights, "
-            "which all floated, floats did not make the water slower"
+            f"of gravity {row.shift_mm:+.0f} mm, at {row.thrust_N:.2f} N of thrust"
         )
-
-
-def ballasted(vehicle: Vehicle, float_N: float, shift_mm: float = 0.0) -> Vehicle:
-    """The vehicle with this much more buoyancy (negative: less) and its centre of gravity this much farther forward.
-
-    Buoyancy is added at the centre of buoyancy, by volume; mass and inertia stay.
-
-    Raises
-    ------
-    InputError
-        If no displaced volume would be left.
-    """
-    volume_m3 = vehicle.displaced_volume_m3 + float_N / (TRIM_WATER_KG_M3 * GRAVITY_M_S2)
-    if not volume_m3 > 0.0:
-        raise InputError(f"ballast: {float_N:g} N leaves a displaced volume of {volume_m3:g} m3, it must stay positive")
-    return replace(
-        vehicle, displaced_volume_m3=volume_m3, p_BG_m=vehicle.p_BG_m + np.array([1e-3 * shift_mm, 0.0, 0.0])
-    )
-
-
-def net_buoyancy_N(vehicle: Vehicle) -> float:
-    """Buoyancy less weight in fresh water of 1000 kg/m3, positive floats."""
-    return GRAVITY_M_S2 * (TRIM_WATER_KG_M3 * vehicle.displaced_volume_m3 - vehicle.mass_kg)
 
 
 def trim_advice(
@@ -125,6 +102,7 @@ def trim_advice(
     wake: WakeModel,
     settings: ControlSettings | None = None,
     *,
+    net_weight_N: float = 0.0,
     unknown_N: float = 1.0,
     current_N: Array | None = None,
     floats_N: tuple[float, ...] = FLOATS_N,
@@ -139,8 +117,10 @@ def trim_advice(
         X_WB of the mission.
     region, wake, settings
         As a controller has them; with the bed lever, points on the bed count.
+    net_weight_N : float
+        Weight less buoyancy that is known but not in the vehicle's numbers, positive: heavy.
     unknown_N : float
-        The trim error lies between minus and plus this; its ends and the middle are looked at.
+        The trim error, beside that, lies between minus and plus this; its ends and the middle are looked at.
     current_N : ndarray, shape (3,), optional
         Steady force of the current on the vehicle, in W.
     floats_N, shifts_mm : tuple of float
@@ -149,22 +129,25 @@ def trim_advice(
     Raises
     ------
     InputError
-        If there are no poses, or `unknown_N` is negative or not finite.
+        If there are no poses, `unknown_N` is negative, or a number is not finite.
     """
     chosen = settings or ControlSettings()
     if not poses:
         raise InputError("trim: no poses, a mission must hold at least one")
     if not (np.isfinite(unknown_N) and unknown_N >= 0.0):
         raise InputError(f"trim: unknown_N {unknown_N:g}, must be finite and not negative")
+    if not np.isfinite(net_weight_N):
+        raise InputError(f"trim: net_weight_N {net_weight_N:g}, must be finite")
     view = WakeView.of(vehicle, with_bed_points(region, chosen.levers), wake, chosen.superposition)
     grams = [view.gram(X_WB) for X_WB in poses]
     weights = Weights(disturbance=chosen.w_disturbance / view.total_weight, effort=chosen.w_effort)
-    own = net_buoyancy_N(vehicle)
+    believed = net_buoyancy_N(vehicle)
+    own = believed - net_weight_N
     force_W = np.zeros(3) if current_N is None else np.asarray(current_N, dtype=np.float64)
     errors = (-unknown_N, 0.0, unknown_N) if unknown_N > 0.0 else (0.0,)
     buoyancies = sorted({*floats_N, round(own, 6)})
     rows = tuple(
-        _row(vehicle, poses, grams, view, weights, force_W, errors, float_N - own, shift_mm, float_N)
+        _row(vehicle, poses, grams, view, weights, force_W, errors, float_N - believed, shift_mm, float_N)
         for float_N, shift_mm in product(buoyancies, sorted({*shifts_mm, 0.0}))
     )
     now = next(row for row in rows if row.float_N == round(own, 6) and row.shift_mm == 0.0)

@@ -1,68 +1,58 @@
-"""The water that a method watches now: the region, and what the current, as the estimator finds it, brings to it."""
+"""What a method watches: the region as the jets reach it, carried by the current that the estimator finds."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from wakewise.arrays import Array, freeze
-from wakewise.control.levers import LeverSettings, with_drift
+from wakewise.arrays import Array
+from wakewise.control.levers import LeverSettings
 from wakewise.interfaces import BodyState
-from wakewise.targets import Region
+from wakewise.wake.carried import Flow
 from wakewise.wake.silt import SiltView
 from wakewise.wake.view import WakeView
 
-MOVED_M_S = 0.004
-"""Change of the current at which its points are placed anew: over `DRIFT_S` it is a decimetre, a jet's width there."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Seen:
-    """What is watched for a current, shape (3,)."""
-
-    current_W_m_s: Array
-    view: WakeView
-
-    def __post_init__(self) -> None:
-        freeze(self, current_W_m_s=(3,))
+UNSURE = 0.2
+"""Standard deviation of each component of the current along a jet's way over its speed at the vehicle, beside what the
+estimator is unsure of: from the bed's own layer, where a current falls to a half, and eddies of a tenth to a fifth
+(I. Nezu and H. Nakagawa, Turbulence in Open-Channel Flows, 1993)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Watch:
-    """A region with what the levers add to it but for drift, the view of it, the levers, and the bed if it counts."""
+    """The view of a region with what the levers add to it, the levers, and the bed if silt counts."""
 
-    region: Region
     view: WakeView
     levers: LeverSettings
     silt: SiltView | None = None
 
-    def at(self, seen: Seen | None, estimate: BodyState) -> Seen:
-        """What to watch now: the same as before while the current is about the same.
+    def gram(self, estimate: BodyState, thrusts_N: Array) -> Array:
+        """Matrix G of D = s' G s at an estimate, shape (2 n, 2 n), in the flow that it tells of."""
+        return self.view.gram(estimate.X_WB, self.flow(estimate, thrusts_N))
+
+    def with_silt(self, gram: Array, estimate: BodyState, thrusts_N: Array) -> Array:
+        """That matrix, and what is lifted into the camera's view after such thrusts, where that counts."""
+        if self.silt is None:
+            return gram
+        current, _ = self._believed(estimate)
+        silt = self.silt.gram(estimate.X_WB, thrusts_N, np.zeros(3) if current is None else current)
+        return gram + self.view.total_weight * silt
+
+    def flow(self, estimate: BodyState, thrusts_N: Array) -> Flow | None:
+        """The current to reckon with and the thrusts, shape (n,), to reckon from; None where it does not count.
 
         The current is the one stated in the levers, else the estimate's; before that is known there is none.
         """
-        current = self.current_W_m_s(estimate)
-        if seen is not None and float(np.abs(current - seen.current_W_m_s).max()) <= MOVED_M_S:
-            return seen
-        region = with_drift(self.region, current)
-        if region is self.region:
-            return Seen(current_W_m_s=current, view=self.view)
-        view = replace(self.view, points_W_m=region.points_W_m, weights=region.weights)
-        return Seen(current_W_m_s=current, view=view)
-
-    def current_W_m_s(self, estimate: BodyState) -> Array:
-        """Current that is reckoned with, shape (3,); zero where drift does not count or nothing is known."""
-        return self._believed_m_s(estimate) if self.levers.drift else np.zeros(3)
-
-    def silt_gram(self, estimate: BodyState, thrusts_N: Array) -> Array | None:
-        """What silt adds to the matrix of a mean D, shape (2 n, 2 n), after such thrusts; None where it counts not."""
-        if self.silt is None:
+        current, found = self._believed(estimate)
+        if current is None or not self.levers.drift:
             return None
-        return self.silt.gram(estimate.X_WB, thrusts_N, self._believed_m_s(estimate))
+        variance = 0.0 if found is None else float(np.trace(found)) / 3.0
+        unsure_m_s = float(np.sqrt(variance + UNSURE**2 * float(current @ current)))
+        return Flow(current_W_m_s=current, unsure_m_s=unsure_m_s, thrusts_N=thrusts_N)
 
-    def _believed_m_s(self, estimate: BodyState) -> Array:
-        stated, found = self.levers.drift_m_s, estimate.current_W_m_s
-        if stated is not None:
-            return np.array(stated, dtype=np.float64)
-        return np.zeros(3) if found is None else found
+    def _believed(self, estimate: BodyState) -> tuple[Array | None, Array | None]:
+        """The current, shape (3,), and its covariance, shape (3, 3), None each where nothing is known or sure."""
+        if self.levers.drift_m_s is not None:
+            return np.array(self.levers.drift_m_s, dtype=np.float64), None
+        return estimate.current_W_m_s, estimate.current_covariance

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
         compare_depths,
         read_depth_views,
     )
-    from wakewise.evaluation.flight import SWAY_FIGURES, flight_figures
+    from wakewise.evaluation.flight import SWAY_FIGURES, attitude_rmse_deg, flight_figures
     from wakewise.evaluation.surface import (
         Comparison,
         Crop,
@@ -46,6 +46,7 @@ __all__ = [
     "Similarity",
     "Surface",
     "SurfaceScore",
+    "attitude_rmse_deg",
     "compare_depths",
     "compare_surface",
     "count_views",

@@ -75,6 +75,13 @@ def roll_pitch_rms_deg(true_WB_q: Array, goal_WB_q: Array) -> float:
     return float(np.degrees(rms(wrapped)))
 
 
+def attitude_rmse_deg(true_WB_q: Array, goal_WB_q: Array) -> float:
+    """RMS in degrees of the angle between true and wished attitude; quaternions (w, x, y, z), shape (n, 4)."""
+    cosine = np.abs(np.einsum("ni,ni->n", true_WB_q, goal_WB_q))
+    cosine /= np.linalg.norm(true_WB_q, axis=1) * np.linalg.norm(goal_WB_q, axis=1)
+    return float(np.degrees(rms(2.0 * np.arccos(np.clip(cosine, -1.0, 1.0)))))
+
+
 def sign_flips(thrusts_N: Array, dead_N: float = REVERSAL_N) -> int:
     """How often any thruster reversed; thrusts have shape (steps, thrusters), forces below `dead_N` have no sign."""
     flips = 0
@@ -108,10 +115,13 @@ def flight_figures(steps: pl.DataFrame) -> dict[str, float | int | None]:
     open. bed_speed_p95_m_s: the same percentile at the bed. turbidity_mean_per_m, disturbance: averaged over time.
     So are target_pressure_mean_Pa, target_pressure_p95_Pa, bed_shear_p95_Pa, tracer_speed_mean_m_s and
     ray_optical_depth, of the whole water; exposure_*: speed, pressure and optical depth while the shutter is open.
+    exceedance_1cm_s_pct, exceedance_ambient_pct: share of the target's surface, and of time, where the excess is more
+    than 1 cm/s, and more than the ambient water's own speed; exposure_exceedance_1cm_s_pct while the shutter is open.
     silt_lifted_g: given up by the bed until the end, settled again or not, so that sand counts at every hop.
     silt_suspended_max_g: most in the water at once, the figure to compare beds by.
     position_rmse_mm: true position against the goal's at the same instant. path_rmse_mm: against the goal's path.
-    estimate_rmse_mm: estimated against true position. velocity_deviation_pct, roll_pitch_rms_deg: see the functions.
+    estimate_rmse_mm: estimated against true position. velocity_deviation_pct, roll_pitch_rms_deg,
+    attitude_rmse_deg: see the functions.
     energy_kJ: electrical. sign_flips_per_s: reversals of all thrusters together per second. fallbacks: steps on which
     the controller fell back. collisions: times that the vehicle touched something. duration_s: length of the flight.
     Of a target that yields: sway_rms_mm, sway_wash_mm, sway_mean_mm, sway_about_mean_mm (see `sway_figures`),
@@ -143,6 +153,12 @@ def flight_figures(steps: pl.DataFrame) -> dict[str, float | int | None]:
         ("disturbance", "disturbance"),
     ):
         out[key] = _mean(steps, column, lasts, np.ones(len(time), dtype=np.bool_))
+    for key, column in (
+        ("exceedance_1cm_s_pct", "target_over_1cm_s"),
+        ("exceedance_ambient_pct", "target_over_ambient"),
+    ):
+        share = _mean(steps, column, lasts, np.ones(len(time), dtype=np.bool_))
+        out[key] = None if share is None else 100.0 * share
     exposing = _flags(steps, "exposing")
     for key, column in (
         ("exposure_speed_mean_m_s", "target_speed_mean_m_s"),
@@ -152,6 +168,8 @@ def flight_figures(steps: pl.DataFrame) -> dict[str, float | int | None]:
         ("exposure_optical_depth", "ray_optical_depth"),
     ):
         out[key] = None if exposing is None else _mean(steps, column, lasts, exposing)
+    share = None if exposing is None else _mean(steps, "target_over_1cm_s", lasts, exposing)
+    out["exposure_exceedance_1cm_s_pct"] = None if share is None else 100.0 * share
     lifted = _finite(steps, "silt_lifted_g")
     out["silt_lifted_g"] = None if lifted is None else float(lifted[-1])
     suspended = _finite(steps, "silt_suspended_g")
@@ -200,7 +218,14 @@ def sway_figures(steps: pl.DataFrame, exposing: BoolArray | None) -> dict[str, f
 
 def _tracking(steps: pl.DataFrame, time_s: Array) -> dict[str, float | int | None]:
     out: dict[str, float | int | None] = dict.fromkeys(
-        ("position_rmse_mm", "path_rmse_mm", "estimate_rmse_mm", "velocity_deviation_pct", "roll_pitch_rms_deg")
+        (
+            "position_rmse_mm",
+            "path_rmse_mm",
+            "estimate_rmse_mm",
+            "velocity_deviation_pct",
+            "roll_pitch_rms_deg",
+            "attitude_rmse_deg",
+        )
     )
     place = {who: _maybe(steps, *(f"{who}_{k}_m" for k in "xyz")) for who in ("true", "goal", "est")}
     turn = {who: _maybe(steps, *(f"{who}_q{k}" for k in "wxyz")) for who in ("true", "goal")}
@@ -214,6 +239,7 @@ def _tracking(steps: pl.DataFrame, time_s: Array) -> dict[str, float | int | Non
     q_true, q_goal = turn["true"], turn["goal"]
     if q_true is not None and q_goal is not None:
         out["roll_pitch_rms_deg"] = roll_pitch_rms_deg(q_true, q_goal)
+        out["attitude_rmse_deg"] = attitude_rmse_deg(q_true, q_goal)
         if speed["true"] is not None and speed["goal"] is not None:
             out["velocity_deviation_pct"] = velocity_deviation_pct(q_true, speed["true"], q_goal, speed["goal"])
     return out

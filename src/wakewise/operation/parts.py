@@ -30,6 +30,7 @@ from wakewise.planning import Surroundings
 from wakewise.tank.swaying import DRAG, Loose, Yielding
 from wakewise.targets import Region, Sway, Target, find_target
 from wakewise.vehicles import Vehicle
+from wakewise.vehicles.ballast import with_blocks
 from wakewise.wake import wake_model
 
 if TYPE_CHECKING:
@@ -85,6 +86,8 @@ class Parts:
         self.asked = scenario
         self.scenario = scenario.drawn()
         self.given: Mapping[str, Any] = MappingProxyType(dict(given or {}))
+        if "vehicle" in self.given and scenario.ballast:
+            raise InputError("ballast: the vehicle was given in Python, take it with its blocks (vehicles.ballast)")
 
     def replace(self, **given: Any) -> Parts:
         """The same parts with others in place of some; what depends on them is made anew.
@@ -130,8 +133,8 @@ class Parts:
 
     @part
     def vehicle(self) -> Vehicle:
-        """The vehicle as it is believed to be."""
-        vehicle = any_vehicle(self.scenario.vehicle)
+        """The vehicle as it is believed to be, with its ballast."""
+        vehicle = with_blocks(any_vehicle(self.scenario.vehicle), self.scenario.ballast)
         return vehicle.with_ideal_thrusters() if self.scenario.tank.ideal_thrusters else vehicle
 
     @part

@@ -26,6 +26,8 @@ from wakewise.vehicles.tilt import TiltJoint
 
 _STATE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "u_m_s", "v_m_s", "w_m_s", "p_rad_s", "q_rad_s", "r_rad_s")
 _WRENCH = ("wrench_X_N", "wrench_Y_N", "wrench_Z_N", "wrench_K_Nm", "wrench_M_Nm", "wrench_N_Nm")
+LOAD = ("load_X_N", "load_Y_N", "load_Z_N", "load_K_Nm", "load_M_Nm", "load_N_Nm")
+"""What the estimator says that pulls at the vehicle, in B (see `wakewise.interfaces.BodyState`)."""
 _WATER = tuple(figure.name for figure in fields(WaterTruth))
 _POSTURE = (
     "sway_m", "sway_peak_m", "sway_x_m", "sway_y_m", "sway_z_m", "target_stress_Pa", "shifted_m", "sway_wash_m",
@@ -43,6 +45,7 @@ def step_columns(thrusters: int, yields: bool = False) -> list[str]:
         *(f"thrust_{i + 1}_N" for i in range(thrusters)),
         *(f"command_{i + 1}_N" for i in range(thrusters)),
         *_WRENCH,
+        *LOAD,
         "disturbance",
         *_WATER,
         "power_W",
@@ -147,6 +150,7 @@ class FlightRecorder:
             truth.thrusts_N if truth else np.full(self.thrusters, np.nan),
             step.command.thrusts_N,
             step.command.wrench_B,
+            step.estimate.load_B,
             np.array([np.nan if step.command.disturbance is None else step.command.disturbance, *water]),
             np.array([truth.power_W if truth else np.nan]),
             _posture_row(self._posture),

@@ -121,7 +121,7 @@ GONE: Mapping[str, str] = {
     ),
     **dict.fromkeys(
         (f"control.levers.drift_{name}" for name in ("s", "spread_m_s", "points", "weight")),
-        f"{_CONSTANT} (wakewise.control.levers)",
+        "gone, jets follow the current themselves (wakewise.wake.carried)",
     ),
     "control.w_previous": "gone, five times w_effort by argument (wakewise.control.settings)",
     **dict.fromkeys(

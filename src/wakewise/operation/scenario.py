@@ -30,6 +30,7 @@ from wakewise.reconstruction import ReconstructionSettings
 from wakewise.settings import Settings
 from wakewise.tank import TankSettings
 from wakewise.tank.beds import SILTS
+from wakewise.vehicles.ballast import Block
 from wakewise.yaml_text import YamlError, read_yaml
 
 if TYPE_CHECKING:
@@ -56,10 +57,8 @@ class Scenario(Settings):
     )
     method: str = Field("wake-aware", description="how thrusts are chosen: a method's name, or package.module:make")
     vehicle: str = Field("paper", description="library name or path of a vehicle file")
-    world: str = Field(
-        "tank",
-        description="a world's name (`wakewise world list`), a flow's, or package.module:make",
-    )
+    ballast: tuple[Block, ...] = Field((), max_length=20, description="blocks of float or lead on it: float_N, at_B_m")
+    world: str = Field("tank", description="a world's name (`wakewise world list`), a flow's, or package.module:make")
     flow: str | None = Field(
         None,
         description="water in place of the world's own: tank, paper (circular), lattice, lattice-jets, a plug-in",

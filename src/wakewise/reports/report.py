@@ -17,6 +17,7 @@ from wakewise.reports.page import absence, fold, missing, plot, section, tile, w
 from wakewise.reports.photos import contact_sheet
 from wakewise.reports.scene3d import vehicle_of
 from wakewise.reports.trial import Trial, read_trial
+from wakewise.reports.trim import trim_html
 from wakewise.reports.words import grouped, number, shown, unit, verdict
 from wakewise.reports.yardstick import yardstick_html
 
@@ -173,7 +174,8 @@ def _flown_section(trial: Trial) -> str:
         "flown",
         "What was flown",
         lead,
-        film_html(trial)
+        trim_html(trial)
+        + film_html(trial)
         + plot(
             figures.plan_and_side(trial),
             "flight from above and from the side",

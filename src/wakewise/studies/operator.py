@@ -26,7 +26,7 @@ from wakewise.missions import open_route
 from wakewise.operation import Scenario, fly
 from wakewise.operation.instant_water import InstantWorld, paper_jets
 from wakewise.operation.loop import Step
-from wakewise.studies.gentle.flight import OFF, WAKE_OF, paper_place
+from wakewise.studies.gentle.paper import OFF, PAPER_WAKE, paper_place
 from wakewise.tank import TankSettings
 from wakewise.trials.timing import BenchOptions
 from wakewise.vehicles import load_vehicle, perturbed
@@ -173,7 +173,7 @@ def fly_course(course: Course, method: str, w_track: float, seed: int) -> Flown:
     """One flight by one method."""
     vehicle, tank = load_vehicle("paper"), TankSettings()
     target, region = paper_place(tank.size_m[2])
-    base = ControlSettings(wake=WakeSettings(**WAKE_OF["paper"]), levers=LeverSettings(**OFF))
+    base = ControlSettings(wake=WakeSettings(**PAPER_WAKE), levers=LeverSettings(**OFF))
     control = base.model_copy(update={"plan": obeying(base.plan, w_track)})
     plant_rng, _ = np.random.default_rng([seed, 13]).spawn(2)
     trim_N = float(plant_rng.uniform(-tank.mismatch.trim_range_N, tank.mismatch.trim_range_N))
@@ -201,7 +201,7 @@ def fly_course(course: Course, method: str, w_track: float, seed: int) -> Flown:
     )
     pilot = ScriptedOperator(course, watch, here, 1.0 / control.rate_hz)
     controller = Overheard(make_controller(method, vehicle, region, wake_model(control.wake), control))
-    view = WakeView.of(vehicle, region, wake_model(WakeSettings(**WAKE_OF["paper"])))
+    view = WakeView.of(vehicle, region, wake_model(WakeSettings(**PAPER_WAKE)))
     asked, done, planned, D, speed, solve_ms = [], [], [], [], [], []
 
     def record(step: Step, witness: Witness | None) -> None:

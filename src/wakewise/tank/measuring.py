@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Protocol
 
 import numpy as np
@@ -20,6 +21,12 @@ CLOSE_M = 0.3
 
 FRAME_S = 1 / 30
 """Time between the two pictures that a tracer's way is measured over."""
+
+OVER_M_S = 0.01
+"""Excess beyond which a place of the surface counts as washed: a round figure below the currents that targets live in,
+2 to 30 cm/s in the worlds of the library."""
+STILL_M_S = 1e-4
+"""Ambient water slower than this has no speed to be beyond."""
 
 _PROBES = 300
 _TRACERS = 60
@@ -76,7 +83,8 @@ class TargetProbes:
             The wave that is part of the ambient water, at `time_s`.
         """
         excess = water.excess_velocity(self._all_W_m)
-        whole = excess + self._ambient_m_s(water)
+        ambient = self._ambient_m_s(water)
+        whole = excess + ambient
         n, m = len(self.surface_W_m), len(self.surface_W_m) + len(self.bed_W_m)
         at_target, at_bed = np.linalg.norm(excess[:n], axis=1), np.linalg.norm(excess[n:m], axis=1)
         pressure = 0.5 * density_kg_m3 * np.einsum("ij,ij->i", whole[:n], whole[:n])
@@ -87,6 +95,7 @@ class TargetProbes:
             swell_Pa = swell.stress_Pa(floor, time_s)
         star = friction_velocity_m_s(np.linalg.norm(on_bed, axis=1), SHEAR_HEIGHT_M, laws.grain_m)
         every = max(n // _TRACERS, 1)
+        drift_m_s = float(np.linalg.norm(ambient[:n], axis=1).mean())
         return WaterTruth(
             target_speed_mean_m_s=float(at_target.mean()),
             target_speed_p95_m_s=_p95(at_target),
@@ -99,6 +108,8 @@ class TargetProbes:
                 tracer_speeds_m_s(water, self.surface_W_m[::every], whole[:n:every], FRAME_S, self._bed_z).mean()
             ),
             ray_optical_depth=self.ray_optical_depth(laws, silt, camera_W_m),
+            target_over_1cm_s=float((at_target > OVER_M_S).mean()),
+            target_over_ambient=float((at_target > drift_m_s).mean()) if drift_m_s > STILL_M_S else math.nan,
         )
 
     def _ambient_m_s(self, water: ExcessFlow) -> Array:

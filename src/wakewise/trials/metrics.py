@@ -52,6 +52,11 @@ _FIGURES: dict[str, tuple[str, str, Better]] = {
                               "mean over surface and time from the first leg on", "less"),
     "target_speed_p95_m_s": ("m/s", "95th percentile over the surface of the same, mean over time", "less"),
     "exposure_speed_mean_m_s": ("m/s", "target_speed_mean_m_s while the shutter is open", "less"),
+    "exceedance_1cm_s_pct": ("%", "share of the target's surface, and of time, where that excess is more than 1 cm/s",
+                             "less"),
+    "exceedance_ambient_pct": ("%", "the same where it is more than the water's own mean speed there without the "
+                               "vehicle", "less"),
+    "exposure_exceedance_1cm_s_pct": ("%", "exceedance_1cm_s_pct while the shutter is open", "less"),
     "bed_speed_p95_m_s": ("m/s", "95th percentile of the excess speed just above the bed within 0.3 m of the target, "
                           "mean over time", "less"),
     "turbidity_mean_per_m": ("1/m", "beam attenuation by silt around the target, mean over time", "less"),
@@ -97,6 +102,7 @@ _FIGURES: dict[str, tuple[str, str, Better]] = {
     "estimate_rmse_mm": ("mm", "distance of the estimated vehicle from the true one", "less"),
     "velocity_deviation_pct": ("%", "rms difference of true and wished velocity over the rms wished velocity", "less"),
     "roll_pitch_rms_deg": ("deg", "rms error in roll and pitch", "less"),
+    "attitude_rmse_deg": ("deg", "rms angle between true and wished attitude", "less"),
     "energy_kJ": ("kJ", "electrical energy of the thrusters", "less"),
     "sign_flips_per_s": ("1/s", "reversals of thrust, all thrusters together, per second", "less"),
     "duration_s": ("s", "length of the flight from the first leg on; what comes before, settling, is in no figure",

@@ -25,8 +25,10 @@ class BenchOptions:
     progress : Progress
     seeds : int
         Flights per method of a bench that flies; seeds 1 to this.
-    methods, flows, levers : tuple of str or None
+    methods, scenarios : tuple of str or None
         Which of them such a bench flies; None for all.
+    levers : tuple of str or None
+        Levers that such a bench switches, one by one; None for none of them.
     worlds : tuple of str or None
         Which worlds such a bench flies in; None for all.
     models : int
@@ -45,7 +47,7 @@ class BenchOptions:
     progress: Progress = no_progress
     seeds: int = 10
     methods: tuple[str, ...] | None = None
-    flows: tuple[str, ...] | None = None
+    scenarios: tuple[str, ...] | None = None
     levers: tuple[str, ...] | None = None
     worlds: tuple[str, ...] | None = None
     models: int = 1

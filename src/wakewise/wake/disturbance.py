@@ -17,8 +17,10 @@ from numpy.typing import ArrayLike
 from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.interfaces import WakeModel
+from wakewise.wake.carried import Flow, plumes
 from wakewise.wake.checks import explain, same_sizes
-from wakewise.wake.floor import FloorJet
+from wakewise.wake.floor import FloorJet, free_jet
+from wakewise.wake.floor_carried import add_carried_walls
 from wakewise.wake.floor_sums import floor_gram_sum
 from wakewise.wake.gradients import Superposition
 from wakewise.wake.jets import AxialJet
@@ -35,6 +37,7 @@ def gram(
     axes_W: Array,
     areas_m2: Array,
     superposition: Superposition = "coherent",
+    flow: Flow | None = None,
 ) -> Array:
     """Matrix G of D = s' G s at given thruster places, symmetric and positive semidefinite.
 
@@ -48,6 +51,9 @@ def gram(
     areas_m2 : ndarray, shape (m,)
     superposition : "coherent" or "incoherent"
         How jets that meet add up; incoherent leaves the diagonal alone.
+    flow : Flow, optional
+        What carries the jets, at the thrusts of its guess (see `carried`); still water where it is not given, and for
+        models from outside.
 
     Returns
     -------
@@ -61,7 +67,14 @@ def gram(
     """
     same_sizes(region_points_W, weights, origins_W, axes_W, areas_m2)
     place = (region_points_W, weights, origins_W, axes_W, areas_m2)
-    if isinstance(model, AxialJet):
+    if flow is not None and isinstance(free_jet(model), AxialJet):
+        twice, directions = np.concatenate([origins_W, origins_W]), np.concatenate([-axes_W, axes_W])
+        jets = (twice, directions, np.concatenate([areas_m2, areas_m2]))
+        moved = carried_velocity(model, region_points_W, *jets, flow.guessed, flow) * np.sqrt(weights)[:, None]
+        rows = moved.reshape(len(moved), -1)
+        # A flow that is not finite is the estimator's doing and gives a matrix that is not; the rest is the caller's.
+        G, check = rows @ rows.T, float(np.min(weights, initial=0.0) < 0.0 or np.min(areas_m2) <= 0.0)
+    elif isinstance(model, AxialJet):
         G, check = gram_sum(*place, *model.law)
     elif isinstance(model, FloorJet):
         in_world = (region_points_W, weights, _ORIGIN, _LEVEL, origins_W, axes_W, areas_m2)
@@ -77,6 +90,31 @@ def gram(
     if check != 0.0:
         raise explain(*place)
     return incoherent(G) if superposition == "incoherent" else G
+
+
+def carried_velocity(
+    model: WakeModel,
+    points_W_m: Array,
+    origins_W_m: Array,
+    directions_W: Array,
+    areas_m2: Array,
+    thrusts_N: Array,
+    flow: Flow,
+) -> Array:
+    """Velocity per square root of newton, shape (m, n, 3), that jets of these thrusts have in excess of a current.
+
+    Arguments as for `WakeModel.unit_velocity`; `thrusts_N`, shape (m,), more than 0, sets how far each jet gets. The
+    model must be one of ours (an `AxialJet`, with a floor or without).
+    """
+    jet = free_jet(model)
+    if not isinstance(jet, AxialJet):
+        raise InputError(f"wake model {model.name}: brings no law of a jet that a current could carry")
+    speeds, curves = plumes(points_W_m, origins_W_m, directions_W, areas_m2, jet.law, thrusts_N, flow)
+    velocity = speeds[:, :, None] * directions_W[:, None, :]
+    if isinstance(model, FloorJet):
+        walls = (np.ascontiguousarray(directions_W), areas_m2, model.numbers, thrusts_N)
+        add_carried_walls(points_W_m, curves, *walls, flow.current_W_m_s, flow.unsure_m_s, velocity)
+    return np.asarray(velocity)
 
 
 def incoherent(gram: Array) -> Array:

@@ -13,6 +13,7 @@ from wakewise.geometry import Pose
 from wakewise.interfaces import WakeModel
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
+from wakewise.wake.carried import Flow
 from wakewise.wake.disturbance import gram
 from wakewise.wake.gradients import Superposition
 
@@ -55,12 +56,11 @@ class WakeView:
         """Sum of the region's weights: D divided by it is a mean square speed."""
         return float(np.sum(self.weights))
 
-    def gram(self, X_WB: Pose) -> Array:
-        """Matrix G of D = s' G s, shape (2 n, 2 n), with the jets where a pose puts them."""
+    def gram(self, X_WB: Pose, flow: Flow | None = None) -> Array:
+        """Matrix G of D = s' G s, shape (2 n, 2 n), with the jets where a pose puts them and a flow carries them."""
         origins_W, axes_W = _placed(X_WB.p_m, X_WB.q, self.positions_B_m, self.axes_B)
-        return gram(
-            self.wake, self.points_W_m, self.weights, origins_W, axes_W, self.areas_m2, superposition=self.superposition
-        )
+        place = (self.points_W_m, self.weights, origins_W, axes_W, self.areas_m2)
+        return gram(self.wake, *place, superposition=self.superposition, flow=flow)
 
 
 @njit

@@ -94,8 +94,14 @@ def load_world(name: str) -> NamedWorld:
         close = difflib.get_close_matches(name, world_names(), 1)
         hint = f"did you mean {close[0]}? " if close else ""
         raise InputError(f"world '{name}': not in the library, {hint}allowed are {', '.join(world_names())}")
-    every, own = parse_world("_every", _text("_every")).file, parse_world(name, _text(name)).file
-    return NamedWorld(name=name, file=own.model_copy(update={"fields": every.fields | own.fields}))
+    own = parse_world(name, _text(name)).file
+    return NamedWorld(name=name, file=own.model_copy(update={"fields": every_world() | own.fields}))
+
+
+@functools.cache
+def every_world() -> dict[str, WorldField]:
+    """Fields that every world has, unless it says otherwise, by their dotted names."""
+    return parse_world("_every", _text("_every")).file.fields
 
 
 def _text(name: str) -> str:

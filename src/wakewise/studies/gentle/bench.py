@@ -1,14 +1,9 @@
-"""What each method does to the target's water, in the tank and in the paper's own world, and what each lever is worth.
+"""What each method does to the target's water where users have the trouble, and what each lever is worth there.
 
-Every method flies the same vehicle, the same unknown trim (drawn per seed, +-1 N), sensors, estimator and mission: a
-hover on an orbit of 40 deg and an arc of one of 20 deg, both legs and the way between them in one figure, over a
-silty bed in the default current. Seed k is the same draw for all methods, so flights are compared in pairs; intervals
-are 95 % of a bootstrap over pairs. Flow `parcels` is the tank's own water; flow `paper` is circular
-(`wakewise.operation.instant_water`) and says so.
-
-How long, and how many. A jet of 0.1 N needs 5 s to a target 0.7 m away, and its remains drift there with 3 cm/s in 15
-to 20 s, so a flight needs settling and hover of 23 s and an arc of 15 s to show what a method does; 43 s it is. Methods
-fly all seeds. Levers fly fewer: they are large or they are nothing, and pairs tell which.
+Scenarios are files (`scenarios/`), stratified over trim and the side of the current (`strata.py`); the library's
+worlds count as scenarios, too. Seed k of a scenario is one world for all methods, so flights are compared in pairs;
+the headline was chosen beforehand (`headline.py`, docs/decisions/0033). The paper's own world is circular and says so
+(`paper.py`).
 
 Flights are kept (`flight_store`): a run that was stopped goes on, and a second one only flies what is new.
 """
@@ -16,119 +11,191 @@ Flights are kept (`flight_store`): a run that was stopped goes on, and a second 
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from wakewise.errors import InputError
 from wakewise.studies import side_by_side
 from wakewise.studies.flight_store import FlightStore, store_folder
-from wakewise.studies.gentle.figures import flow_figures
-from wakewise.studies.gentle.flight import FIGURES, Trial, World, fly_trial
-from wakewise.studies.gentle.levers import Entry, entries, method_trial
-from wakewise.studies.side_by_side import Failure, Key, Row
+from wakewise.studies.gentle.figures import SPEED, Row, log_reduction_pct, means, pairs_of, reduction_pct
+from wakewise.studies.gentle.flight import FIGURES, fly_trial
+from wakewise.studies.gentle.headline import PLACE, RIVALS, WRONG, headline
+from wakewise.studies.gentle.levers import LEVERS, NONE, alone, left_out, wished_levers
+from wakewise.studies.gentle.library import names_of, title_of, trim_of
+from wakewise.studies.gentle.paper import FIGURES as PAPER_FIGURES
+from wakewise.studies.gentle.paper import METHODS as PAPER_METHODS
+from wakewise.studies.gentle.paper import SEEDS as PAPER_SEEDS
+from wakewise.studies.gentle.paper import PaperTrial, fly_paper
+from wakewise.studies.gentle.plan import METHODS, flight_s, flown_methods, planned_trials
+from wakewise.studies.side_by_side import Failure, Key
 from wakewise.trials.timing import BenchOptions
 
-METHODS = ("dp", "pseudo-inverse", "unaware", "smooth", "wake-aware")
-WORLDS: tuple[World, ...] = ("parcels", "paper")
-LEVER_SEEDS = {"parcels": 3, "paper": 2}
-"""Levers fly the first seeds only. The first three hover abreast, upstream and downstream of the target; the intervals
-of so few pairs are narrower than their 95 %."""
+MODEL_FIGURES = ("rmse_mm", "completeness_pct", "success_pct")
+PAPER = "paper"
 
 _pool = side_by_side.processes
 
 
 def run(options: BenchOptions) -> dict[str, Any]:
-    """Fly what is wished and not known yet, and gather figures, reductions and levers of each flow.
+    """Fly what is wished and not known yet; scenarios' tables, the headline, the paper's world.
 
     Raises
     ------
     InputError
-        If a method, flow or lever is not known.
+        If a scenario, method or lever is not known.
     """
-    methods = _known("methods", options.methods, METHODS)
-    worlds = _known("flows", options.flows, WORLDS)
-    tables = {world: _wished_levers(world, options.levers) for world in WORLDS if world in worlds}
-    trials = planned_trials(methods, tables, options.seeds)
+    wished = options.scenarios
+    scenarios = names_of(None if wished is None else tuple(name for name in wished if name != PAPER))
+    with_paper = wished is None or PAPER in wished
+    methods, reasons = flown_methods(options.methods)
+    levers = wished_levers(options.levers)
     began = time.monotonic()
-    rows, failures, kept = fly_all(trials, options)
-    flows: dict[str, Any] = {}
-    for world, table in tables.items():
-        flights: dict[str, dict[int, Row]] = {}
-        for (where, name, seed), row in rows.items():
-            if where == world:
-                flights.setdefault(name, {})[seed] = row
-        flows[world] = flow_figures(world, flights, methods, table)
+    trials = planned_trials(scenarios, methods, levers, options.seeds)
+    folder = options.store or store_folder()
+    store = FlightStore(folder, options.fresh)
+    expected = sum(flight_s(trial) for trial in trials.values() if store.load(trial) is None)
+    words = f"{len(trials)} flights, some {expected / 60.0 / options.workers:.0f} min of {options.workers} free cores"
+    options.progress(0, max(len(trials), 1), words)
+    rows, failures, kept = side_by_side.fly_all(trials, fly_trial, store, options, _pool)
+    papers, lost, known = side_by_side.fly_all(
+        paper_trials(methods, options.seeds) if with_paper else {}, fly_paper, store, options, _pool
+    )
+    failed = {(failure.name, (failure.flow, failure.seed)) for failure in failures}
+    trims = {(scenario, seed): trim_of(scenario, seed) for scenario, _, seed in trials}
     return {
-        "flows": flows,
-        "flights": len(trials),
-        "flown": len(trials) - kept - len(failures),
-        "failed": len(failures),
-        "failures": [vars(failure) for failure in failures],
+        "scenarios": {name: scenario_figures(name, methods, levers, rows, failures) for name in scenarios},
+        "headline": headline(by_method(rows), trims, failed),
+        "flows": {PAPER: paper_figures(papers, methods)} if with_paper else {},
+        "flights": len(trials) + len(papers) + len(lost),
+        "flown": len(rows) + len(papers) - kept - known,
+        "failed": len(failures) + len(lost),
+        "failures": [vars(failure) for failure in (*failures, *lost)],
         "flight_cpu_s": _cpu_s(rows),
         "wall_s": time.monotonic() - began,
-        "why": why(rows, worlds, methods),
+        "why": reasons | why(levers, with_paper),
     }
 
 
-def planned_trials(methods: tuple[str, ...], tables: dict[World, dict[str, Entry]], seeds: int) -> dict[Key, Trial]:
-    """Flights to make: each method on seeds 1 to `seeds`, each lever on the first few of them."""
-    trials: dict[Key, Trial] = {}
-    for world, table in tables.items():
-        for seed in range(1, seeds + 1):
-            for method in methods:
-                trials[world, method, seed] = method_trial(world, method, seed)
-        for entry in table.values():
-            for seed in range(1, min(seeds, LEVER_SEEDS[world]) + 1):
-                trials[world, entry.name, seed] = entry.trial(world, seed)
-    return trials
+def by_method(rows: Mapping[Key, Row]) -> dict[str, dict[tuple[str, int], Row]]:
+    """Rows by method or lever, then by scenario and seed."""
+    found: dict[str, dict[tuple[str, int], Row]] = {}
+    for (scenario, name, seed), row in rows.items():
+        found.setdefault(name, {})[scenario, seed] = row
+    return found
 
 
-def fly_all(trials: dict[Key, Trial], options: BenchOptions) -> tuple[dict[Key, Row], list[Failure], int]:
-    """Figures of all flights, those that failed, and how many were known already."""
-    store = FlightStore(options.store or store_folder(), options.fresh)
-    return side_by_side.fly_all(trials, fly_trial, store, options, _pool)
+def scenario_figures(
+    scenario: str, methods: tuple[str, ...], levers: tuple[str, ...], rows: Mapping[Key, Row], failures: list[Failure]
+) -> dict[str, Any]:
+    """Table of one scenario: methods, what `wake-aware` is worth, levers; flights that failed are with their method."""
+    here: dict[str, dict[int, Row]] = {}
+    for (where, name, seed), row in rows.items():
+        if where == scenario:
+            here.setdefault(name, {})[seed] = row
+    lost = [failure for failure in failures if failure.flow == scenario]
+    strata = {seed: trim_of(scenario, seed) for own in here.values() for seed in own}
+    table: dict[str, Any] = {}
+    dp = here.get(METHODS[0], {})
+    for name in (*methods, WRONG):
+        own = here.get(name, {})
+        gone = [failure for failure in lost if failure.name == name]
+        if not own and not gone:
+            continue
+        told = means(own.values(), FIGURES)
+        told |= dict.fromkeys(MODEL_FIGURES)
+        told["failed"] = len(gone)
+        told["failures"] = [f"seed {failure.seed}: {failure.reason}" for failure in gone]
+        if name != METHODS[0]:
+            told |= against(dp, own, METHODS[0], strata)
+        told["why"] = {key: _reason(key) for key in (*FIGURES, *MODEL_FIGURES) if told[key] is None}
+        table[name] = told
+    ours = here.get("wake-aware", {})
+    answer: dict[str, Any] = {
+        "title": title_of(scenario),
+        "dp_target_speed_m_s": table.get(METHODS[0], {}).get(SPEED),
+        "methods": table,
+    }
+    for rival in RIVALS:
+        answer |= against(here.get(rival, {}), ours, rival, strata)
+    answer["levers"] = {name: lever_figures(name, here, strata) for name in levers}
+    answer["why"] = {key: "not flown by both" for key, value in answer.items() if key.endswith("pct") and value is None}
+    return answer
 
 
-def why(rows: dict[Key, Row], worlds: tuple[World, ...], methods: tuple[str, ...]) -> dict[str, str]:
-    """Reasons of what could not be computed."""
-    reasons: dict[str, str] = {}
-    for figure in FIGURES:
-        without = sorted({key[0] for key, row in rows.items() if row.get(figure) is None})
-        if without:
-            reasons[figure] = f"no figure from flow {', '.join(without)}"
-    if "bed_speed_p95_m_s" in reasons:
-        reasons["bed_speed_p95_m_s"] = "flow paper has no bed"
-    for world in (w for w in WORLDS if w not in worlds):
-        reasons[world] = "this flow was left out"
-    for method in (m for m in METHODS if m not in methods):
-        reasons[method] = "this method was left out"
+def against(base: Mapping[int, Row], ours: Mapping[int, Row], rival: str, strata: Mapping[int, str]) -> dict[str, Any]:
+    """Reduction of the target's speed against a rival: by logarithms, its worst seed, and by sums."""
+    tag = rival.replace("-", "_")
+    value, interval, worst = log_reduction_pct(pairs_of(base, ours, SPEED, strata))
+    return {
+        f"reduction_vs_{tag}_pct": value,
+        f"reduction_vs_{tag}_interval_pct": interval,
+        f"worst_seed_vs_{tag}_pct": worst,
+        f"sums_reduction_vs_{tag}_pct": reduction_pct(base, ours, SPEED)[0],
+    }
+
+
+def lever_figures(name: str, here: Mapping[str, Mapping[int, Row]], strata: Mapping[int, str]) -> dict[str, Any]:
+    """What a lever is worth here: with it and without, all others on; it alone and none."""
+    answer: dict[str, Any] = {}
+    for key, base, ours in (
+        ("left_out", left_out(name), "wake-aware"),
+        ("alone", NONE, alone(name)),
+    ):
+        pairs = pairs_of(here.get(base, {}), here.get(ours, {}), SPEED, strata)
+        answer[f"{key}_pct"], answer[f"{key}_interval_pct"], _ = log_reduction_pct(pairs)
+        worse = [ours - theirs for theirs, ours, _ in pairs_of(here.get(base, {}), here.get(ours, {}), PLACE, {})]
+        answer[f"{key}_camera_change_mm"] = float(np.mean(worse)) if worse else None
+    return answer
+
+
+def paper_trials(methods: tuple[str, ...], seeds: int) -> dict[Key, PaperTrial]:
+    """Flights in the paper's own world."""
+    return {
+        (PAPER, method, seed): PaperTrial(method=method, seed=seed)
+        for seed in range(1, min(seeds, PAPER_SEEDS) + 1)
+        for method in PAPER_METHODS
+        if method in methods
+    }
+
+
+def paper_figures(rows: Mapping[Key, Row], methods: tuple[str, ...]) -> dict[str, Any]:
+    """Table of the paper's world, and reductions of `wake-aware`; circular, since its wake model is the water."""
+    here = {name: {seed: row for (_, who, seed), row in rows.items() if who == name} for name in PAPER_METHODS}
+    answer: dict[str, Any] = {
+        "circular": True,
+        "methods": {name: means(here[name].values(), PAPER_FIGURES) for name in PAPER_METHODS if name in methods},
+    }
+    for rival in PAPER_METHODS[:-1]:
+        for figure, short in ((SPEED, ""), ("disturbance", "_disturbance")):
+            value, interval = reduction_pct(here[rival], here["wake-aware"], figure)
+            answer[f"reduction_vs_{rival}{short}_pct"] = value
+            answer[f"reduction_vs_{rival}{short}_interval_pct"] = interval
+    return answer
+
+
+def why(levers: tuple[str, ...], with_paper: bool) -> dict[str, str]:
+    """Reasons of what was not flown."""
+    reasons = {} if with_paper else {PAPER: "this flow was left out"}
+    for name in LEVERS:
+        if name not in levers:
+            reasons[name] = "this lever was not switched; --levers all, or its name"
     return reasons
 
 
-def _known(what: str, wished: tuple[str, ...] | None, allowed: tuple[Any, ...]) -> tuple[Any, ...]:
-    """The wished names in the bench's order; all if None."""
-    for name in wished or ():
-        if name not in allowed:
-            raise InputError(f"{what}: '{name}' is not known, allowed: {', '.join(allowed)}")
-    return tuple(name for name in allowed if wished is None or name in wished)
+def _reason(key: str) -> str:
+    if key in MODEL_FIGURES:
+        return "models are made by `wakewise bench worlds`"
+    if key.startswith("sway"):
+        return "the targets of these seeds are rigid"
+    if key == "exceedance_ambient_pct":
+        return "the water is still without the vehicle"
+    if key == "float_N":
+        return "of +trim alone"
+    return "no flight gave it"
 
 
-def _wished_levers(world: World, wished: tuple[str, ...] | None) -> dict[str, Entry]:
-    """Lines of the lever table, those that they are held against included; all if None, `none` for none."""
-    table = entries(world)
-    if wished is None:
-        return table
-    every = {name for w in WORLDS for name in entries(w)}
-    for name in wished:
-        if name not in every and name != "none":
-            raise InputError(f"levers: '{name}' is not known, allowed: none, {', '.join(sorted(every))}")
-    chosen = {name for name in wished if name in table}
-    chosen |= {table[name].base for name in chosen if table[name].base in table}
-    return {name: entry for name, entry in table.items() if name in chosen}
-
-
-def _cpu_s(rows: dict[Key, Row]) -> float | None:
+def _cpu_s(rows: Mapping[Key, Row]) -> float | None:
     """Mean CPU time of a flight."""
     known = [row["cpu_s"] for row in rows.values() if row.get("cpu_s") is not None]
     return float(np.mean(np.array(known, dtype=np.float64))) if known else None

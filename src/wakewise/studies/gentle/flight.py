@@ -1,216 +1,226 @@
-"""One short flight of the gentle bench: a hover and an arc of an orbit, in one world, by one method, with one seed."""
+"""One flight of the gentle bench: a scenario or a world of the library, one vehicle, one method, one seed."""
 
 from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import polars as pl
 
-from wakewise.control.trim import ballasted
-from wakewise.evaluation import flight_figures
-from wakewise.geometry import Pose, matrix_from_quat
-from wakewise.missions import SETTLING, Leg, Route
-from wakewise.missions.route import rest_to_rest
-from wakewise.operation import Parts, fly
-from wakewise.operation.scenario import Scenario, check_scenario
-from wakewise.operation.seeds import Seeds
-from wakewise.targets import Region, find_target, sample_region
-from wakewise.vehicles import Vehicle, load_vehicle
-from wakewise.wake import WakeSettings, WakeView, disturbance, wake_model
+from wakewise.arrays import Array
+from wakewise.evaluation import attitude_rmse_deg, flight_figures
+from wakewise.geometry import Pose
+from wakewise.interfaces import Witness
+from wakewise.missions import SETTLING, Route
+from wakewise.operation import Parts, Scenario, fly
+from wakewise.operation.loop import Step
+from wakewise.studies.gentle.courses import (
+    BRAKE_AT_M,
+    CLOSE_M,
+    HOVER_DEG,
+    STANDOFF_M,
+    brake_route,
+    gentle_route,
+    looking_down,
+    lowest_clear_deg,
+    station_route,
+    transect_route,
+)
+from wakewise.studies.gentle.library import WORLD, Drawn, drawn, fields_of, load_scenario_file
+from wakewise.studies.gentle.paper import WATER_EVERY_S
+from wakewise.studies.gentle.trimmed import ballasted_world, blocks_N
+from wakewise.studies.worlds.flight import WorldTrial, short_flight
+from wakewise.tank.tether import DRAG_COEFFICIENT
+from wakewise.vehicles import Vehicle
 
-World = Literal["parcels", "paper"]
-
-SETTLE_S, HOVER_S, ARC_S = 8.0, 15.0, 15.0
-HOVER_DEG, ARC_DEG = 40.0, 20.0
-"""Elevations of two orbits of the default mission."""
-STANDOFF_M, ARC_SPEED_M_S, TRANSIT_SPEED_M_S, ACCELERATION_M_S2 = 0.5, 0.06, 0.10, 0.05
-EXPOSURE_EVERY_S = 3.0
-WATER_EVERY_S = 0.25
-WAKE_OF: dict[str, dict[str, Any]] = {
-    "parcels": {"model": "jet", "floor": False},
-    "paper": {"model": "paper-calibrated", "edge_width_deg": 3.0, "floor": False},
-}
-"""What the controllers believe: the default, and in the paper's world the paper's model with a smooth edge."""
-
-OFF = {"spare": False, "meet": False, "drift": False}
-"""Levers that a scenario has on; here each is added by name."""
+TRIM = "+trim"
+"""Ends the name of a method that is flown with the float or lead that its own hover asks for."""
+CABLE_M, WINCH_M = 0.01, 1.5
+"""Diameter of a cable such as small vehicles have; its winch is this far off, at the surface, across the current, so
+that it pulls straight down it."""
+WRONG_SHARE, WRONG_RAD = 0.3, np.radians(30.0)
+"""How wrong a current is believed: its speed by this share, its heading by this angle; the seed draws both signs."""
 
 FIGURES = (
     "target_speed_mean_m_s",
     "target_speed_p95_m_s",
     "exposure_speed_mean_m_s",
-    "bed_speed_p95_m_s",
-    "disturbance",
+    "exceedance_1cm_s_pct",
+    "exceedance_ambient_pct",
+    "exposure_exceedance_1cm_s_pct",
+    "target_pressure_mean_Pa",
+    "bed_shear_p95_Pa",
+    "silt_lifted_g",
+    "ray_optical_depth",
+    "exposure_optical_depth",
+    "sway_rms_mm",
+    "sway_about_mean_mm",
     "position_rmse_mm",
     "path_rmse_mm",
-    "velocity_deviation_pct",
-    "roll_pitch_rms_deg",
+    "attitude_rmse_deg",
+    "camera_rmse_mm",
+    "camera_attitude_rmse_deg",
     "energy_kJ",
     "sign_flips_per_s",
+    "solve_ms_p99",
     "fallbacks",
     "collisions",
-    "camera_rmse_mm",
-    "hover_speed_mean_m_s",
-    "orbit_speed_mean_m_s",
+    "float_N",
     "cpu_s",
 )
-"""Of each flight. `camera_rmse_mm` is how far the camera is from where the mission wants it, attitude included."""
+"""Of each flight, from the end of settling on; `float_N` is what +trim added, null for others."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trial:
-    """One flight to make; hashable, so that it can be handed to a worker.
+    """One flight to make; hashable and plain, so that it can be handed to a worker.
 
     Parameters
     ----------
-    world : "parcels" or "paper"
+    scenario : str
+        Full name: `orbit/paper`, `world/mud`.
     method : str
+        A method's name, or one with `TRIM` at its end.
     seed : int
+        From 1.
     control : tuple
         Dotted fields of `ControlSettings` and their values.
-    float_N : float
-        Buoyancy by which the vehicle is ballasted away from neutral, known to everybody; the unknown trim comes on top.
-    shift_mm : float
-        How far its centre of gravity is moved forward, known to everybody.
-    standoff_m : float
-    with_current : bool
-        Fly the arc in that direction in which the mean current helps.
+    wrong_current : bool
+        State a wrong current to the controller.
+    duration_s : float or None
+        Only the first part of the flight.
     """
 
-    world: World
+    scenario: str
     method: str
     seed: int
     control: tuple[tuple[str, Any], ...] = ()
-    float_N: float = 0.0
-    shift_mm: float = 0.0
-    standoff_m: float = STANDOFF_M
-    with_current: bool = False
+    wrong_current: bool = False
+    duration_s: float | None = None
 
 
-def scenario_of(trial: Trial) -> Scenario:
-    """Everything at its default but for the levers, which are off, the method, the seed and what the trial changes."""
-    control: dict[str, Any] = {"wake": dict(WAKE_OF[trial.world]), "levers": dict(OFF)}
-    for name, value in trial.control:
-        branch = control
-        *parents, leaf = name.split(".")
-        for parent in parents:
-            branch = branch.setdefault(parent, {})
-        branch[leaf] = value
-    world = "tank" if trial.world == "parcels" else trial.world
-    told = {"method": trial.method, "seed": trial.seed, "world": world, "control": control}
-    return check_scenario(told, "gentle bench")
+def parts_of(trial: Trial) -> Parts:
+    """Parts of the flight, but for what +trim adds."""
+    method = trial.method.removesuffix(TRIM)
+    if trial.scenario.startswith(WORLD):
+        world = WorldTrial(world=trial.scenario.removeprefix(WORLD), method=method, seed=trial.seed)
+        parts = short_flight(world)
+    else:
+        name, vehicle = trial.scenario.split("/")
+        parts = scenario_parts(name, vehicle, method, trial.seed)
+    told = dict(trial.control)
+    if trial.wrong_current:
+        told |= wrong_current(parts.scenario.tank.current.velocity_m_s, parts.scenario.seed)
+    return parts.replace(**{f"control.{key}": value for key, value in told.items()}) if told else parts
 
 
-def gentle_route(
-    centre_W_m: Any,
-    standoff_m: float,
-    azimuth_rad: float,
-    direction: float = 1.0,
-    elevations_deg: tuple[float, float] = (HOVER_DEG, ARC_DEG),
-) -> Route:
-    """Hover on a higher orbit, sink to a lower one, fly part of it: towards larger azimuths, or less for -1."""
-    high = np.array([azimuth_rad, np.radians(elevations_deg[0]), standoff_m])
-    low = np.array([azimuth_rad, np.radians(elevations_deg[1]), standoff_m])
-    turn = direction * ARC_SPEED_M_S * ARC_S / (standoff_m * np.cos(low[1]))
-    end = low + np.array([turn, 0.0, 0.0])
-    hover = Leg(
-        name="hover",
-        start=high,
-        end=high,
-        length_m=0.0,
-        duration_s=HOVER_S,
-        speed_m_s=TRANSIT_SPEED_M_S,
-        acceleration_m_s2=ACCELERATION_M_S2,
-    )
-    sink = rest_to_rest("transit", high, low, TRANSIT_SPEED_M_S, ACCELERATION_M_S2)
-    arc = rest_to_rest("orbit", low, end, ARC_SPEED_M_S, ACCELERATION_M_S2)
-    legs = (hover, sink, arc)
-    starts = SETTLE_S + np.cumsum([0.0, hover.duration_s, sink.duration_s])
-    shots = [
-        start + t
-        for start, leg in ((starts[0], hover), (starts[2], arc))
-        for t in np.arange(0.5 * EXPOSURE_EVERY_S, leg.duration_s, EXPOSURE_EVERY_S)
-    ]
-    return Route(
-        centre_W_m=centre_W_m,
-        legs=legs,
-        starts_s=starts,
-        exposures_s=np.array(shots),
-        exposure_names=tuple(f"{k:03d}.png" for k in range(len(shots))),
-        X_WC_planned=tuple(Pose(np.zeros(3)) for _ in shots),
-        duration_s=float(starts[2] + arc.duration_s + 0.3),
-    )
+def scenario_parts(name: str, vehicle: str, method: str, seed: int) -> Parts:
+    """Parts of a flight of one of the bench's own scenarios."""
+    file, what = load_scenario_file(name), drawn(name, seed)
+    values, draws = fields_of(name)
+    told: dict[str, Any] = values | {
+        "world": "tank",
+        "vehicle": vehicle,
+        "method": method,
+        "seed": what.seed,
+        "tank.mismatch.trim_N": what.trim_N,
+        "tank.current.velocity_m_s": what.current_W_m_s,
+        "draws": {key: draw.model_dump(exclude_none=True) for key, draw in draws.items()},
+    }
+    parts = Scenario.preset("quick", **told).parts()
+    if file.course == "nadir":
+        parts = parts.replace(vehicle=looking_down(parts.vehicle))
+    parts = parts.replace(route=route_of(file.course, parts, what))
+    return parts.replace(**cable(parts, what)) if what.pull_N is not None else parts
 
 
-@lru_cache(maxsize=2)
-def paper_place(bed_z_m: float) -> tuple[Any, Any]:
-    """Target and the region about it; the same for all seeds, but for where each takes the target to be."""
-    scenario = Scenario()
-    target = find_target(scenario.target.kind, bed_z_m)
-    return target, sample_region(target, scenario.target.points, Seeds(0).region())
+def route_of(course: str, parts: Parts, what: Drawn) -> Route:
+    """The route of a course, about where the target is taken to be."""
+    centre, azimuth = parts.found_target.centre_W_m, what.azimuth_rad
+    if course == "station":
+        return station_route(parts.found_target, centre, azimuth)
+    if course == "nadir":
+        return transect_route(parts.found_target, centre, azimuth, what.altitude_m or 0.0)
+    if course == "orbit":
+        return gentle_route(centre, STANDOFF_M, azimuth)
+    standoff_m = CLOSE_M if course == "close" else BRAKE_AT_M
+    low_deg = lowest_clear_deg(parts.vehicle, parts.bounds, parts.found_target, standoff_m)
+    if course == "close":
+        return gentle_route(centre, standoff_m, azimuth, (max(HOVER_DEG, low_deg), low_deg))
+    return brake_route(centre, azimuth, low_deg)
 
 
-def true_disturbance(frame: pl.DataFrame, parts: Parts, region: Region, world: World, rate_hz: float) -> float:
-    """Mean of D in (m/s)^2 of the true thrusts at the true poses about the true target, by the model believed there.
+def cable(parts: Parts, what: Drawn) -> dict[str, Any]:
+    """Fields of a cable that pulls `pull_N` down the current at the flight's start.
 
-    The same yardstick for all methods, whatever each of them weighs itself; looked at five times a second.
+    From the tank's own law of a straight cable across a current: half of its drag comes to the vehicle,
+    1/4 rho C_D d L U^2, which gives the length L.
     """
-    wake = wake_model(WakeSettings(**WAKE_OF[world]))
-    view = WakeView.of(parts.vehicle, region, wake)
-    rows = frame.gather_every(round(0.2 * rate_hz))
-    places = rows.select("true_x_m", "true_y_m", "true_z_m").to_numpy()
-    turns = rows.select("true_qw", "true_qx", "true_qy", "true_qz").to_numpy()
-    thrusts = rows.select(f"thrust_{i + 1}_N" for i in range(len(parts.vehicle.thrusters))).to_numpy()
-    steps = zip(places, turns, thrusts, strict=True)
-    return float(np.mean([disturbance(view.gram(Pose(p, q)), T) for p, q, T in steps]))
+    north, east, _ = what.current_W_m_s
+    speed = float(np.hypot(north, east))
+    per_metre = 0.25 * parts.scenario.tank.density_kg_m3 * DRAG_COEFFICIENT * CABLE_M * speed**2
+    start = parts.start.X_WB.p_m
+    return {
+        "tank.tether.diameter_m": CABLE_M,
+        "tank.tether.length_m": round((what.pull_N or 0.0) / per_metre, 3),
+        "tank.tether.from_m": (
+            round(float(start[0] - WINCH_M * east / speed), 4),
+            round(float(start[1] + WINCH_M * north / speed), 4),
+            0.0,
+        ),
+    }
 
 
-def helped_by(current_m_s: tuple[float, float, float], azimuth_rad: float) -> float:
-    """1 if the current runs towards larger azimuths at an azimuth, else -1."""
-    north, east, _ = current_m_s
-    return 1.0 if east * np.cos(azimuth_rad) - north * np.sin(azimuth_rad) >= 0.0 else -1.0
-
-
-def camera_rmse_mm(frame: pl.DataFrame, vehicle: Vehicle) -> float:
-    """Root mean square distance of the true camera from the wished one, in mm."""
-    places = {}
-    for who in ("true", "goal"):
-        p = frame.select(f"{who}_x_m", f"{who}_y_m", f"{who}_z_m").to_numpy()
-        q = frame.select(f"{who}_qw", f"{who}_qx", f"{who}_qy", f"{who}_qz").to_numpy()
-        tilts = np.radians(frame[f"{who}_tilt_deg"].to_numpy())
-        mounts = np.array([vehicle.X_BC_at(float(tilt)).p_m for tilt in tilts])
-        places[who] = p + np.einsum("nij,nj->ni", matrix_from_quat(q), mounts)
-    return 1e3 * float(np.sqrt(np.mean(np.sum((places["true"] - places["goal"]) ** 2, axis=1))))
+def wrong_current(current_W_m_s: tuple[float, ...], seed: int) -> dict[str, Any]:
+    """Fields of control that state a current too fast or too slow, and turned."""
+    faster, left = np.random.default_rng([seed, 31]).uniform(-1.0, 1.0, 2) < 0.0
+    share = 1.0 + (WRONG_SHARE if faster else -WRONG_SHARE)
+    turn = WRONG_RAD if left else -WRONG_RAD
+    north, east, down = current_W_m_s
+    c, s = np.cos(turn), np.sin(turn)
+    stated = (share * (c * north - s * east), share * (s * north + c * east), down)
+    return {"levers.drift_m_s": tuple(round(float(v), 6) for v in stated)}
 
 
 def fly_trial(trial: Trial) -> dict[str, float | None]:
-    """Figures of one flight, from the end of settling on, both legs and the way between them together."""
+    """Figures of one flight."""
     began = time.process_time()
-    scenario = scenario_of(trial)
-    target, region = paper_place(scenario.tank.size_m[2])
-    # The wind rose of the current is not round: each seed hovers at its own azimuth.
-    azimuth = float(np.random.default_rng([trial.seed, 7]).uniform(-np.pi, np.pi))
-    direction = helped_by(scenario.tank.current.velocity_m_s, azimuth) if trial.with_current else 1.0
-    parts = scenario.parts().replace(
-        vehicle=ballasted(load_vehicle(scenario.vehicle), trial.float_N, trial.shift_mm), target=target
-    )
-    found = parts.found_target.centre_W_m
-    parts = parts.replace(
-        region=region.moved(found - target.centre_W_m),
-        route=gentle_route(found, trial.standoff_m, azimuth, direction),
-    )
-    # The arc passes the target at the mission's own standoff, which the mission's check has seen.
-    frame = fly(parts, checked=False, water_every_s=WATER_EVERY_S).steps.filter(pl.col("leg") != SETTLING)
-    figures: dict[str, Any] = flight_figures(frame)
-    out = {key: figures.get(key) for key in FIGURES}
-    out["disturbance"] = true_disturbance(frame, parts, region, trial.world, scenario.control.rate_hz)
-    for leg in ("hover", "orbit"):
-        speed = frame.filter(pl.col("leg") == leg)["target_speed_mean_m_s"].mean()
-        out[f"{leg}_speed_mean_m_s"] = float(speed)  # type: ignore[arg-type]
-    out["camera_rmse_mm"] = camera_rmse_mm(frame, parts.vehicle)
-    out["cpu_s"] = time.process_time() - began
-    return out
+    parts, float_N = parts_of(trial), None
+    if trial.method.endswith(TRIM):
+        float_N = blocks_N(parts)
+        parts = ballasted_world(parts, float_N)
+    solve_ms: list[float] = []
+
+    def heard(step: Step, witness: Witness | None) -> None:  # noqa: ARG001
+        solve_ms.append(1e3 * step.solve_s)
+
+    # Courses clear the bed by their own check, orbits by the mission's.
+    flown = fly(parts, checked=False, water_every_s=WATER_EVERY_S, duration_s=trial.duration_s, watch=heard).steps
+    frame = flown.filter(pl.col("leg") != SETTLING)
+    judged = frame if frame.height else flown
+    figures: dict[str, Any] = flight_figures(judged) | camera_errors(judged, parts.vehicle)
+    figures["float_N"] = float_N
+    figures["solve_ms_p99"] = float(np.percentile(solve_ms[-judged.height :], 99))
+    figures["cpu_s"] = time.process_time() - began
+    return {key: figures.get(key) for key in FIGURES}
+
+
+def camera_errors(frame: pl.DataFrame, vehicle: Vehicle) -> dict[str, float]:
+    """How far the true camera is from the wished one: place in mm and angle in degrees, root mean square over steps."""
+    poses = {who: _camera_poses(frame, vehicle, who) for who in ("true", "goal")}
+    apart = poses["true"][0] - poses["goal"][0]
+    return {
+        "camera_rmse_mm": 1e3 * float(np.sqrt(np.mean(np.sum(apart**2, axis=1)))),
+        "camera_attitude_rmse_deg": attitude_rmse_deg(poses["true"][1], poses["goal"][1]),
+    }
+
+
+def _camera_poses(frame: pl.DataFrame, vehicle: Vehicle, who: str) -> tuple[Array, Array]:
+    """Places, shape (n, 3), and attitudes, shape (n, 4), of the camera in W."""
+    places = frame.select(f"{who}_x_m", f"{who}_y_m", f"{who}_z_m").to_numpy()
+    turns = frame.select(f"{who}_qw", f"{who}_qx", f"{who}_qy", f"{who}_qz").to_numpy()
+    tilts = np.radians(frame[f"{who}_tilt_deg"].to_numpy())
+    cameras = [Pose(p, q) @ vehicle.X_BC_at(float(tilt)) for p, q, tilt in zip(places, turns, tilts, strict=True)]
+    return np.array([X.p_m for X in cameras]), np.array([X.q for X in cameras])

@@ -14,7 +14,8 @@ import polars as pl
 from wakewise.evaluation import flight_figures
 from wakewise.missions import SETTLING
 from wakewise.operation import Parts, Scenario, fly
-from wakewise.studies.gentle.flight import WATER_EVERY_S, gentle_route
+from wakewise.studies.gentle.courses import gentle_route
+from wakewise.studies.gentle.paper import WATER_EVERY_S
 
 FLIGHT_FIGURES = (
     "target_speed_mean_m_s",

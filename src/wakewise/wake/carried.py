@@ -1,0 +1,281 @@
+"""Jets in water that moves: the current bends them, stops them, brings them back, and spreads them where it is unsure.
+
+What a thruster sends out goes on along its own direction e through the water, and the water takes it along:
+
+    dX/dt = chi U e + c,    ds/dt = chi U
+
+with X the place of a cross-section that left t ago, s its way through the water, c the current, U the greatest speed in
+excess of the current, and chi U the mean speed with which momentum travels: momentum flux over mass flux of the
+profile, 1 at the disk and 1/2 for a Gaussian. A jet that blows steadily fills the curve X(t), the plume. In still water
+s is the distance from the disk and U the jet's own centreline speed U_0(s), which is what fixes everything else.
+
+- *Momentum.* What crosses a section in excess of the current is the jet's thrust at every t, in the direction e:
+  U |chi U e + c| q^2 = chi U_0(s)^2, q the width over that of the same jet in still water (the integral method: J. H.
+  W. Lee and V. H. Chu, Turbulent Jets and Plumes, Kluwer 2003).
+- *Width.* A jet along its own path widens by the same share of s in moving water as in still (Chu, Lee and Chu, J.
+  Hydraul. Eng. 125 (1999) 1060); what is bent over widens twice as fast, as a line puff does (0.34 against 0.17 for
+  profiles made square, Lee and Chu 2003). Between the two by the angle of the path against e: cos + 2 sin.
+- *Against the current* the front stops and is taken back past the thruster, as the law of momentum has it. There is one
+  root at every section if the current's opposing part counts by at most sqrt(8) / 3 in the speed of the section, and it
+  counts so; fronts then stop at 2.2 to 2.3 D U_j / |c|, where 2.4 to 2.8 are published (Koenig and Fiedler, Exp. Fluids
+  10 (1991) 212; Yoda and Fiedler, Exp. Fluids 21 (1996) 427).
+- *Across the current* the path is within a quarter of z / rD = 2.05 (x / rD)^.28, r = U_j / |c| (B. D. Pratte and
+  W. D. Baines, J. Hydraul. Div. ASCE 93 (1967) 53), for x from rD to 10 rD.
+- *Unsure.* A current known to sigma_c puts the section sigma_c t elsewhere. What counts is the mean square of the
+  speed, and that of a Gaussian whose place is normal is a wider and lower one: width^2 grows by (2 sigma_c t)^2, the
+  root mean square of the greatest speed falls as one over the width.
+
+Speeds are per square root of newton at a thrust that is guessed, so that D stays the quadratic form that the exact
+allocators minimise. A point that several parts of a plume pass has the fastest. Left out: walls but for the bed (see
+`floor_carried`), the pair of vortices of a bent jet, and a current that changes on the way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from wakewise.arrays import Array, freeze
+from wakewise.compiled import njit
+from wakewise.wake.kernels import PRINTED_CONE, ROUND_JET, as_tuple, own_constants, speed_and_slope
+
+FOLLOWED_S = 40.0
+"""How long a section is followed. Bent over, its speed falls as t^(-2/3) and its width grows as t^(1/3), so what a
+point sees of it falls to a hundredth of what it had after one second."""
+SECTIONS = 40
+"""Sections of a curve, at times as the squares of whole numbers: the first after .025 s, a centimetre; the last 2 s
+apart, when a plume is half a metre wide."""
+OPPOSED = float(np.sqrt(8.0) / 3.0)
+"""Share of an opposing current that counts in a section's speed: with more there are three roots."""
+PUFF = 2.0
+"""How much faster what is bent over widens, per way through the water."""
+LEAST_GUESS_N = 0.02
+"""Thrust below which no jet is guessed: it would be a guess about noise."""
+GUESS_SHARE = 0.5
+"""A thruster at rest is guessed to push with this share of the mean: half of what it would if all pushed alike."""
+_TINY = 1e-12
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Flow:
+    """The water that jets are sent into, and how hard they are sent.
+
+    Parameters
+    ----------
+    current_W_m_s : ndarray, shape (3,)
+    unsure_m_s : float
+        Standard deviation of each component of the current.
+    thrusts_N : ndarray, shape (m,)
+        Guess of the thrusts, see `guessed`.
+    """
+
+    current_W_m_s: Array
+    unsure_m_s: float
+    thrusts_N: Array
+
+    def __post_init__(self) -> None:
+        freeze(self, current_W_m_s=(3,), thrusts_N=(None,))
+
+    @property
+    def guessed(self) -> Array:
+        """Size of both thrusts of each thruster, shape (2 m,), in N: as they are, but none far below the mean."""
+        size = np.abs(self.thrusts_N)
+        least = max(GUESS_SHARE * float(np.mean(size)), LEAST_GUESS_N)
+        ahead = np.where(self.thrusts_N > 0.0, size, 0.0)
+        return np.maximum(np.concatenate([ahead, size - ahead]), least)
+
+
+@njit
+def _profile(kind, numbers, own, s):  # type: ignore[no-untyped-def]
+    """(U_0 per square root of newton, chi, width) of the jet in still water at a distance s from the disk."""
+    speed, _, _ = speed_and_slope(kind, numbers, own[0], own[1], own[2], s, s * s)
+    if kind != ROUND_JET:
+        # cos^m of the angle is a Gaussian of the radius with this width.
+        power = 4.0 if kind == PRINTED_CONE else max(numbers[2], 2.0)
+        return speed, 0.5, s * np.sqrt(2.0 / power)
+    b = own[1] + numbers[4] * s
+    if numbers[5] == 0.0:
+        return speed, 0.5, b
+    # The core's radius, as in the jet's own kernel.
+    root = np.sqrt(max(numbers[1] / (speed * speed) + (np.pi / 8.0 - 0.5) * b * b, 0.0))
+    a = max(root - np.sqrt(np.pi / 8.0) * b, 0.0)
+    momentum = a * a + np.sqrt(0.5 * np.pi) * a * b + 0.5 * b * b
+    return speed, momentum / (a * a + np.sqrt(np.pi) * a * b + b * b), a + b
+
+
+@njit
+def excess_speed(strength, chi, along, current2):  # type: ignore[no-untyped-def]
+    """U of U |chi U e + c| = strength, `along` = c . e with what opposes already lessened, `current2` = c . c."""
+    low, high = 0.0, np.sqrt(strength / chi) + 2.0 * np.sqrt(current2) / chi
+    U = high
+    for _ in range(60):
+        own = chi * U
+        over = U * U * (own * own + 2.0 * own * along + current2) - strength * strength
+        if over < 0.0:
+            low = U
+        else:
+            high = U
+        # Newton's step, halving where it leaves the bracket.
+        after = U - over / (U * (4.0 * own * own + 6.0 * own * along + 2.0 * current2))
+        if not low < after < high:
+            after = 0.5 * (low + high)
+        if abs(after - U) <= 1e-13 * U:
+            return after
+        U = after
+    return U
+
+
+@njit
+def _rates(kind, numbers, own, s, grown, root, e, current, along, current2, v):  # type: ignore[no-untyped-def]
+    """(ds/dt, d grown/dt, U, U_0) at one section, and dX/dt into `v`; `grown` / s is the width over still water's."""
+    unit, chi, _ = _profile(kind, numbers, own, s)
+    still = unit * root
+    wider = max(grown / s, 1.0)
+    U = excess_speed(chi * still * still / (wider * wider), chi, along, current2)
+    size2, forward = 0.0, 0.0
+    for x in range(3):
+        v[x] = chi * U * e[x] + current[x]
+        size2 += v[x] * v[x]
+        forward += v[x] * e[x]
+    cosine = min(max(forward / np.sqrt(size2), 0.0), 1.0) if size2 > 0.0 else 1.0
+    rate = chi * U
+    return rate, rate * (cosine + PUFF * np.sqrt(1.0 - cosine * cosine)), U, still
+
+
+@njit(apart=True)
+def follow(kind, parameters, own, origin, e, thrust, current, unsure, curve):  # type: ignore[no-untyped-def]
+    """Sections of one plume into `curve`, (SECTIONS + 1, 7): X, t, s, speed over still water's at s, and width so.
+
+    Parameters
+    ----------
+    kind, parameters, own
+        The jet's law and its disk's constants (`kernels.own_constants`), shape (6,).
+    origin, e, current : ndarray, shape (3,)
+    thrust, unsure : float
+        In N, more than 0; in m/s.
+    """
+    numbers = as_tuple(parameters)
+    root = np.sqrt(thrust)
+    along, current2 = 0.0, 0.0
+    for x in range(3):
+        along += current[x] * e[x]
+        current2 += current[x] * current[x]
+    if along < 0.0:
+        along *= OPPOSED
+    # A cone has no speed at its tip.
+    s = 1e-6 if kind == ROUND_JET else 0.05
+    grown, t = s, 0.0
+    X, v, w = origin.copy(), np.empty(3), np.empty(3)
+    curve[0, :3] = X
+    curve[0, 3], curve[0, 4], curve[0, 5], curve[0, 6] = 0.0, 0.0, 1.0, 1.0
+    for k in range(1, SECTIONS + 1):
+        then = FOLLOWED_S * (k / SECTIONS) ** 2
+        dt = then - t
+        ds, dg, _, _ = _rates(kind, numbers, own, s, grown, root, e, current, along, current2, v)
+        ds, dg, _, _ = _rates(
+            kind, numbers, own, s + 0.5 * dt * ds, grown + 0.5 * dt * dg, root, e, current, along, current2, w
+        )
+        for x in range(3):
+            X[x] += dt * w[x]
+        s, grown, t = s + dt * ds, grown + dt * dg, then
+        _, _, U, still = _rates(kind, numbers, own, s, grown, root, e, current, along, current2, v)
+        _, _, width = _profile(kind, numbers, own, s)
+        wider = max(grown / s, 1.0)
+        blurred = np.sqrt(1.0 + (2.0 * unsure * t / (wider * width)) ** 2)
+        curve[k, :3] = X
+        curve[k, 3], curve[k, 4], curve[k, 5], curve[k, 6] = t, s, U / (still * blurred), wider * blurred
+
+
+@njit
+def fill_plume(points, ball, kind, parameters, own, curve, speed):  # type: ignore[no-untyped-def]
+    """Raise `speed`, shape (n,), to the plume's speed per square root of newton at points, shape (n, 3), in a ball."""
+    numbers = as_tuple(parameters)
+    count = SECTIONS
+    d, length = np.zeros((count, 3)), np.empty(count)
+    for k in range(count):
+        total = 0.0
+        for x in range(3):
+            d[k, x] = curve[k + 1, x] - curve[k, x]
+            total += d[k, x] * d[k, x]
+        length[k] = np.sqrt(total)
+        for x in range(3):
+            d[k, x] /= length[k] + _TINY
+    for k in range(count):
+        a, b = curve[k], curve[k + 1]
+        s, wide = b[4], max(a[6], b[6])
+        reach2 = (own[3] + own[4] * s + (own[5] - 1.0) * s * s) * wide * wide
+        # Most of a plume is far from all of the points.
+        px, py, pz = a[0] - ball[0], a[1] - ball[1], a[2] - ball[2]
+        if px * px + py * py + pz * pz > (ball[3] + length[k] + np.sqrt(reach2)) ** 2:
+            continue
+        for j in range(points.shape[0]):
+            px, py, pz = points[j, 0] - a[0], points[j, 1] - a[1], points[j, 2] - a[2]
+            on = px * d[k, 0] + py * d[k, 1] + pz * d[k, 2]
+            if on <= 0.0:
+                continue
+            if on > length[k]:
+                if k + 1 == count:
+                    continue
+                # Between this section's end and the next one's beginning, outside of the bend.
+                px, py, pz = points[j, 0] - b[0], points[j, 1] - b[1], points[j, 2] - b[2]
+                if px * d[k + 1, 0] + py * d[k + 1, 1] + pz * d[k + 1, 2] > 0.0:
+                    continue
+                r2, share = px * px + py * py + pz * pz, 1.0
+            else:
+                r2, share = max(px * px + py * py + pz * pz - on * on, 0.0), on / length[k]
+            if r2 > reach2:
+                continue
+            along = a[4] + share * (b[4] - a[4])
+            stretch = a[6] + share * (b[6] - a[6])
+            f, _, _ = speed_and_slope(
+                kind, numbers, own[0], own[1], own[2], along, along * along + r2 / (stretch * stretch)
+            )
+            speed[j] = max(speed[j], f * (a[5] + share * (b[5] - a[5])))
+
+
+@njit
+def plume_speeds(points, origins, directions, areas, kind, parameters, thrusts, current, unsure):  # type: ignore[no-untyped-def]
+    """Speed per square root of newton of m jets at n points, shape (m, n), and their curves, (m, SECTIONS + 1, 7).
+
+    Jets leave along `directions`, shape (m, 3), and move the water in excess of the current along them, too.
+    """
+    m = origins.shape[0]
+    own = own_constants(kind, parameters, areas)
+    speeds, curves = np.zeros((m, points.shape[0])), np.empty((m, SECTIONS + 1, 7))
+    ball = np.zeros(4)
+    for x in range(3):
+        ball[x] = np.mean(points[:, x])
+    for j in range(points.shape[0]):
+        r2 = 0.0
+        for x in range(3):
+            r2 += (points[j, x] - ball[x]) ** 2
+        ball[3] = max(ball[3], np.sqrt(r2))
+    for i in range(m):
+        follow(kind, parameters, own[i], origins[i], directions[i], thrusts[i], current, unsure, curves[i])
+        fill_plume(points, ball, kind, parameters, own[i], curves[i], speeds[i])
+    return speeds, curves
+
+
+def plumes(
+    points_W_m: Array,
+    origins_W_m: Array,
+    directions_W: Array,
+    areas_m2: Array,
+    law: tuple[int, Array],
+    thrusts_N: Array,
+    flow: Flow,
+) -> tuple[Array, Array]:
+    """`plume_speeds` of jets of a law, of these sizes, in a flow."""
+    found = plume_speeds(
+        points_W_m,
+        np.ascontiguousarray(origins_W_m),
+        np.ascontiguousarray(directions_W),
+        areas_m2,
+        *law,
+        thrusts_N,
+        flow.current_W_m_s,
+        flow.unsure_m_s,
+    )
+    return cast("tuple[Array, Array]", found)
