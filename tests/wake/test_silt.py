@@ -70,6 +70,31 @@ def test_the_matrix_is_diagonal_and_not_negative():
     np.testing.assert_allclose(np.diag(alone), np.diag(S)[[2, 8]])
 
 
+def test_a_current_carries_the_jet_before_it_strikes():
+    """By its speed times H^2 / (K sqrt(T / rho)): a thruster that much upstream strikes where another does at once."""
+    H, u = 0.6, 0.02
+    shift = u * H**2 / (silt.ROUND_DECAY * np.sqrt(1.0 / 1000.0))
+    reach, source = np.array([H]), []
+    for x in (0.3, 0.3 + shift):
+        run = np.array([silt.RUNS * np.sqrt(1.0 / 1000.0)])
+        start = silt.PEAK_AT * reach * np.sqrt(peak_stress_Pa(1.0, reach, AREA) / SILT.threshold_Pa)
+        place, current = np.array([[x, 0.0]]), np.array([u, 0.0, 0.0])
+        source.append(depth_of_source(place, np.zeros((1, 2)), start, run, current, BED_Z, EYE, SEEN, SILT)[0])
+    found = gram_of([0.3, 0.0, BED_Z - H], (u, 0.0, 0.0))[0, 0]
+    assert found == pytest.approx(lifted_kg_s_N(1.0, H, AREA, SILT) * source[1], rel=1e-9)
+    assert found != pytest.approx(lifted_kg_s_N(1.0, H, AREA, SILT) * source[0], rel=0.05)
+
+
+def test_a_jet_that_rests_is_priced_as_the_others_blow():
+    """Else load would jump to it: its entry is that of a jet with the root mean square of all thrusts."""
+    places, axes = np.array([[0.2, 0.1, 0.9], [0.2, -0.1, 0.9]]), np.repeat(DOWN, 2, axis=0)
+    S = silt_gram(
+        places, axes, np.full(2, AREA), np.array([0.0, 2.0]), BED_Z, np.zeros(3), EYE, SEEN, SILT
+    )  # fmt: skip
+    assert S[0, 0] == pytest.approx(gram_of(places[0], thrust=np.sqrt(2.0))[0, 0])
+    assert S[1, 1] == pytest.approx(gram_of(places[1], thrust=2.0)[0, 0])
+
+
 def test_the_depth_is_that_of_its_puffs():
     """The sum over ages and rays, written out with many more of both, agrees within what ten ages can tell."""
     place, start, run, current = np.array([0.15, -0.1]), 0.08, 0.026, np.array([0.02, 0.01, 0.0])

@@ -13,9 +13,12 @@ J. Hydraul. Div. ASCE 91 (1965) HY1) then loses, summed over all of it and with 
 
 The first factors are linear in |T| and know no H: what a strike lifts is what a given momentum lifts, more from nearby
 only by the logarithm. A slanting jet spreads the same momentum over other angles, so its sum is the same. The logarithm
-is frozen at a thrust that is the same for all jets, the root mean square of the last ones: frozen at each jet's own, it
-would be nothing for those that rest, and load would jump to them and back at every step. So the rate is linear in the
-split thrusts, and the optical depth a quadratic form of s = sqrt|T|, a diagonal one.
+is frozen at the last thrust of each jet; of one that rests at the root mean square of all, since it would be nothing
+there, and load would jump to it and back at every step. So the rate is linear in the split thrusts, and the optical
+depth a quadratic form of s = sqrt|T|, a diagonal one.
+
+A current carries the jet aside before it strikes: its water goes on average at half the speed of the axis,
+K sqrt(T / rho) / x (`RoundJet`), so it is on the way for H^2 / (K sqrt(T / rho)).
 
 Each second's silt is a puff. It goes out with its wall jet's front, r^2 = rc^2 + 2 (1.16 / sqrt 2) sqrt(T / rho) t from
 the radius rc = 0.14 H sqrt p up to which the bed moves (the layer's water goes at 1 / sqrt 2 of its greatest speed); it
@@ -38,7 +41,7 @@ import numpy as np
 from wakewise.arrays import Array, freeze
 from wakewise.geometry import Pose
 from wakewise.physics import FRESH_WATER_KG_M3
-from wakewise.wake.floor import HALF_THICKNESS, LEAST_SINE, WALL_SPEED
+from wakewise.wake.floor import HALF_THICKNESS, LEAST_SINE, ROUND_DECAY, WALL_SPEED
 
 BedKind = Literal["silt", "fresh-mud", "fluff"]
 """Beds that give up what stays in the water. Sand does not: it sinks centimetres per second."""
@@ -182,7 +185,7 @@ def silt_gram(
         Disks and unit force axes in the world.
     areas_m2 : ndarray, shape (n,)
     thrusts_N : ndarray, shape (n,)
-        The last ones, at whose root mean square the threshold is reckoned with.
+        The last ones, by which the threshold is reckoned with.
     bed_z_m : float
     current_W_m_s : ndarray, shape (3,)
         As it is believed.
@@ -198,18 +201,19 @@ def silt_gram(
     """
     n = len(origins_W_m)
     S = np.zeros((2 * n, 2 * n))
-    thrust = float(np.sqrt(np.mean(np.square(thrusts_N))))
+    thrust = np.concatenate([np.maximum(thrusts_N, 0.0), np.maximum(np.negative(thrusts_N), 0.0)])
+    thrust[thrust == 0.0] = np.sqrt(np.mean(np.square(thrusts_N)))
     found = strikes(origins_W_m, axes_W, bed_z_m)
     areas = np.concatenate([areas_m2, areas_m2])
     lifted = lifted_kg_s_N(thrust, found.reach_m, areas, bed)
     k = np.flatnonzero(found.lands & (lifted > 0.0))
     if not len(k):
         return S
-    reach = found.reach_m[k]
-    start = PEAK_AT * reach * np.sqrt(peak_stress_Pa(thrust, reach, areas[k]) / bed.threshold_Pa)
-    run = np.full(len(k), RUNS * np.sqrt(thrust / FRESH_WATER_KG_M3))
+    reach, root = found.reach_m[k], np.sqrt(thrust[k] / FRESH_WATER_KG_M3)
+    places = found.places_W_m[k] + (reach**2 / (ROUND_DECAY * root))[:, None] * current_W_m_s[:2]
+    start = PEAK_AT * reach * np.sqrt(peak_stress_Pa(thrust[k], reach, areas[k]) / bed.threshold_Pa)
     depth = depth_of_source(
-        found.places_W_m[k], found.ahead_W[k], start, run, current_W_m_s, bed_z_m, eye_W_m, seen_W_m, bed
+        places, found.ahead_W[k], start, RUNS * root, current_W_m_s, bed_z_m, eye_W_m, seen_W_m, bed
     )
     S[k, k] = lifted[k] * depth
     return S
