@@ -55,6 +55,9 @@ class LeverSettings(Settings):
     drift: bool = Field(
         default=True, description="also keep the water still that the current will bring to the target; needs spare"
     )
+    thrift: bool = Field(
+        default=True, description="bound the power that gentle shares cost by what the least thrusts would stir"
+    )
     drift_m_s: Velocity | None = Field(
         default=None, description="that current, north, east, down, if it is stated; null: as the estimator finds it"
     )
