@@ -11,7 +11,8 @@ rests and its weighted sum with effort has minima at rests alone: with a rising 
 gentlest shares to about the least ones, past all that the bound allows.
 
 Which part is worth most: parts of the null space that share no thruster (the horizontal ones, the vertical ones) are
-gone along one after the other, in each order, as far as the power that is left allows; the cheapest result is taken.
+gone along one after the other, in each order, as far as is cheapest and the power that is left allows; the cheapest
+result is taken.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from wakewise.allocation.layout import Layout
 from wakewise.allocation.search import cost
 from wakewise.arrays import Array, freeze
 
-_SHARES = np.linspace(0.0, 1.0, 65)
+_SHARES = np.linspace(0.0, 1.0, 33)
 _MOST_ORDERED = 3
 """Parts of the null space up to which each order is tried; beyond, only that in which they are listed."""
 
@@ -92,16 +93,15 @@ def within_power(
     owners = [np.any(np.abs(block) > 1e-12, axis=1) for block in layout.blocks]
     ways = [np.where(own, found.thrusts_N - least_N, 0.0) for own in owners]
     orders = permutations(ways) if len(ways) <= _MOST_ORDERED else (tuple(ways),)
-    best, value = np.array(least_N), np.inf
+    best = np.array(least_N)
+    value = float(cost(G, best, previous, packed))
     for order in orders:
-        thrusts = np.array(least_N)
+        thrusts, spent = np.array(least_N), value
         for way in order:
             tried = thrusts + _SHARES[:, None] * way
-            allowed = np.flatnonzero(law.power_W(tried) <= most_W)
-            thrusts = tried[allowed[-1]] if len(allowed) else thrusts
-        spent = float(cost(G, thrusts, previous, packed))
+            tried = tried[: max(int(np.sum(law.power_W(tried) <= most_W)), 1)]
+            costs = [float(cost(G, row, previous, packed)) for row in tried]
+            thrusts, spent = tried[int(np.argmin(costs))], min(costs)
         if spent < value:
             best, value = thrusts, spent
-    return replace(
-        found, thrusts_N=best, wrench_B=layout.B @ best, disturbance=disturbance_of(G, best)
-    )
+    return replace(found, thrusts_N=best, wrench_B=layout.B @ best, disturbance=disturbance_of(G, best))

@@ -31,7 +31,7 @@ Method = Annotated[
     str | None,
     typer.Option(
         "--method",
-        help="dp, bow-rule, manual, pseudo-inverse, unaware, smooth, linear, instant, wake-aware, a plug-in, or "
+        help="dp, bow-rule, manual, ardusub, pseudo-inverse, unaware, smooth, linear, instant, wake-aware, a plug-in, or "
         "package.module:make.",
         show_default=False,
     ),

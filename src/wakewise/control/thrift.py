@@ -3,8 +3,10 @@
 Sparing a target means load on fewer thrusters, and those need more power for the same wrench, up to 1.7 times. That is
 bought where the least thrusts would stir the target's water, and wasted where they would not. So the bound on power,
 over that of the least thrusts, goes with the speed that these would leave at the target by the wake model: `CALM` up to
-`CALM_M_S`, `TROUBLE` from `TROUBLE_M_S`, straight in between. The four numbers are what was set beforehand as fair
-(see docs/decisions/0036), not what flights came out best with.
+`CALM_M_S`, `TROUBLE` from `TROUBLE_M_S`, straight in between. The numbers were set beforehand: a flight may cost 1.3
+times the energy of `dp` where that leaves more than 10 mm/s, 1.05 times where it leaves less than 5
+(docs/decisions/0036). Of what lies above 1, a sixth stays for what the bound does not see: pulses, the lag of rotors,
+corrections between two searches.
 """
 
 from __future__ import annotations
@@ -18,7 +20,9 @@ from wakewise.arrays import Array
 from wakewise.thrusters import electrical_power_W
 from wakewise.vehicles import Vehicle
 
-CALM, TROUBLE = 1.05, 1.3
+KEPT = 5.0 / 6.0
+"""Share of the extra power of a whole flight that the bound of an instant hands out."""
+CALM, TROUBLE = 1.0 + KEPT * 0.05, 1.0 + KEPT * 0.3
 """Most power over that of the least thrusts, where these leave the target's water calm, and where they do not."""
 CALM_M_S, TROUBLE_M_S = 0.005, 0.010
 
