@@ -41,7 +41,7 @@ def test_the_power_law_is_the_tank_s_own_above_the_least_thrust():
 
 @pytest.mark.parametrize(("scale", "most"), [(1e-5, CALM), (1.0, TROUBLE)])
 def test_shares_keep_the_bound_that_the_water_asks_for(scale, most):
-    """Astern push ahead of a target: a quarter more than the least power where jets stir it, hardly more if faint."""
+    """Astern push ahead of a target: three tenths more than the least power where jets stir it, little if faint."""
     wrench = np.array([-4.0, 0.0, 1.0, 0.0, 0.05, 0.0])
     G = scale * VIEW.gram(Pose(np.zeros(3)))
     sharer = Sharer(layout=LAYOUT, law=LAW)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from wakewise.arrays import Array, IntArray
 from wakewise.settings import Settings
@@ -61,6 +61,14 @@ class LeverSettings(Settings):
     drift_m_s: Velocity | None = Field(
         default=None, description="that current, north, east, down, if it is stated; null: as the estimator finds it"
     )
+
+    @model_validator(mode="after")
+    def _stated_current_can_act(self) -> LeverSettings:
+        if self.drift_m_s is not None and not self.drift:
+            raise ValueError("drift_m_s is stated but drift is off; leave it null, or turn drift on")
+        if self.drift_m_s is not None and not any(self.drift_m_s):
+            raise ValueError("drift_m_s is no current at all; null takes the estimator's, drift: false does without")
+        return self
 
 
 def with_bed_points(region: Region, levers: LeverSettings, bed_z_m: float | None = None) -> Region:
