@@ -347,7 +347,11 @@ class Witness(Protocol):
 
 
 class World(Protocol):
-    """Where a vehicle flies: simulated tank, the paper's water, an autopilot, the sea."""
+    """Where a vehicle flies: simulated tank, the paper's water, an autopilot, the sea.
+
+    One that does not wait for its controller says so by an attribute `waits` that is False; thrusts that come too late
+    are not sent there (see `wakewise.control.safeguard`).
+    """
 
     @property
     def name(self) -> str:

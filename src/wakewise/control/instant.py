@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from wakewise.allocation.allocate import Allocation, Weights, gentle_allocation, least_thrusts
+from wakewise.allocation import Allocation, Weights, least_thrusts
 from wakewise.arrays import Array
 from wakewise.control.levers import with_bed_points
 from wakewise.control.loop import TrackingController, vehicle_layout
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
 from wakewise.control.silt import silt_view
-from wakewise.control.spare import meeting_view
+from wakewise.control.spare import meeting_view, sharer_of
 from wakewise.control.tracker import make_tracker
 from wakewise.control.watch import Watch
 from wakewise.interfaces import Controller, WakeModel
@@ -28,8 +28,10 @@ def instant_allocator(
     """The same tracker as `dp`, and the gentlest thrusts that make the same wrench.
 
     D is divided by the sum of the region's weights, so that the cost does not depend on how many points sample it.
+    Where D has no weight, the least thrusts: what a planner without a disturbance term falls back on is `dp`.
     """
-    layout = vehicle_layout(vehicle)
+    sharer = sharer_of(vehicle, settings)
+    layout = sharer.layout
     view = WakeView.of(vehicle, region, wake, settings.superposition)
     weights = Weights(
         disturbance=settings.w_disturbance / view.total_weight,
@@ -38,9 +40,9 @@ def instant_allocator(
     )
 
     def allocate(wrench_B: Array, gram: Array | None, previous_N: Array) -> Allocation:
-        if gram is None:
-            return least_thrusts(layout, wrench_B)
-        return gentle_allocation(layout, wrench_B, gram, weights, previous_N)
+        if gram is None or weights.disturbance == 0.0:
+            return least_thrusts(layout, wrench_B, gram)
+        return sharer.shares(wrench_B, gram, weights, view.total_weight, previous_N)
 
     return TrackingController(
         name="instant",

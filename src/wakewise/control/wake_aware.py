@@ -53,6 +53,8 @@ def _planned(
 ) -> Controller[Any]:
     levers = settings.levers
     seen = with_bed_points(region, levers, bed_of(wake))
-    believed = free_jet(wake) if levers.spare else wake
-    controller = planning_controller(vehicle, seen, believed, settings, name=name, surroundings=around)
-    return respared(controller, vehicle, seen, wake, settings) if levers.spare else controller
+    if not levers.spare:
+        return planning_controller(vehicle, seen, wake, settings, name=name, surroundings=around)
+    # The motion spares the target alone: points beside it move only spare thrusts.
+    controller = planning_controller(vehicle, region, free_jet(wake), settings, name=name, surroundings=around)
+    return respared(controller, vehicle, seen, wake, settings)

@@ -252,7 +252,7 @@ class Parts:
 
     @cached_property
     def flying(self) -> Controller[Any]:
-        """The controller as it is flown: one from outside has a guard round it, small thrusts are sent as pulses."""
+        """The controller as it is flown: with a guard round each step, small thrusts sent as pulses."""
         return in_pulses(guarded(self), self.vehicle, self.scenario.control.pulse_s)
 
     @cached_property
