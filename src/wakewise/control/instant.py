@@ -9,12 +9,14 @@ from wakewise.allocation.allocate import Allocation, Weights, gentle_allocation,
 from wakewise.arrays import Array
 from wakewise.control.levers import with_bed_points
 from wakewise.control.loop import TrackingController, vehicle_layout
+from wakewise.control.poised import poised
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
 from wakewise.control.spare import meeting_view
 from wakewise.control.tracker import make_tracker
 from wakewise.control.watch import Watch
 from wakewise.interfaces import Controller, WakeModel
 from wakewise.planning import Surroundings
+from wakewise.planning.surroundings import around_target
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
 from wakewise.wake import bed_of
@@ -54,11 +56,14 @@ def instant(
     region: Region,
     wake: WakeModel,
     settings: ControlSettings,
-    around: Surroundings | None = None,  # noqa: ARG001
+    around: Surroundings | None = None,
 ) -> Controller[Any]:
     """`instant`: the tracker, and the gentlest thrusts for its wrench, one instant at a time."""
     levers = settings.levers
     seen = with_bed_points(region, levers, bed_of(wake))
     controller = instant_allocator(vehicle, seen, wake, settings)
     view = meeting_view(controller.view, vehicle_layout(vehicle)) if levers.meet else controller.view
-    return replace(controller, view=view, watch=Watch(region=seen, view=view, levers=levers))
+    watch = Watch(region=seen, view=view, levers=levers)
+    return poised(
+        replace(controller, view=view, watch=watch), watch, vehicle, settings, around or around_target(region)
+    )

@@ -55,6 +55,11 @@ class LeverSettings(Settings):
     drift: bool = Field(
         default=True, description="also keep the water still that the current will bring to the target; needs spare"
     )
+    posture: bool | None = Field(
+        default=None,
+        description="lean the body as its thrusters like it where the camera's joint keeps the view (mission.aim: "
+        "auto); null: where there is a joint",
+    )
     drift_m_s: Velocity | None = Field(
         default=None, description="that current, north, east, down, if it is stated; null: as the estimator finds it"
     )
