@@ -118,7 +118,7 @@ def test_a_neutral_vehicle_in_still_water_stays_level():
     """Nothing to carry but what rights it: level costs nothing, every lean something."""
     leans, found = prices(scale(), held(looking(VEHICLE, np.radians(40.0))))
     level = leans.index(0.0)
-    assert chosen(found, level) == level and found[level].cost < 1e-12
+    assert chosen(found, level, level) == level and found[level].cost < 1e-12
     assert min(price.power for price in found[:level] + found[level + 1 :]) > 0.01
 
 
@@ -127,18 +127,25 @@ def test_a_heavy_vehicle_saves_by_a_lean(vehicle):
     """5 N heavy beside the target: the posture that is chosen costs less than half of the level one."""
     leans, found = prices(scale(vehicle), held(looking(vehicle, np.radians(20.0)), 5.0, vehicle))
     level = leans.index(0.0)
-    assert found[chosen(found, level)].cost < 0.5 * found[level].cost
+    assert found[chosen(found, level, level)].cost < 0.5 * found[level].cost
 
 
 def test_among_postures_that_cost_about_the_least_the_one_of_least_power_is_taken():
-    """A lean four times as dear is as good; dearer is not; the present one stays for a tenth; without any, it stays."""
-    least, cheap, dear = Price(cost=1.0, power=9.0), Price(cost=3.9, power=2.0), Price(cost=5.0, power=1.0)
-    assert chosen([dear, least, cheap]) == 2
-    assert chosen([Price(cost=4.2, power=2.1), least, cheap]) == 0
-    assert chosen([Price(cost=4.5, power=2.1), least, cheap]) == 2
-    assert chosen([Price(cost=1.0, power=2.3), least, cheap]) == 2
-    assert chosen([NOT_TO_BE_HAD, dear]) == 1
-    assert chosen([NOT_TO_BE_HAD, NOT_TO_BE_HAD], 1) == 1
+    """A lean four times as dear is as good, a dearer one is not; the present one stays for a tenth."""
+    least, cheap = Price(cost=1.0, power=2.9), Price(cost=3.9, power=2.0)
+    assert chosen([Price(cost=5.0, power=2.0), least, cheap], 0, 0) == 2
+    for own, stays in (((4.2, 2.1), True), ((4.5, 2.1), False), ((1.0, 2.2), True), ((1.0, 2.3), False)):
+        prices = [Price(cost=own[0], power=own[1]), least, cheap]
+        assert chosen(prices, 0, 0) == (0 if stays else 2)
+
+
+def test_a_lean_may_take_twice_the_power_and_no_more():
+    """However gentle it seems to be; without any that can be had, the mission's own stays."""
+    own = Price(cost=100.0, power=1.5)
+    assert chosen([own, Price(cost=1.0, power=2.9)], 0, 0) == 1
+    assert chosen([own, Price(cost=1.0, power=3.1)], 0, 0) == 0
+    assert chosen([own, Price(cost=1.0, power=3.5)], 0, 1) == 0
+    assert chosen([NOT_TO_BE_HAD, NOT_TO_BE_HAD], 0, 1) == 0
 
 
 def test_a_posture_that_comes_too_near_is_refused_and_the_missions_own_never():

@@ -121,7 +121,7 @@ class Poised:
         now = replace(now, prices=(*now.prices, self.scale.price(now.hold, now.leans[len(now.prices)])))
         if len(now.prices) < len(now.leans):
             return replace(state, round=now, age_s=0.0)
-        return replace(state, round=None, age_s=0.0, wished_rad=now.leans[chosen(now.prices)])
+        return replace(state, round=None, age_s=0.0, wished_rad=now.leans[chosen(now.prices, now.leans.index(0.0), 0)])
 
 
 def poised(

@@ -130,22 +130,34 @@ NOT_TO_BE_HAD = Price(cost=np.inf, power=np.inf)
 NEAR = 4.0
 """Postures that cost at most this many times the least are as good as the least: no wake model of ours knows the speeds
 of the water within a factor of two (docs/decisions/0014), and cost goes with their square."""
+MOST_POWER = 2.0
+"""A posture may take this many times the power of the mission's own. Where wash is carried off by a current or has
+nothing to disturb, wake models still find it, and a vehicle that hovers for nearly nothing would lean for it."""
 WORTH = 0.1
 """Share of the power, or of the bound on the cost, by which another posture must be better than the present one."""
 
 
-def chosen(prices: Sequence[Price], present: int = 0) -> int:
+def chosen(prices: Sequence[Price], own: int, present: int) -> int:
     """Which of some postures to take: of those that cost about the least, the one of least power.
 
     Thrusts are known, what they do to the water is known roughly: so what seems to be twice as gentle decides, and
     below that the battery does. The present one stays while it is about as good by both.
+
+    Parameters
+    ----------
+    prices : sequence of Price
+    own, present : int
+        Numbers of the mission's own posture and of the present one.
     """
-    least = NEAR * min(price.cost for price in prices)
-    if not np.isfinite(least):
-        return present
-    best = min((k for k, price in enumerate(prices) if price.cost <= least), key=lambda k: prices[k].power)
-    stays = prices[present].cost <= (1.0 + WORTH) * least
-    return present if stays and (1.0 - WORTH) * prices[present].power <= prices[best].power else best
+    most = MOST_POWER * prices[own].power
+    usable = [k for k, price in enumerate(prices) if price.power <= most and np.isfinite(price.cost)]
+    if not usable:
+        return own
+    least = NEAR * min(prices[k].cost for k in usable)
+    best = min((k for k in usable if prices[k].cost <= least), key=lambda k: prices[k].power)
+    cost, power = prices[present].cost, prices[present].power
+    stays = cost <= (1.0 + WORTH) * least and (1.0 - WORTH) * power <= min(prices[best].power, most)
+    return present if stays else best
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
