@@ -9,6 +9,7 @@ from wakewise.allocation import Allocation, Weights, least_thrusts
 from wakewise.arrays import Array
 from wakewise.control.levers import with_bed_points
 from wakewise.control.loop import TrackingController, vehicle_layout
+from wakewise.control.poised import poised
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
 from wakewise.control.silt import silt_view
 from wakewise.control.spare import meeting_view, sharer_of
@@ -16,6 +17,7 @@ from wakewise.control.tracker import make_tracker
 from wakewise.control.watch import Watch
 from wakewise.interfaces import Controller, WakeModel
 from wakewise.planning import Surroundings
+from wakewise.planning.surroundings import around_target
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
 from wakewise.wake import bed_of
@@ -57,12 +59,13 @@ def instant(
     region: Region,
     wake: WakeModel,
     settings: ControlSettings,
-    around: Surroundings | None = None,  # noqa: ARG001
+    around: Surroundings | None = None,
 ) -> Controller[Any]:
     """`instant`: the tracker, and the gentlest thrusts for its wrench, one instant at a time."""
     levers = settings.levers
     seen = with_bed_points(region, levers, bed_of(wake))
     controller = instant_allocator(vehicle, seen, wake, settings)
     view = meeting_view(controller.view, vehicle_layout(vehicle)) if levers.meet else controller.view
-    silt = silt_view(vehicle, region, wake, levers)
-    return replace(controller, view=view, watch=Watch(view=view, levers=levers, silt=silt))
+    watch = Watch(view=view, levers=levers, silt=silt_view(vehicle, region, wake, levers))
+    spared = replace(controller, view=view, watch=watch)
+    return poised(spared, watch, vehicle, settings, around or around_target(region))

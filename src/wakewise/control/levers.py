@@ -45,6 +45,11 @@ class LeverSettings(Settings):
     thrift: bool = Field(
         default=True, description="bound the power that gentle shares cost by what the least thrusts would stir"
     )
+    posture: bool | None = Field(
+        default=None,
+        description="lean the body as its thrusters like it where the camera's joint keeps the view (mission.aim: "
+        "auto); null: where there is a joint",
+    )
     drift_m_s: Velocity | None = Field(
         default=None, description="that current, north, east, down, if it is stated; null: as the estimator finds it"
     )

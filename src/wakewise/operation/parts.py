@@ -191,7 +191,26 @@ class Parts:
     @cached_property
     def control(self) -> ControlSettings:
         """What the controllers are told: the scenario's settings and who flies, nothing of the water flown in."""
-        return flown_by(self.scenario.control, int(self.seeds.person().integers(2**32)))
+        told = flown_by(self.scenario.control, int(self.seeds.person().integers(2**32)))
+        return told if self._leans else told.without_posture()
+
+    @property
+    def _leans(self) -> bool:
+        """Whether a controller may choose the body's attitude: where the mission leaves it open, and no pilot flies by
+        the body's own place.
+
+        Raises
+        ------
+        InputError
+            If that is asked for and the mission says what aims the camera.
+        """
+        aim, wanted = self.scenario.mission.aim, self.scenario.control.levers.posture
+        if wanted and aim != "auto":
+            raise InputError(
+                f"control.levers.posture: true, but mission.aim is {aim}, which says how the body stands: leave "
+                "mission.aim at auto, or posture at null"
+            )
+        return aim == "auto" and (bool(wanted) or (self.scenario.pilot == "route" and "pilot" not in self.given))
 
     @part
     def wake(self) -> WakeModel:
