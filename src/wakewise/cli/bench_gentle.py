@@ -94,6 +94,12 @@ def _show_headline(headline: dict[str, Any]) -> None:
             label = f"{part}, {own['flights']} flights" if place == 0 else ""
             table.add_row(label, words, shown(own.get(key)), interval, *others, bar)
     print_table(table)
+    most = headline["everywhere"]
+    for name, words in (("wash", "wash"), ("silt_rays", "silt on the rays"), ("sway", "sway")):
+        if most[f"{name}_most_ratio"] is not None:
+            typer.echo(
+                f"worst anywhere: {words} {shown(most[f'{name}_most_ratio'])} times dp's, {most[f'{name}_most_where']}"
+            )
 
 
 def _show_levers(scenarios: dict[str, Any], levers: list[str]) -> None:
