@@ -273,6 +273,7 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
     steps = pl.read_parquet(folder / "steps.parquet")
     flown = steps.filter(pl.col("leg") != SETTLING)
     gathering.add(flight_figures(flown))
+    gathering.missing(("exceedance_ambient_pct",), "the water is still without the vehicle")
     add_yardsticks(gathering, parts, flown)
     solve_ms = pl.read_parquet(folder / "timings.parquet")["solve_ms"].to_numpy()[50:]
     gathering.add({"solve_ms_median": float(np.median(solve_ms)), "solve_ms_p99": float(np.percentile(solve_ms, 99))})

@@ -5,6 +5,7 @@ from concurrent.futures import Future
 
 import pytest
 
+from wakewise.cli.bench_gentle import show_gentle
 from wakewise.control import METHODS as MADE
 from wakewise.control import ControlSettings
 from wakewise.errors import InputError, StageError
@@ -62,7 +63,7 @@ def here(monkeypatch):
     return flown
 
 
-def test_the_answer_has_the_keys_that_were_promised(here, tmp_path):
+def test_the_answer_has_the_keys_that_were_promised(here, tmp_path, capsys):
     """Scenarios with methods, reductions and levers; headline; flows; a picture of them."""
     found = gentle.run(
         BenchOptions(seeds=3, scenarios=("orbit/paper", "world/mud", "paper"), levers=("all",), store=tmp_path)
@@ -84,6 +85,9 @@ def test_the_answer_has_the_keys_that_were_promised(here, tmp_path):
     assert trouble["flights"] == 6 and trouble["worst_world_pct"] == pytest.approx(90.0)
     assert trouble["wrong_current_keeps_pct"] == pytest.approx(100.0 * 80.0 / 90.0)
     assert found["flows"]["paper"]["circular"] is True
+    show_gentle(found)
+    said = capsys.readouterr().out
+    assert "headline" in said and "orbit/paper" in said and "levers" in said and "circular" in said
     draw_gentle(found, tmp_path / "gentle.png")
     assert (tmp_path / "gentle.png").stat().st_size > 10_000
     with pytest.raises(InputError, match="ending"):

@@ -68,6 +68,13 @@ def test_a_flight_that_failed_is_no_gain_and_no_accuracy():
     assert lost["reduction_vs_bow_rule_pct"] == pytest.approx(50.0)
 
 
+def test_harm_is_looked_for_everywhere():
+    """Also where there is no trouble: the calm scenario has the most silt, and none has more wash."""
+    found = headline(FLIGHTS, TRIMS, set())["everywhere"]
+    assert (found["silt_rays_most_ratio"], found["silt_rays_most_where"]) == (pytest.approx(1.2), "calm/paper")
+    assert found["wash_most_ratio"] == pytest.approx(0.75) and found["sway_most_ratio"] == pytest.approx(1.0)
+
+
 def test_a_camera_that_is_off_is_not_ok():
     """5 % and 0.2 mm are allowed, no more."""
     worse = {key: value | {PLACE: 5.6} for key, value in FLIGHTS["wake-aware"].items()}

@@ -17,6 +17,7 @@ TROUBLE_M_S, CALM_M_S = 0.010, 0.005
 POSITION_SHARE, POSITION_MM = 1.05, 0.2
 """The camera may be off by so much of what `dp` leaves, and so much more."""
 SILT, SWAY, PLACE, ENERGY = "ray_optical_depth", "sway_rms_mm", "camera_rmse_mm", "energy_kJ"
+BODY = "position_rmse_mm"
 RIVALS = ("dp", "unaware", "bow-rule")
 WRONG = "wake-aware, wrong current"
 
@@ -45,6 +46,7 @@ def headline(flights: Flights, trims: Mapping[Known, str], failed: set[tuple[str
         "method": "wake-aware",
         **table("wake-aware", speeds),
         "by_scenario": table("wake-aware", whole),
+        "everywhere": harm(flights.get("dp", {}), flights.get("wake-aware", {})),
         "beside": {name: table(name, speeds) for name in beside},
     }
 
@@ -96,15 +98,35 @@ def calm(method: str, where: set[Known], flights: Flights, trims: Mapping[Known,
     return answer
 
 
+def harm(dp: Mapping[Known, Row], ours: Mapping[Known, Row]) -> dict[str, Any]:
+    """Where ours does most harm, over all scenarios, in trouble or not: silt on the rays and sway over `dp`'s."""
+    answer: dict[str, Any] = {}
+    for name, figure in (("wash", SPEED), ("silt_rays", SILT), ("sway", SWAY)):
+        by = {
+            scenario: value
+            for scenario in sorted({key[0] for key in dp})
+            if (value := ratio(pairs_of({k: v for k, v in dp.items() if k[0] == scenario}, ours, figure, {}))[0])
+        }
+        worst = max(by, key=lambda scenario: by[scenario]) if by else None
+        answer[f"{name}_most_ratio"], answer[f"{name}_most_where"] = (by[worst] if worst else None), worst
+    answer["why"] = _why(answer, len(dp))
+    return answer
+
+
 def place(dp: Mapping[Known, Row], ours: Mapping[Known, Row], lost: int) -> dict[str, Any]:
-    """Errors of the camera's place, root mean square over flights, and whether ours is no worse than it may be."""
-    pairs = pairs_of(dp, ours, PLACE, {})
-    if not pairs:
-        return {"position_ok": None, "camera_rmse_mm": None, "dp_camera_rmse_mm": None}
-    errors_mm = np.array([(base, own) for base, own, _ in pairs])
-    theirs, own = (float(v) for v in np.sqrt(np.mean(errors_mm**2, axis=0)))
-    fine = lost == 0 and own <= POSITION_SHARE * theirs + POSITION_MM
-    return {"position_ok": fine, "camera_rmse_mm": own, "dp_camera_rmse_mm": theirs}
+    """Errors of the camera's place, root mean square over flights, and whether ours is no worse than it may be.
+
+    The body's are told beside them.
+    """
+    answer: dict[str, Any] = {"position_ok": None}
+    for name, figure in (("camera", PLACE), ("position", BODY)):
+        pairs = pairs_of(dp, ours, figure, {})
+        errors_mm = np.array([(base, own) for base, own, _ in pairs]).reshape(-1, 2)
+        theirs, own = (float(v) for v in np.sqrt(np.mean(errors_mm**2, axis=0))) if pairs else (None, None)
+        answer[f"{name}_rmse_mm"], answer[f"dp_{name}_rmse_mm"] = own, theirs
+        if figure == PLACE and theirs is not None and own is not None:
+            answer["position_ok"] = lost == 0 and own <= POSITION_SHARE * theirs + POSITION_MM
+    return answer
 
 
 def keeps(
