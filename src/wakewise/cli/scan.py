@@ -99,7 +99,7 @@ def _say_trim(folder: Path) -> None:
         _, found = folder_trim(folder)
     except InputError:  # no hover in it, or a vehicle that was given in Python
         return
-    if found.blocks:
+    if found.worth:
         typer.echo(f"before the next flight: {found.words}; wakewise vehicle trim --flight {folder} --write FILE")
 
 

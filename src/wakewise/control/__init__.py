@@ -9,7 +9,7 @@ exact allocator behind it) and `instant.py` (the tracker and the gentlest thrust
 `stability.py` are the PID and its margins, `loop.py` flies it with any allocation, `receding.py` flies a plan,
 `levers.py` adds the water that counts, `watch.py` follows it, `spare.py` shares a plan's wrench out anew, `pulses.py`
 sends thrusts that no thruster can hold as pulses, `intent.py` turns an operator's stick into goals, `trim.py` advises
-ballast.
+ballast for a mission, `hover_trim.py` from a hover.
 """
 
 from wakewise.control.levers import LeverSettings
