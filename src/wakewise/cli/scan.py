@@ -93,7 +93,7 @@ def scan(
 def _say_trim(folder: Path) -> None:
     """What the flight's hover says of the ballast, where it is worth a block."""
     from wakewise.errors import InputError
-    from wakewise.operation.trim import folder_trim
+    from wakewise.operation.flight_trim import folder_trim
 
     try:
         _, found = folder_trim(folder)

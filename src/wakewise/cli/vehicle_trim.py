@@ -75,7 +75,7 @@ def _from_flight(folder: Path, write: Path | None, json: bool) -> None:
     import yaml
 
     from wakewise.files import write_text
-    from wakewise.operation.trim import folder_trim
+    from wakewise.operation.flight_trim import folder_trim
 
     parts, found = folder_trim(folder)
     blocks = [*parts.scenario.ballast, *found.blocks]

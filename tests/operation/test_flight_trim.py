@@ -8,7 +8,7 @@ import pytest
 
 import wakewise as ww
 from wakewise.errors import InputError
-from wakewise.operation.trim import flight_trim, folder_trim, hovering, proposal
+from wakewise.operation.flight_trim import flight_trim, folder_trim, hovering, proposal
 from wakewise.vehicles import compile_body, load_vehicle, restoring_wrench
 from wakewise.vehicles.ballast import Block, net_buoyancy_N, with_blocks
 
