@@ -39,22 +39,22 @@ def refusal(capsys: Capsys, *words: str) -> str:
 
 def test_a_flight_gives_the_ballast_of_the_next(tmp_path: Path, capsys: Capsys) -> None:
     """Words, a file with what was on the vehicle already and the new block, and a scenario that reads it."""
-    folder, new = flown(tmp_path / "a", 3.0, ballast=[{"float_N": -1.5}]), tmp_path / "next.yaml"
+    folder, new = flown(tmp_path / "a", 3.0, ballast=[{"float_N": -1.4}]), tmp_path / "next.yaml"
     assert run(["vehicle", "trim", "--flight", str(folder), "--write", str(new)]) == 0
     shown = capsys.readouterr().out
-    # 3 N that were found at 10 cm, and 1.5 N of lead that were known in the middle.
+    # 3 N that were found at 10 cm, and 1.4 N of lead that were known in the middle; rounded to the light side.
     assert "add 4.5 N of float 5 cm forward of the middle" in shown and str(new) in shown
     later = load_scenario("quick", new, {})
-    assert [block.float_N for block in later.ballast] == [-1.5, 4.5]
+    assert [block.float_N for block in later.ballast] == [-1.4, 4.5]
     assert run(["vehicle", "trim", "--flight", str(folder), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert told["net_weight_N"] == pytest.approx(4.5, abs=0.01)
+    assert told["net_weight_N"] == pytest.approx(4.4, abs=0.01)
     assert told["ballast"] == [block.model_dump(mode="json") for block in later.ballast]
 
 
 def test_a_vehicle_in_trim_is_left_alone(tmp_path: Path, capsys: Capsys) -> None:
     """No block, and the ballast of the next flight is that of the last."""
-    folder, new = flown(tmp_path / "a", 0.1), tmp_path / "next.yaml"
+    folder, new = flown(tmp_path / "a", -0.1), tmp_path / "next.yaml"
     assert run(["vehicle", "trim", "--flight", str(folder), "--write", str(new)]) == 0
     assert "no change" in capsys.readouterr().out
     assert load_scenario("quick", new, {}).ballast == ()

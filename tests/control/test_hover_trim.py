@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wakewise.control.hover_trim import HoverTrim, hover_trim
+from wakewise.control.hover_trim import LIGHT_N, HoverTrim, hover_trim
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_from_euler
 from wakewise.vehicles import compile_body, coriolis_wrench, damping_wrench, load_vehicle, restoring_wrench
@@ -24,11 +24,11 @@ def weighed(X_WB, weight_N, place_m):
     return np.concatenate([force, np.cross(place_m, force)])
 
 
-def found(weight_N, x_m, y_m, attitudes=ATTITUDES, more=0.0, thrust_N=0.0, **told) -> HoverTrim:
+def found(weight_N, x_m, y_m, attitudes=ATTITUDES, more=0.0, thrust_N=0.0, light_N=0.0) -> HoverTrim:
     poses = [turned(a) for a in attitudes]
     loads = np.array([weighed(X, weight_N, [x_m, y_m, Z_M]) + more for X in poses])
     thrusts = np.full((len(poses), 8), thrust_N)
-    return hover_trim(VEHICLE, np.array([X.q for X in poses]), loads, thrusts, **told)
+    return hover_trim(VEHICLE, np.array([X.q for X in poses]), loads, thrusts, light_N)
 
 
 @pytest.mark.parametrize("attitudes", [ATTITUDES[:1], ATTITUDES[1:2], ATTITUDES])
@@ -98,7 +98,16 @@ def test_blocks_stay_on_the_hull() -> None:
 def test_a_wanted_buoyancy_comes_on_top() -> None:
     """Half a newton light: half a newton more of float, and the place a little nearer to the middle."""
     trim = found(2.0, 0.25, 0.0, light_N=0.5)
-    assert trim.blocks[0].float_N == 2.5 and trim.blocks[0].at_B_m == (0.2, 0.0, Z_M)
+    assert trim.worth and trim.blocks[0].float_N == 2.5 and trim.blocks[0].at_B_m == (0.2, 0.0, Z_M)
+
+
+@pytest.mark.parametrize("weight_N", np.linspace(-3.0, 6.0, 37))
+def test_a_vehicle_is_never_left_heavy(weight_N) -> None:
+    """Blocks of half a newton leave it neutral to half a newton light; a change below that is not proposed unasked."""
+    trim = found(weight_N, 0.0, 0.0, light_N=LIGHT_N)
+    light_N = sum(block.float_N for block in trim.blocks) - weight_N
+    assert -1e-9 <= light_N <= 0.5 + 1e-9
+    assert trim.worth == (abs(weight_N + LIGHT_N) >= 0.5 - 1e-9)
 
 
 def test_what_is_no_hover_is_refused() -> None:

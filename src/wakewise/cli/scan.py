@@ -93,13 +93,13 @@ def scan(
 def _say_trim(folder: Path) -> None:
     """What the flight's hover says of the ballast, where it is worth a block."""
     from wakewise.errors import InputError
-    from wakewise.operation.trim import folder_trim
+    from wakewise.operation.flight_trim import folder_trim
 
     try:
         _, found = folder_trim(folder)
     except InputError:  # no hover in it, or a vehicle that was given in Python
         return
-    if found.blocks:
+    if found.worth:
         typer.echo(f"before the next flight: {found.words}; wakewise vehicle trim --flight {folder} --write FILE")
 
 

@@ -50,7 +50,8 @@ def trim(
     """Advise on ballast: for a mission beforehand, or from the hover of a flight.
 
     For a mission: D and thrust of holding its poses by net buoyancy and centre of gravity. Advised is the least effort
-    that is not worse by D; the least D by the wake model, bed points and wall jets included, is told beside it.
+    that is not worse by D, light by as much as the trim is unknown, since a heavy vehicle blows down; the least D by
+    the wake model, bed points and wall jets included, is told beside it.
 
     From a flight: how heavy the vehicle was, where that sits, and which block takes it away. `wakewise scan FILE` flies
     with what --write left.
@@ -74,7 +75,7 @@ def _from_flight(folder: Path, write: Path | None, json: bool) -> None:
     import yaml
 
     from wakewise.files import write_text
-    from wakewise.operation.trim import folder_trim
+    from wakewise.operation.flight_trim import folder_trim
 
     parts, found = folder_trim(folder)
     blocks = [*parts.scenario.ballast, *found.blocks]

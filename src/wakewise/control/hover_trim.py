@@ -29,6 +29,10 @@ from wakewise.vehicles.ballast import Block, net_buoyancy_N
 
 STEP_N, STEP_M = 0.5, 0.05
 """What a person can do: blocks of half a newton (50 g of lead, 60 ml of foam), places to five centimetres."""
+LIGHT_N = 0.5 * STEP_N
+"""Net buoyancy that is aimed at. After rounding to blocks a vehicle is then left neutral to half a newton light, and
+never heavy: that half newton costs a third more wash than neutral, half a newton heavy once cost ten times as much
+(docs/decisions/0037)."""
 WORTH_NM = 0.05
 """A moment below this, half a newton at a decimetre, is left alone where no net weight goes with it."""
 SURE = 2.0
@@ -75,11 +79,21 @@ class HoverTrim:
         return self.weight_N - self.own_N
 
     @property
+    def change_N(self) -> float:
+        """Lift that is lacking, as if blocks came in any size."""
+        return self.heavy_N + self.light_N
+
+    @property
+    def worth(self) -> bool:
+        """Whether the change is worth half a newton, or lead is to be moved: less is not proposed unasked."""
+        return bool(self.blocks) and (abs(self.change_N) >= STEP_N or len(self.blocks) == 2)
+
+    @property
     def blocks(self) -> tuple[Block, ...]:
         """What to fix to the hull: one block, or two that stand for lead moved, or none where nothing is sure."""
-        change_N = self.heavy_N + self.light_N
         moment = np.where(np.abs(self.moment_Nm) > SURE * self.moment_std_Nm, self.moment_Nm, 0.0)
-        float_N = _rounded(change_N, STEP_N) if abs(change_N) > SURE * self.weight_std_N else 0.0
+        sure = abs(self.change_N) > SURE * self.weight_std_N
+        float_N = _rounded(self.change_N, STEP_N) if sure else 0.0
         if float_N != 0.0:
             # The wanted change of what was believed sits in the centre of buoyancy.
             place = (moment + (self.light_N - self.own_N) * self.p_BB_m[:2]) / float_N
@@ -118,7 +132,7 @@ class HoverTrim:
         return f"{self.advice} ({found}, two standard deviations)"
 
 
-def hover_trim(vehicle: Vehicle, q_WB: Array, loads_B: Array, thrusts_N: Array, light_N: float = 0.0) -> HoverTrim:
+def hover_trim(vehicle: Vehicle, q_WB: Array, loads_B: Array, thrusts_N: Array, light_N: float = LIGHT_N) -> HoverTrim:
     """Net weight and its place from the estimates of a hover.
 
     Parameters

@@ -5,10 +5,12 @@ rights itself, shared out as gently as can be; buoyancy and the place of the cen
 The mean is taken over the trim that nobody knows beforehand, so that advice is not made for a vehicle that is exactly
 as written. Steady jets only: what moving costs does not depend on ballast.
 
-The advice is the ballast of least effort that is not worse by D than the vehicle as it is. Least D is another one and
-is told beside it (`gentlest`, of least effort among those near to the least D): D asks for floats beyond neutral, since
-jets then go up, away from target and bed. How much of that the simulated tank bears out stands in decision 0037. What a
-flight says of its own trim is told by `hover_trim`.
+The advice is the ballast of least effort that is not worse by D than the vehicle as it is, among those that are light
+by as much as is unknown, so that the vehicle is heavy in no case: in the tank half a newton light costs a third more
+wash than neutral, half a newton heavy up to ten times as much (docs/decisions/0037). Least D is another one and is told
+beside it (`gentlest`, of least effort among those near to the least D): D asks for more floats, since jets then go up,
+away from target and bed, which the tank does not bear out beyond half a newton. What a flight says of its own trim is
+told by `hover_trim`.
 """
 
 from __future__ import annotations
@@ -108,7 +110,7 @@ def trim_advice(
     floats_N: tuple[float, ...] = FLOATS_N,
     shifts_mm: tuple[float, ...] = SHIFTS_MM,
 ) -> TrimAdvice:
-    """Ballast of least effort over poses and unknown loads that is not worse by D, and the one of least D beside it.
+    """Ballast of least effort that is heavy in no case and not worse by D, and the one of least D beside it.
 
     Parameters
     ----------
@@ -145,16 +147,17 @@ def trim_advice(
     own = believed - net_weight_N
     force_W = np.zeros(3) if current_N is None else np.asarray(current_N, dtype=np.float64)
     errors = (-unknown_N, 0.0, unknown_N) if unknown_N > 0.0 else (0.0,)
-    buoyancies = sorted({*floats_N, round(own, 6)})
+    buoyancies = sorted({*floats_N, unknown_N, round(own, 6)})
     rows = tuple(
         _row(vehicle, poses, grams, view, weights, force_W, errors, float_N - believed, shift_mm, float_N)
         for float_N, shift_mm in product(buoyancies, sorted({*shifts_mm, 0.0}))
     )
     now = next(row for row in rows if row.float_N == round(own, 6) and row.shift_mm == 0.0)
     least = min(row.speed_m_s for row in rows)
+    never_heavy = tuple(row for row in rows if row.float_N >= unknown_N)
     return TrimAdvice(
         rows=rows,
-        best=_easiest(rows, max(now.speed_m_s, least)),
+        best=_easiest(never_heavy, max(now.speed_m_s, min(row.speed_m_s for row in never_heavy))),
         gentlest=_easiest(rows, NEAR * least),
         now=now,
     )

@@ -7,7 +7,8 @@ one meet) and `loop.py` (the loop itself). `scenario.py` with `target_settings.p
 pilot who is a person), `instant_water.py` and `lattice_water.py` worlds other than the tank, `survey.py` what is known
 of target and camera beforehand; `surroundings.py` is what a planner is told to keep clear of, `preflight.py` refuses
 what does not fit, `foreign.py` guards what comes from outside; `flying.py` flies, `recorder.py` and `telemetry.py`
-keep what was, `photography.py` renders what the camera saw, `darkroom.py` while the flight goes on.
+keep what was, `flight_trim.py` reads from it what ballast is lacking, `photography.py` renders what the camera saw,
+`darkroom.py` while the flight goes on.
 """
 
 from typing import TYPE_CHECKING

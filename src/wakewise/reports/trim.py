@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from wakewise.errors import InputError
-from wakewise.operation.trim import proposal
+from wakewise.operation.flight_trim import proposal
 from wakewise.reports.trial import Trial
 
 

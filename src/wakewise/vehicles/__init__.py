@@ -7,8 +7,8 @@ per cited source; `vehicle_file.py` and `draft.py` read them). `dynamics.py` has
 (`fossen.py` the readable matrices, `kernels.py`, `runge_kutta.py`, `semi_implicit.py` the compiled steps,
 `jacobians.py` their derivatives, `batch.py` many vehicles at once), `check.py` and `mixing.py` rank, null space and
 wrong signs in shipped matrices, `describe.py` and `parameters.py` all of it in words, `perturbation.py` the vehicle
-that the tank flies, `drag.py` its drag as other sources have it, `tilt.py` the joint of its camera. Thrusters are a
-room below, files of other projects the room `importers`.
+that the tank flies, `drag.py` its drag as other sources have it, `tilt.py` the joint of its camera, `ballast.py` floats
+and lead on it. Thrusters are a room below, files of other projects the room `importers`.
 """
 
 from wakewise.vehicles.batch import pack_bodies, step_batch

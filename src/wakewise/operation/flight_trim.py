@@ -19,7 +19,6 @@ LEARNING_S = 4.0
 """The estimator knows a vehicle's load that long after the start: from 1 N unknown to some hundredths."""
 LEAST_S = 2.0
 """A shorter hover says nothing: its spread would be that of one gust."""
-WANTED_LIGHT_N = 0.0
 _AT_REST = 1e-3
 _SLOW_M_S, _SLOW_RAD_S = 0.02, 0.05
 
@@ -68,7 +67,6 @@ def flight_trim(vehicle: Vehicle, steps: pl.DataFrame) -> HoverTrim:
         _table(kept, [f"est_q{a}" for a in "wxyz"]),
         _table(kept, [*LOAD]),
         _table(kept, needed[len(LOAD) :]),
-        WANTED_LIGHT_N,
     )
 
 
@@ -96,7 +94,7 @@ def proposal(vehicle: Vehicle, steps: pl.DataFrame) -> str | None:
         found = flight_trim(vehicle, steps)
     except InputError:  # no hover, or an older record: nothing is known, nothing is proposed
         return None
-    return found.words if found.blocks else None
+    return found.words if found.worth else None
 
 
 def _table(steps: pl.DataFrame, names: list[str]) -> Array:
