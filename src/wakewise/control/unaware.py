@@ -13,8 +13,8 @@ from wakewise.vehicles import Vehicle
 from wakewise.wake import free_jet
 
 FILTER_S = 0.77
-"""Time over which `smooth` filters its thrusts: of those flown the longest whose position error is within a tenth of that
-of `unaware` (docs/decisions/0036)."""
+"""Time over which `smooth` filters its thrusts: of those flown the longest whose position error is within a tenth of
+that of `unaware` (docs/decisions/0036)."""
 
 
 def price_of_change(settings: ControlSettings) -> float:
