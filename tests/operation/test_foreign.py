@@ -142,6 +142,16 @@ def test_memory_that_runs_out_is_blamed_on_no_part():
         ww.fly(PARTS.replace(pilot=Pilot(), method="dp"), duration_s=SECONDS)
 
 
+def test_a_world_that_does_not_wait_has_the_deadline_enforced():
+    """It says so by `waits`; a world that says nothing waits."""
+
+    class Sea:
+        name, waits = "sea", False
+
+    own = PARTS.replace(method="dp")
+    assert own.replace(world=Sea()).flying.inner.enforce and not own.flying.inner.enforce
+
+
 def test_our_own_have_the_guard_of_a_control_step_and_not_that_of_a_stranger():
     """A controller of this package is trusted with its answers' kind and pace; its guard waits as the tank does."""
     own = PARTS.replace(method="dp")

@@ -13,6 +13,7 @@ from wakewise.interfaces import BodyState, Goal
 from wakewise.planning import PlanSettings
 from wakewise.planning.guard import Guard
 from wakewise.planning.planner import Planner
+from wakewise.planning.reference import reference_of
 from wakewise.thrusters import thruster_lag
 from wakewise.vehicles import compile_body, perturbed, step_rk4
 
@@ -201,3 +202,16 @@ def test_a_world_that_waits_counts_a_late_plan_and_flies_it():
     assert found.plan is not None
     assert found.trouble is None
     assert guard.counts == {"late": 1}
+
+
+def test_a_goal_inside_the_clearance_is_counted_though_it_is_planned_for():
+    """A goal 2 cm over the floor: the plan keeps off it, which is no trouble, but said; one farther off is not."""
+    guard = Guard(planner=Planner(model(iterations=1)), deadline_s=10.0)
+    near = np.array([1.0, 1.0, 1.5 - 0.5 * VEHICLE.size_m[2] - 0.02])
+    low = reference_of(Goal(X_WB=Pose(near, quat_from_euler(0.0, 0.0, 0.0))), 20, 0.1)
+    found = guard.ask(lambda: replace(problem(), state=low[0], reference=low), None, 0.0)
+    assert found.plan is not None and found.trouble is None and guard.counts == {"goal inside clearance": 1}
+    guard.counts.clear()
+    high = reference_of(Goal(X_WB=Pose(near - np.array([0.0, 0.0, 0.4]))), 20, 0.1)
+    guard.ask(lambda: replace(problem(), state=high[0], reference=high), None, 0.0)
+    assert guard.counts == {}

@@ -4,8 +4,9 @@ All methods share one tracker (a PID with feed-forward, slowed where its margins
 the water can be compared at equal wrench. `make_controller` makes one by name, ours or one from outside.
 
 Start reading in `methods.py` (which methods there are; `dynamic_positioning.py`, `bow_rule.py`, `manual.py`,
-`pseudo_inverse.py` and `unaware.py` are the rivals), `wake_aware.py` (the product: model predictive control and the
-exact allocator behind it) and `instant.py` (the tracker and the gentlest thrusts of an instant). `tracker.py` and
+`ardusub.py` with `motor_mix.py`, `pseudo_inverse.py` and `unaware.py` are the rivals), `wake_aware.py` (the product:
+model predictive control and the exact allocator behind it) and `instant.py` (the tracker and the gentlest thrusts of an
+instant). `tracker.py` and
 `stability.py` are the PID and its margins, `loop.py` flies it with any allocation, `receding.py` flies a plan,
 `levers.py` adds the water that counts, `watch.py` follows it, `silt.py` is the bed, `spare.py` shares a plan's wrench
 out anew, `thrift.py` says how much power that may cost, `posture.py` and `poised.py` choose the body's attitude,

@@ -89,7 +89,7 @@ def missing_axis(B: Array, lower_N: Array, upper_N: Array) -> int | None:
             # Thrusts and how much of that wrench they make, which is to be as much as can be.
             made = np.column_stack([B, -way])
             found = linprog(np.append(np.zeros(n), -1.0), A_eq=made, b_eq=np.zeros(6), bounds=bounds)
-            if found.x is None or found.status != 0 or found.x[-1] <= 1e-6:
+            if found.status != 0 or found.x is None or found.x[-1] <= 1e-6:
                 return axis
     return None
 

@@ -5,8 +5,11 @@ becomes command, and a planner that obeys more flies worse (velocity deviation 1
 paper's world). So p_now is a place that moves as commanded and is kept within `LEASH_M` of the vehicle, lest it run
 away from one that is held up.
 
-`w_track` sets the trade between obedience and still water: above 10 for transit, 5 for work, below 2 for delicate
-places.
+`w_track` on the paper's scale sets the trade between obedience and still water: above 10 for transit, 5 for work,
+below 2 for delicate places. It has one meaning here: 5 stands for the planner's default weights of tracking (w_track
+200 per m2, w_path 20 per m2 and s, w_twist 1 per (m/s)2 and s), x for all three times x / 5; attitude, effort and wash
+keep their weights. The planner's own field of the same name is one of the three and not on that scale. docs/methods.md
+has a grid of it, `wakewise bench operator` flies the whole one.
 """
 
 from __future__ import annotations
@@ -24,7 +27,7 @@ from wakewise.planning.problem import PlanSettings
 LEASH_M = 0.10
 """Farthest that the commanded place may be from the vehicle: what 0.1 m/s makes in a second."""
 PAPER_W_TRACK = 5.0
-"""The paper's default; the planner's default weights of tracking stand for it."""
+"""The paper's default; the planner's default weights of tracking, all three, stand for it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -12,9 +12,19 @@ from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
 from wakewise.wake import free_jet
 
-W_CHANGE_PER_N2 = 0.05
-"""Price of change of thrust of `smooth`, per N^2 and stage. The planner's effort costs w_effort h = 1e-4 per N^2 and
-stage; filtering over the horizon of 2 s asks for w_change / (w_effort h) = (2 s / 0.1 s)^2 = 400, rounded up to 500."""
+FILTER_S = 0.77
+"""Time over which `smooth` filters its thrusts: of those flown the longest whose position error is within a tenth of
+that of `unaware` (docs/decisions/0036)."""
+
+
+def price_of_change(settings: ControlSettings) -> float:
+    """Price of squared change of thrust from stage to stage, per N^2.
+
+    Thrusts that cost w_effort h T^2 in a stage of h seconds and w_change (dT)^2 from stage to stage relax over the
+    time h sqrt(w_change / (w_effort h)), so the price follows effort and stage where these are set otherwise.
+    """
+    stage_s = settings.plan.stage_s
+    return (FILTER_S / stage_s) ** 2 * settings.w_effort * stage_s
 
 
 def unaware(
@@ -37,7 +47,7 @@ def smooth(
     around: Surroundings | None = None,
 ) -> Controller[Any]:
     """`smooth`: the planner without a disturbance term and with a price on change of thrust."""
-    change = max(settings.plan.w_change, W_CHANGE_PER_N2)
+    change = max(settings.plan.w_change, price_of_change(settings))
     plan = settings.plan.model_copy(update={"w_change": change})
     careless = settings.model_copy(update={"w_disturbance": 0.0, "plan": plan})
     return planning_controller(vehicle, region, free_jet(wake), careless, name="smooth", surroundings=around)

@@ -6,8 +6,9 @@ one meet) and `loop.py` (the loop itself). `scenario.py` with `target_settings.p
 `regions.py` keeps what takes long to draw; `worlds/` and `pilots.py` are worlds and pilots by name (`helm.py` is the
 pilot who is a person), `instant_water.py` and `lattice_water.py` worlds other than the tank, `survey.py` what is known
 of target and camera beforehand; `surroundings.py` is what a planner is told to keep clear of, `preflight.py` refuses
-what does not fit, `foreign.py` guards what comes from outside; `flying.py` flies, `recorder.py` and `telemetry.py`
-keep what was, `flight_trim.py` reads from it what ballast is lacking, `photography.py` renders what the camera saw,
+what does not fit, `switches.py` says what is set and cannot act, `foreign.py` guards what comes from outside;
+`flying.py` flies, `recorder.py` and `telemetry.py` keep what was, `flight_trim.py` reads from it what ballast is
+lacking, `photography.py` renders what the camera saw,
 `darkroom.py` while the flight goes on.
 """
 
