@@ -113,7 +113,14 @@ class Poised:
         now = state.round
         if now is None:
             seen = self.watch.at(state.seen, estimate)
-            hold = Hold(goal=goal, force_W_N=state.force_W_N, moment_B_Nm=state.moment_B_Nm, view=seen.view)
+            view = seen.view
+            hold = Hold(
+                goal=goal,
+                force_W_N=state.force_W_N,
+                moment_B_Nm=state.moment_B_Nm,
+                gram=lambda X_WB, _: view.gram(X_WB),
+                total_weight=view.total_weight,
+            )
             low, high = self.scale.hinge.span(goal.tilt_rad)
             present = min(max(state.wished_rad, low), high)
             leans = (present, *(lean for lean in self.scale.leans(goal) if lean != present))

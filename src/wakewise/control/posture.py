@@ -15,7 +15,7 @@ X_WB' X_BC(tilt + lean) = X_WB X_BC(tilt) is the mission's.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,7 +30,6 @@ from wakewise.planning.barrier import least_gap
 from wakewise.planning.problem import CLEARANCE_M
 from wakewise.vehicles import RigidBody, TiltJoint, Vehicle, compile_body, restoring_wrench
 from wakewise.vehicles.dynamics import coriolis_wrench, damping_wrench
-from wakewise.wake.view import WakeView
 
 STEP_RAD = float(np.radians(5.0))
 """Distance between the leans that are compared: half a metre on, a jet moves by 4 cm, less than its own width there."""
@@ -98,18 +97,24 @@ def eased(lean_rad: float, rate_rad_s: float, wished_rad: float, dt_s: float) ->
     return lean_rad + 0.5 * (rate_rad_s + rate) * dt_s, rate
 
 
+Gram = Callable[[Pose, Array], Array]
+"""`(X_WB, thrusts_N) -> G`."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Hold:
     """What is to be held: a goal, and the load on the vehicle there.
 
     `force_W_N`, shape (3,), keeps its direction in the world (trim, current, cable), `moment_B_Nm`, shape (3,), in the
-    body; `view` is of the water that counts.
+    body. `gram` gives the matrix of D, shape (2 n, 2 n), of a body's pose and of thrusts about which it is to hold,
+    shape (n,); `total_weight` is that of the water it counts.
     """
 
     goal: Goal
     force_W_N: Array
     moment_B_Nm: Array
-    view: WakeView
+    gram: Gram
+    total_weight: float
 
     def __post_init__(self) -> None:
         freeze(self, force_W_N=(3,), moment_B_Nm=(3,))
@@ -210,10 +215,12 @@ class Scale:
         wrench -= coriolis_wrench(self.body, nu)
         wrench[:3] -= goal.X_WB.R.T @ hold.force_W_N
         wrench[3:] -= hold.moment_B_Nm
-        G = hold.view.gram(goal.X_WB)
-        if not (np.isfinite(wrench).all() and np.isfinite(G).all()):
+        if not np.isfinite(wrench).all():
             return NOT_TO_BE_HAD
-        weights = Weights(disturbance=self.w_disturbance / hold.view.total_weight, effort=self.w_effort)
+        G = hold.gram(goal.X_WB, self.layout.inverse @ wrench)
+        if not np.isfinite(G).all():
+            return NOT_TO_BE_HAD
+        weights = Weights(disturbance=self.w_disturbance / hold.total_weight, effort=self.w_effort)
         found = gentle_allocation(self.layout, wrench, G, weights)
         if found.scale < FULL or found.disturbance is None:
             return NOT_TO_BE_HAD
