@@ -8,7 +8,8 @@ Start reading in `methods.py` (which methods there are; `dynamic_positioning.py`
 exact allocator behind it) and `instant.py` (the tracker and the gentlest thrusts of an instant). `tracker.py` and
 `stability.py` are the PID and its margins, `loop.py` flies it with any allocation, `receding.py` flies a plan,
 `levers.py` adds the water that counts, `watch.py` follows it, `spare.py` shares a plan's wrench out anew, `pulses.py`
-sends thrusts that no thruster can hold as pulses, `intent.py` turns an operator's stick into goals, `trim.py` advises
+sends thrusts that no thruster can hold as pulses, `posture.py` prices attitudes of a body whose camera tilts and
+`poised.py` flies the best of them round any method, `intent.py` turns an operator's stick into goals, `trim.py` advises
 ballast.
 """
 
