@@ -36,7 +36,14 @@ def scale(vehicle=VEHICLE, around=OPEN) -> Scale:
 
 def held(goal, down_N=0.0, vehicle=VEHICLE, seen=None) -> Hold:
     force = np.array([0.0, 0.0, down_N])
-    return Hold(goal=goal, force_W_N=force, moment_B_Nm=np.zeros(3), view=view(vehicle) if seen is None else seen)
+    seen = view(vehicle) if seen is None else seen
+    return Hold(
+        goal=goal,
+        force_W_N=force,
+        moment_B_Nm=np.zeros(3),
+        gram=lambda X_WB, _: seen.gram(X_WB),
+        total_weight=seen.total_weight,
+    )
 
 
 HINGES = [

@@ -1,6 +1,6 @@
 """The loop and its recorder, on a plant simple enough to know by heart."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -54,8 +54,8 @@ class Perfect:
         return ScalarGrid(origin_W_m=np.zeros(3), spacing_m=0.1, values=np.ones((2, 3, 4)))
 
 
-def flown(witnessed: bool = True) -> tuple[FlightRecorder, Perfect]:
-    everything = Perfect()
+def flown(witnessed: bool = True, plant: Perfect | None = None) -> tuple[FlightRecorder, Perfect]:
+    everything = plant or Perfect()
     witness = everything if witnessed else None
     recorder = FlightRecorder(
         route=ROUTE, X_BC=X_BC, exposure_s=0.01, instants=3, thrusters=2, dt_s=DT_S, witness=witness
@@ -83,6 +83,31 @@ def test_every_step_is_recorded_once_and_in_order() -> None:
     np.testing.assert_allclose(np.diff(frame["time_s"].to_numpy()), DT_S, atol=1e-12)
     assert frame.columns[: len(step_columns(2))] == step_columns(2)
     assert frame["command_1_N"].to_list() == [command[0] for command in plant.commands]
+
+
+def test_a_goal_that_the_controller_changed_is_recorded_and_aims_the_camera() -> None:
+    """Of `Command.goal` come the columns of the goal and the joint's angle; without it, the pilot's own."""
+
+    @dataclass
+    class Leans(Perfect):
+        aimed: list[float] = field(default_factory=list)
+
+        def aim(self, tilt_rad: float) -> None:
+            self.aimed.append(tilt_rad)
+
+        def step(self, *arguments: object) -> object:
+            answer = super().step(*arguments)
+            if isinstance(arguments[-1], Goal) and int(arguments[0]) % 2:  # type: ignore[call-overload]
+                count, command = answer  # type: ignore[misc]
+                goal = replace(arguments[-1], tilt_rad=0.25, X_WB=Pose(np.full(3, 7.0)))
+                return count, replace(command, goal=goal)
+            return answer
+
+    recorder, plant = flown(plant=Leans())
+    tilt, place = recorder.frame()["goal_tilt_deg"].to_numpy(), recorder.frame()["goal_x_m"].to_numpy()
+    assert isinstance(plant, Leans) and plant.aimed[:4] == [0.0, 0.25, 0.0, 0.25]
+    np.testing.assert_allclose(np.radians(tilt), plant.aimed)
+    assert np.all((place == 7.0) == (tilt != 0.0)) and 0.45 < np.mean(place == 7.0) < 0.55
 
 
 def test_each_exposure_is_recorded_at_its_place() -> None:

@@ -111,8 +111,14 @@ class Poised:
             return replace(state, age_s=state.age_s + dt_s)
         now = state.round
         if now is None:
-            load = {"force_W_N": state.force_W_N, "moment_B_Nm": state.moment_B_Nm}
-            hold = Hold(goal=goal, **load, watch=self.watch, estimate=estimate)
+            watch, now_is = self.watch, estimate
+            hold = Hold(
+                goal=goal,
+                force_W_N=state.force_W_N,
+                moment_B_Nm=state.moment_B_Nm,
+                gram=lambda X_WB, thrusts_N: watch.cost(replace(now_is, X_WB=X_WB), thrusts_N),
+                total_weight=watch.view.total_weight,
+            )
             low, high = self.scale.hinge.span(goal.tilt_rad)
             present = min(max(state.wished_rad, low), high)
             leans = (present, *(lean for lean in self.scale.leans(goal) if lean != present))

@@ -15,7 +15,7 @@ X_WB' X_BC(tilt + lean) = X_WB X_BC(tilt) is the mission's.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -98,19 +98,24 @@ def eased(lean_rad: float, rate_rad_s: float, wished_rad: float, dt_s: float) ->
     return lean_rad + 0.5 * (rate_rad_s + rate) * dt_s, rate
 
 
+Gram = Callable[[Pose, Array], Array]
+"""`(X_WB, thrusts_N) -> G`."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Hold:
     """What is to be held: a goal, and the load on the vehicle there.
 
     `force_W_N`, shape (3,), keeps its direction in the world (trim, current, cable), `moment_B_Nm`, shape (3,), in the
-    body; `watch` is the water that counts, and `estimate` tells of its current.
+    body. `gram` gives the matrix of D, shape (2 n, 2 n), of a body's pose and of thrusts about which it is to hold,
+    shape (n,); `total_weight` is that of the water it counts.
     """
 
     goal: Goal
     force_W_N: Array
     moment_B_Nm: Array
-    watch: Watch
-    estimate: BodyState
+    gram: Gram
+    total_weight: float
 
     def __post_init__(self) -> None:
         freeze(self, force_W_N=(3,), moment_B_Nm=(3,))
@@ -213,13 +218,10 @@ class Scale:
         wrench[3:] -= hold.moment_B_Nm
         if not np.isfinite(wrench).all():
             return NOT_TO_BE_HAD
-        # How far each jet gets is guessed by the least thrusts of the posture, not by those of the present one.
-        guess = least_thrusts(self.layout, wrench).thrusts_N
-        G = hold.watch.gram(hold.estimate, guess, goal.X_WB)
+        G = hold.gram(goal.X_WB, self.layout.inverse @ wrench)
         if not np.isfinite(G).all():
             return NOT_TO_BE_HAD
-        G = hold.watch.with_silt(G, hold.estimate, guess, goal.X_WB)
-        weights = Weights(disturbance=self.w_disturbance / hold.watch.view.total_weight, effort=self.w_effort)
+        weights = Weights(disturbance=self.w_disturbance / hold.total_weight, effort=self.w_effort)
         found = gentle_allocation(self.layout, wrench, G, weights)
         if found.scale < FULL or found.disturbance is None:
             return NOT_TO_BE_HAD
