@@ -66,14 +66,12 @@ class Measurement:
 class Goal:
     """What the mission or the pilot wants now.
 
-    `nu_B` is the wished twist, expressed in the goal's own body frame, shape (6,). `exposure_in_s` is the time until
-    the shutter next opens (infinite if it will not, zero while it is open), so that a controller can keep the water
-    still then. `tilt_rad` is the wished angle of the camera's joint, positive upwards, 0 where the camera is fixed.
+    `nu_B` is the wished twist, expressed in the goal's own body frame, shape (6,). `tilt_rad` is the wished angle
+    of the camera's joint, positive upwards, 0 where the camera is fixed.
     """
 
     X_WB: Pose
     nu_B: Array = field(default_factory=lambda: np.zeros(6))
-    exposure_in_s: float = float("inf")
     tilt_rad: float = 0.0
 
     def __post_init__(self) -> None:

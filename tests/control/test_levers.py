@@ -50,7 +50,7 @@ def test_every_lever_together_still_flies():
     vehicle = load_vehicle("paper")
     controller = make_controller("wake-aware", vehicle, region(), wake_model(settings.wake, 1.5), settings)
     here = BodyState(X_WB=Pose(np.array([-0.5, 0.0, 1.1])))
-    _, command = controller.step(controller.init(), 0.02, here, Goal(X_WB=here.X_WB, exposure_in_s=0.5))
+    _, command = controller.step(controller.init(), 0.02, here, Goal(X_WB=here.X_WB))
     assert np.all(np.isfinite(command.thrusts_N)) and command.fallback is None
 
 

@@ -85,14 +85,14 @@ def test_auto_takes_the_joint_where_there_is_one() -> None:
     assert aim_of(HEAVY).joint is HEAVY.tilt
     assert aim_of(PAPER).joint is None
     assert aim_of(HEAVY, "pitch").joint is None
-    goal = RoutePilot(route=ROUTE, aim=aim_of(HEAVY, "pitch"), exposure_s=0.01).goal(20.0, None)
+    goal = RoutePilot(route=ROUTE, aim=aim_of(HEAVY, "pitch")).goal(20.0, None)
     assert goal.tilt_rad == 0.0
 
 
 def test_the_pilot_tells_the_wished_tilt() -> None:
     """With the pose that goes with it."""
     aim = aim_of(HEAVY)
-    goal = RoutePilot(route=ROUTE, aim=aim, exposure_s=0.01).goal(20.0, None)
+    goal = RoutePilot(route=ROUTE, aim=aim).goal(20.0, None)
     assert goal.tilt_rad == ROUTE.tilt(20.0, aim)[0] == pytest.approx(math.radians(-20.0))
     assert goal.X_WB.p_m == pytest.approx(ROUTE.body(20.0, aim).X_WB.p_m)
 

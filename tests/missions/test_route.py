@@ -1,4 +1,4 @@
-"""Routes: timing, continuity and the announcement of the shutter."""
+"""Routes: timing and continuity."""
 
 import numpy as np
 import pytest
@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_from_euler, quat_from_matrix, quat_multiply
-from wakewise.interfaces import BodyState
-from wakewise.missions import MissionSettings, RoutePilot, plan_route
+from wakewise.missions import MissionSettings, plan_route
 from wakewise.missions.orbit import R_FC
 from wakewise.missions.route import LONGEST_S, rest_to_rest
 
@@ -53,16 +52,6 @@ def test_the_body_twist_is_the_derivative_of_the_body_pose() -> None:
         np.testing.assert_allclose(here.X_WB.R @ here.nu_B[:3], (after.p_m - before.p_m) / (2 * h), atol=1e-6)
         spin = here.X_WB.R.T @ (after.R - before.R) / (2 * h)
         np.testing.assert_allclose(here.nu_B[3:], [spin[2, 1], spin[0, 2], spin[1, 0]], atol=1e-6)
-
-
-def test_the_pilot_announces_the_shutter() -> None:
-    """Before an exposure the goal says how long; while the shutter is open it says zero; after the last, never."""
-    pilot = RoutePilot(route=ROUTE, aim=X_BC, exposure_s=0.01)
-    anything = BodyState(X_WB=Pose(np.zeros(3)))
-    first = float(ROUTE.exposures_s[0])
-    assert pilot.goal(first - 0.5, anything).exposure_in_s == pytest.approx(0.5)
-    assert pilot.goal(first + 0.005, anything).exposure_in_s == 0.0
-    assert pilot.goal(ROUTE.duration_s, anything).exposure_in_s == np.inf
 
 
 def test_before_the_first_leg_the_vehicle_is_asked_to_hover() -> None:

@@ -41,14 +41,6 @@ def test_a_flight_begun_again_is_the_same(parts):
     assert any(not np.array_equal(a.X_WB.p_m, b.X_WB.p_m) for a, b in zip(first, third, strict=True))
 
 
-def test_the_shutter_is_announced_as_on_the_route(parts):
-    """The person does not change when photographs are taken."""
-    start = parts.route.body(0.0, parts.vehicle.X_BC)
-    route = Scenario.preset("quick").parts().pilot
-    for time_s in (0.0, 10.0, 20.0):
-        assert parts.pilot.goal(time_s, start).exposure_in_s == route.goal(time_s, start).exposure_in_s
-
-
 @pytest.mark.slow
 def test_any_method_is_flown_by_a_person(parts):
     """`dp` follows the goals within millimetres, and so comes centimetres off the route."""

@@ -61,7 +61,7 @@ def flown(witnessed: bool = True, plant: Perfect | None = None) -> tuple[FlightR
         route=ROUTE, X_BC=X_BC, exposure_s=0.01, instants=3, thrusters=2, dt_s=DT_S, witness=witness
     )
     run_loop(
-        pilot=RoutePilot(route=ROUTE, aim=X_BC, exposure_s=0.01),
+        pilot=RoutePilot(route=ROUTE, aim=X_BC),
         controller=everything,  # type: ignore[arg-type]
         estimator=everything,  # type: ignore[arg-type]
         plant=everything,  # type: ignore[arg-type]
@@ -190,7 +190,7 @@ def test_the_estimator_is_told_what_was_flown() -> None:
         _exposing=NeverRead(),
     )
     run_loop(
-        pilot=RoutePilot(route=ROUTE, aim=X_BC, exposure_s=0.01),
+        pilot=RoutePilot(route=ROUTE, aim=X_BC),
         controller=everything,  # type: ignore[arg-type]
         estimator=spy,  # type: ignore[arg-type]
         plant=everything,  # type: ignore[arg-type]

@@ -52,7 +52,7 @@ def moved_on(place_W_m: Array, velocity_W_m_s: Array, estimate: BodyState, dt_s:
     return np.asarray(place if distance <= LEASH_M else estimate.X_WB.p_m + away * (LEASH_M / distance))
 
 
-def goal_of(intent: Intent, place_W_m: Array, exposure_in_s: float = float("inf")) -> Goal:
+def goal_of(intent: Intent, place_W_m: Array) -> Goal:
     """Goal at a commanded place, moving as the operator asks, its forward axis on the point to watch.
 
     Parameters
@@ -61,8 +61,6 @@ def goal_of(intent: Intent, place_W_m: Array, exposure_in_s: float = float("inf"
         Without a point to watch the vehicle is level with its heading.
     place_W_m : ndarray, shape (3,)
         See `moved_on`.
-    exposure_in_s : float
-        As in `Goal`.
 
     Returns
     -------
@@ -83,7 +81,7 @@ def goal_of(intent: Intent, place_W_m: Array, exposure_in_s: float = float("inf"
         # The line of sight r to a point at rest turns with r x (dr/dt) / |r|^2, dr/dt = -v.
         omega_W = np.cross(away, -velocity) / float(away @ away)
     R_BW = X_WB.R.T
-    return Goal(X_WB=X_WB, nu_B=np.concatenate([R_BW @ velocity, R_BW @ omega_W]), exposure_in_s=exposure_in_s)
+    return Goal(X_WB=X_WB, nu_B=np.concatenate([R_BW @ velocity, R_BW @ omega_W]))
 
 
 def obeying(plan: PlanSettings, w_track: float) -> PlanSettings:

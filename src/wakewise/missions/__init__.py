@@ -1,8 +1,9 @@
 """What to look at, from where, in what order and when: viewpoints, layered orbits, timed routes.
 
 Start reading in `route.py` (legs, shutter, the pilot that follows them) and `orbit.py` (viewpoints on layered
-hemispheres); `aim.py` is what points the camera there (pitch, tilt joint or both), `clearance.py` refuses what would
-touch and tilts that the joint cannot follow, `settings.py` is what a user may say.
+hemispheres), `order.py` (which of them is the first); `aim.py` is what points the camera there (pitch, tilt joint or
+both), `clearance.py` refuses what would touch and tilts that the joint cannot follow, `settings.py` is what a user may
+say.
 """
 
 from wakewise.missions.aim import CameraAim, aim_of

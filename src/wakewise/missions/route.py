@@ -234,15 +234,12 @@ def open_route(centre_W_m: Array, duration_s: float, name: str = "free") -> Rout
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RoutePilot:
-    """A `Pilot` that follows a route by the clock and announces the shutter."""
+    """A `Pilot` that follows a route by the clock."""
 
     route: Route
     aim: CameraAim | Pose
-    exposure_s: float
 
     def goal(self, time_s: float, estimate: BodyState) -> Goal:  # noqa: ARG002  (a clock needs no estimate)
-        """Wished body pose and twist now, and how long until the shutter opens."""
+        """Wished body pose and twist now, and angle of the camera's joint."""
         wished, (tilt, _) = self.route.body(time_s, self.aim), self.route.tilt(time_s, self.aim)
-        k = int(np.searchsorted(self.route.exposures_s + self.exposure_s, time_s))
-        wait_s = float("inf") if k == len(self.route.exposures_s) else float(self.route.exposures_s[k]) - time_s
-        return Goal(X_WB=wished.X_WB, nu_B=wished.nu_B, exposure_in_s=max(wait_s, 0.0), tilt_rad=tilt)
+        return Goal(X_WB=wished.X_WB, nu_B=wished.nu_B, tilt_rad=tilt)

@@ -82,7 +82,6 @@ class HumanPilot:
         return Goal(
             X_WB=Pose(self._place_W_m, q),
             nu_B=np.concatenate([R_BW @ velocity_W, R_BW @ turn_W]),
-            exposure_in_s=wished.exposure_in_s,
         )
 
     def _watched(self, wished: Goal) -> Array:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def route_pilot(parts: Parts) -> RoutePilot:
     """`route`: follows the mission's route by the clock."""
-    return RoutePilot(route=parts.route, aim=parts.aim, exposure_s=parts.scenario.imaging.window_s)
+    return RoutePilot(route=parts.route, aim=parts.aim)
 
 
 def human_pilot(parts: Parts) -> HumanPilot:
