@@ -20,12 +20,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wakewise.allocation import Layout, Weights, compile_layout, gentle_allocation, least_thrusts
+from wakewise.allocation import Layout, Weights, compile_layout, gentle_allocation
 from wakewise.arrays import Array, freeze
 from wakewise.control.loop import FULL
-from wakewise.control.watch import Watch
 from wakewise.geometry import Pose, quat_from_rotvec
-from wakewise.interfaces import BodyState, Goal
+from wakewise.interfaces import Goal
 from wakewise.planning import Surroundings
 from wakewise.planning.barrier import least_gap
 from wakewise.planning.problem import CLEARANCE_M

@@ -40,9 +40,7 @@ class Watch:
         if self.silt is None:
             return gram
         current, _ = self._believed(estimate)
-        silt = self.silt.gram(
-            estimate.X_WB if X_WB is None else X_WB, thrusts_N, np.zeros(3) if current is None else current
-        )
+        silt = self.silt.gram(estimate.X_WB, thrusts_N, np.zeros(3) if current is None else current)
         return gram + self.view.total_weight * silt
 
     def flow(self, estimate: BodyState, thrusts_N: Array) -> Flow | None:
