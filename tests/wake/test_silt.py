@@ -73,10 +73,10 @@ def test_the_matrix_is_diagonal_and_not_negative():
 def test_a_current_carries_the_jet_before_it_strikes():
     """By its speed times H^2 / (K sqrt(T / rho)): a thruster that much upstream strikes where another does at once."""
     H, u = 0.6, 0.02
-    shift = u * H**2 / (silt.ROUND_DECAY * np.sqrt(1.0 / 1000.0))
+    shift = u * H**2 / (silt.ROUND_DECAY * np.sqrt(1.0 / silt.FRESH_WATER_KG_M3))
     reach, source = np.array([H]), []
     for x in (0.3, 0.3 + shift):
-        run = np.array([silt.RUNS * np.sqrt(1.0 / 1000.0)])
+        run = np.array([silt.RUNS * np.sqrt(1.0 / silt.FRESH_WATER_KG_M3)])
         start = silt.PEAK_AT * reach * np.sqrt(peak_stress_Pa(1.0, reach, AREA) / SILT.threshold_Pa)
         place, current = np.array([[x, 0.0]]), np.array([u, 0.0, 0.0])
         source.append(depth_of_source(place, np.zeros((1, 2)), start, run, current, BED_Z, EYE, SEEN, SILT)[0])
