@@ -86,13 +86,15 @@ class Command:
 
     `thrusts_N`, shape (n,), one per thruster, positive along its force axis. `wrench_B` is the wrench asked of the
     allocation, shape (6,). `disturbance` is D as the controller's own wake model sees it, None if it has none.
-    `fallback` says that the answer is not the one the method wanted (late, infeasible), and why.
+    `fallback` says that the answer is not the one the method wanted (late, infeasible), and why. `goal` is the one that
+    was flown, where the controller chose another attitude and tilt for the same pose of the camera.
     """
 
     thrusts_N: Array
     wrench_B: Array
     disturbance: float | None = None
     fallback: str | None = None
+    goal: Goal | None = None
 
     def __post_init__(self) -> None:
         freeze(self, thrusts_N=(None,), wrench_B=(6,))
@@ -347,7 +349,11 @@ class Witness(Protocol):
 
 
 class World(Protocol):
-    """Where a vehicle flies: simulated tank, the paper's water, an autopilot, the sea."""
+    """Where a vehicle flies: simulated tank, the paper's water, an autopilot, the sea.
+
+    One that does not wait for its controller says so by an attribute `waits` that is False; thrusts that come too late
+    are not sent there (see `wakewise.control.safeguard`).
+    """
 
     @property
     def name(self) -> str:

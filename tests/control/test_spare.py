@@ -7,6 +7,7 @@ from wakewise.allocation import Weights, gentle_allocation
 from wakewise.control import ControlSettings, make_controller, vehicle_layout
 from wakewise.control.levers import BED_POINTS, DRIFT_POINTS, DRIFT_WEIGHT, LeverSettings, with_bed_points, with_drift
 from wakewise.control.spare import Respared, SpareState, joined_jets, meeting_pairs, meeting_view
+from wakewise.control.thrift import Sharer
 from wakewise.control.watch import Watch
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Command, Goal
@@ -113,7 +114,7 @@ def test_respared_thrusts_make_the_same_wrench_and_a_fallback_is_left_alone():
     spared = Respared(
         name="x",
         inner=inner,
-        layout=LAYOUT,
+        sharer=Sharer(layout=LAYOUT),
         watch=watching(view),
         weights=Weights(disturbance=150.0, effort=1e-3, previous=1e-3),
     )
@@ -141,7 +142,7 @@ def test_shares_leave_a_poor_minimum_within_two_seconds():
     )
     view = WakeView.of(VEHICLE, below, RoundJet())
     weights = Weights(disturbance=150.0, effort=1e-3, previous=100.0)
-    spared = Respared(name="x", inner=inner, layout=LAYOUT, watch=watching(view), weights=weights)
+    spared = Respared(name="x", inner=inner, sharer=Sharer(layout=LAYOUT), watch=watching(view), weights=weights)
     best = gentle_allocation(LAYOUT, inner.wrench, view.gram(body.X_WB), Weights(disturbance=150.0, effort=1e-3))
     poor = LAYOUT.inverse @ inner.wrench
     state = SpareState(inner=0, thrusts_N=poor, free_age_s=0.0)

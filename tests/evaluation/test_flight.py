@@ -6,8 +6,14 @@ import pytest
 
 from wakewise.errors import InputError
 from wakewise.evaluation import SWAY_FIGURES, flight_figures
-from wakewise.evaluation.flight import path_distance, rising_edges, roll_pitch_rms_deg, sign_flips
-from wakewise.geometry import quat_from_euler
+from wakewise.evaluation.flight import (
+    attitude_rmse_deg,
+    path_distance,
+    rising_edges,
+    roll_pitch_rms_deg,
+    sign_flips,
+)
+from wakewise.geometry import quat_from_euler, quat_from_rotvec, quat_multiply
 
 
 def table(n=400, dt=0.05, late_s=0.0, **extra):
@@ -77,6 +83,25 @@ def test_attitude_error_is_against_the_goal():
     goal = np.array([quat_from_euler(0.0, 0.0, 0.5)])
     true = np.array([quat_from_euler(np.radians(3), np.radians(4), -0.9)])
     assert roll_pitch_rms_deg(true, goal) == pytest.approx(np.sqrt(12.5))
+
+
+def test_the_whole_turn_counts_yaw():
+    """A quarter turn is 90 degrees about any axis, whichever sign its quaternion has."""
+    goal = np.array([quat_from_euler(0.1, 0.2, 0.5)] * 3)
+    quarters = [quat_multiply(goal[0], quat_from_rotvec(0.5 * np.pi * axis)) for axis in np.eye(3)]
+    assert attitude_rmse_deg(np.array(quarters), -goal) == pytest.approx(90.0)
+    assert attitude_rmse_deg(goal, -goal) == pytest.approx(0.0, abs=1e-5)
+
+
+def test_exceedance_is_a_share_of_surface_and_time():
+    """Half of the surface for half of the time is a quarter; still water has no speed to exceed."""
+    over = np.where(np.arange(400) < 200, 0.5, 0.0)
+    figures = flight_figures(
+        table(target_over_1cm_s=over, target_over_ambient=np.full(400, np.nan), exposing=np.arange(400) < 200)
+    )
+    assert figures["exceedance_1cm_s_pct"] == pytest.approx(25.0)
+    assert figures["exposure_exceedance_1cm_s_pct"] == pytest.approx(50.0)
+    assert figures["exceedance_ambient_pct"] is None
 
 
 def test_missing_columns_give_none_and_no_rows_an_error():

@@ -142,10 +142,10 @@ def test_memory_that_runs_out_is_blamed_on_no_part():
         ww.fly(PARTS.replace(pilot=Pilot(), method="dp"), duration_s=SECONDS)
 
 
-def test_our_own_are_flown_as_they_are():
-    """No guard round a controller of this package: it has its own."""
+def test_our_own_have_the_guard_of_a_control_step_and_not_that_of_a_stranger():
+    """A controller of this package is trusted with its answers' kind and pace; its guard waits as the tank does."""
     own = PARTS.replace(method="dp")
-    assert own.flying.inner is own.controller
+    assert own.flying.inner.inner is own.controller and not own.flying.inner.enforce
     assert own.replace(vehicle=own.vehicle.with_ideal_thrusters()).flying.name == own.controller.name
     assert isinstance(PARTS.replace(controller=Foreign(nan)).flying.inner, Guarded)
     assert described(Foreign(nan)) == "theirs (test_foreign.Foreign)"

@@ -6,8 +6,10 @@ from pydantic import ValidationError
 
 from wakewise.imaging import calibrate
 from wakewise.operation import Scenario
-from wakewise.operation.survey import SurveySettings, found_target, known_calibration
+from wakewise.operation.survey import CURRENT_DEG, SurveySettings, found_target, known_calibration, surveyed_current
+from wakewise.water import AiryWave, AmbientSum, SteadyCurrent
 
+ORDERS = ("plain", "current")
 EXACT = {"survey.place_m": 0.0, "survey.focal_pct": 0.0, "survey.centre_pct": 0.0, "survey.distortion": 0.0}
 
 
@@ -65,3 +67,33 @@ def test_bad_values_do_not_become_settings(bad):
     """Out of range or no number."""
     with pytest.raises(ValidationError):
         SurveySettings(**bad)
+
+
+def test_the_current_is_known_but_for_its_direction():
+    """Speed and sink are the water's own; over 400 draws the direction is off by the stated spread within 10 %."""
+    water, rng = SteadyCurrent(velocity_W_m_s=np.array([0.06, -0.08, 0.01])), np.random.default_rng(0)
+    known = np.array([surveyed_current(water, np.zeros(3), rng) for _ in range(400)])
+    np.testing.assert_allclose(np.hypot(known[:, 0], known[:, 1]), 0.1)
+    np.testing.assert_allclose(known[:, 2], 0.01)
+    off = np.degrees(np.arctan2(known[:, 1], known[:, 0]) - np.arctan2(-0.08, 0.06))
+    assert off.std() == pytest.approx(CURRENT_DEG, rel=0.1)
+
+
+def test_a_swell_is_no_current():
+    """A minute's mean leaves less than a twentieth of the orbital speed of a wave that runs over a steady current."""
+    steady = SteadyCurrent(velocity_W_m_s=np.array([0.05, 0.0, 0.0]))
+    wave = AiryWave(amplitude_m=0.02, period_s=7.0, heading_rad=0.0, depth_m=1.5)
+    place = np.array([0.0, 0.0, 1.4])
+    swing = max(float(np.linalg.norm(wave.velocity(place[None], t))) for t in np.arange(0.0, 7.0, 0.1))
+    rng = np.random.default_rng(1)
+    known = surveyed_current(AmbientSum(parts=(steady, wave)), place, rng)
+    assert np.hypot(known[0], known[1]) == pytest.approx(0.05, abs=0.05 * swing)
+
+
+def test_the_survey_is_of_the_water_that_is_flown_in():
+    """Asked for an order, the mission begins downstream by the tank's own current; plain, in the north."""
+    told = {"tank.current.velocity_m_s": (0.0, 0.08, 0.0), "tank.current.turbulence_m_s": 0.0, "world": "tank"}
+    legs = {order: Scenario().replace(**told, **{"mission.order": order}).parts().route.legs[0] for order in ORDERS}
+    assert float(legs["plain"].start[0]) == 0.0
+    off = np.degrees(float(legs["current"].start[0]) - 0.5 * np.pi)
+    assert abs(off) < 3.0 * CURRENT_DEG + 360.0 / 20

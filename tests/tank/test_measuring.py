@@ -51,6 +51,15 @@ def test_excess_speeds_and_whole_pressures():
     assert measure.bed_shear_p95_Pa == pytest.approx(1000.0 * float(star) ** 2)
     assert measure.tracer_speed_mean_m_s == pytest.approx(0.5)
     assert measure.turbidity_per_m == measure.ray_optical_depth == 0.0
+    assert (measure.target_over_1cm_s, measure.target_over_ambient) == (1.0, 0.0)  # .3 m/s in a stream of .4
+
+
+def test_exceedance_of_still_water_is_not_known():
+    """Excess of 5 mm/s is nowhere over 1 cm/s; over the ambient speed it is everywhere, or nobody can say."""
+    probes = TargetProbes(PYRAMID, np.random.default_rng(0))
+    running, still = (probes.measure(Stream([0.005, 0, 0], [0, v, 0]), LAWS, None, EYE, 1000.0) for v in (0.004, 0.0))
+    assert (running.target_over_1cm_s, running.target_over_ambient) == (0.0, 1.0)
+    assert np.isnan(still.target_over_ambient)
 
 
 def test_a_steady_current_is_asked_for_once_and_another_each_time():

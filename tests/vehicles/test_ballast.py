@@ -67,8 +67,8 @@ def test_no_block_changes_nothing() -> None:
 
 
 def test_what_is_no_block_is_refused() -> None:
-    """Half a tonne, a place off the vehicle."""
-    with pytest.raises(InputError, match="500"):
-        ballasted(VEHICLE, 501.0)
+    """Half a tonne of lift, a place off the vehicle."""
+    with pytest.raises(InputError, match="5000"):
+        ballasted(VEHICLE, 5001.0)
     with pytest.raises(ValidationError):
         Block(float_N=1.0, at_B_m=(9.0, 0.0, 0.0))

@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from wakewise.errors import InputError
 from wakewise.interfaces import WakeModel
-from wakewise.wake import disturbance, gram, incoherent, model_names, point_disturbance, wake_model
+from wakewise.wake import disturbance, gram, incoherent, point_disturbance, wake_model
+from wakewise.wake.models import OWN_MODELS
 
-MODELS = [wake_model(name) for name in model_names()]
+MODELS = [wake_model(name) for name in OWN_MODELS]
 
 
 def scene(seed, n=300, m=8):

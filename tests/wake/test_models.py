@@ -6,24 +6,26 @@ from pydantic import ValidationError
 
 from wakewise.errors import InputError
 from wakewise.wake import FloorJet, GaussianJet, PaperJet, PowerJet, RoundJet, WakeSettings, model_names, wake_model
+from wakewise.wake.learned import LearnedWake
+from wakewise.wake.models import OWN_MODELS
 
 AREA = np.pi * 0.03**2
 
 
 def test_names_give_models_and_a_wrong_name_is_told_the_right_ones():
     """Each name gives a model of that name; any other is refused with the list."""
-    assert model_names() == ("paper", "paper-calibrated", "fitted", "linear", "jet", "jet-fitted")
+    assert model_names() == ("paper", "paper-calibrated", "fitted", "linear", "jet", "jet-fitted", "learned")
     assert [wake_model(name).name for name in model_names()] == list(model_names())
     assert [type(wake_model(name)) for name in model_names()] == [
-        PaperJet, PowerJet, PowerJet, PowerJet, RoundJet, GaussianJet,
+        PaperJet, PowerJet, PowerJet, PowerJet, RoundJet, GaussianJet, LearnedWake,
     ]  # fmt: skip
     with pytest.raises(
-        InputError, match="'swirl': unknown, allowed: paper, paper-calibrated, fitted, linear, jet, jet-fitted"
+        InputError, match="'swirl': unknown, allowed: paper, paper-calibrated, fitted, linear, jet, jet-fitted, learned"
     ):
         wake_model("swirl")
 
 
-@pytest.mark.parametrize("name", model_names())
+@pytest.mark.parametrize("name", OWN_MODELS)
 def test_settings_without_numbers_are_the_named_model(name):
     """Defaults in settings and by name are the same model."""
     assert wake_model(WakeSettings(model=name, floor=False)) == wake_model(name)

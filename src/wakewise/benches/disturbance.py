@@ -21,10 +21,10 @@ from wakewise.wake import (
     gauss_newton,
     gram,
     gram_with_derivatives,
-    model_names,
     point_disturbance,
     wake_model,
 )
+from wakewise.wake.models import OWN_MODELS
 
 THRUSTS_N = np.linspace(-3.0, 4.0, 8)
 COUNTS = (100, 300, 1000, 3000, 10000)
@@ -36,7 +36,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
     """Times of every model at several poses, from Python, checks included; the slowest model is the headline."""
     poses = [X_WB for X_WB, _ in cases(4)]
     region = (REGION.points_W_m, REGION.weights)
-    models = {name: wake_model(name) for name in model_names()}
+    models = {name: wake_model(name) for name in OWN_MODELS}
     models["jet+floor"] = wake_model(WakeSettings(model="jet", floor=True), TARGET.bed_z_m)
     rows = {}
     for done, (name, model) in enumerate(models.items()):

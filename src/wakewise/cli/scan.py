@@ -31,8 +31,8 @@ Method = Annotated[
     str | None,
     typer.Option(
         "--method",
-        help="dp, bow-rule, manual, pseudo-inverse, unaware, smooth, linear, instant, wake-aware, a plug-in, or "
-        "package.module:make.",
+        help="dp, bow-rule, manual, ardusub, pseudo-inverse, unaware, smooth, linear, instant, wake-aware, a plug-in, "
+        "or package.module:make.",
         show_default=False,
     ),
 ]

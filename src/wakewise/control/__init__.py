@@ -7,9 +7,10 @@ Start reading in `methods.py` (which methods there are; `dynamic_positioning.py`
 `pseudo_inverse.py` and `unaware.py` are the rivals), `wake_aware.py` (the product: model predictive control and the
 exact allocator behind it) and `instant.py` (the tracker and the gentlest thrusts of an instant). `tracker.py` and
 `stability.py` are the PID and its margins, `loop.py` flies it with any allocation, `receding.py` flies a plan,
-`levers.py` adds the water that counts, `watch.py` follows it, `spare.py` shares a plan's wrench out anew, `pulses.py`
-sends thrusts that no thruster can hold as pulses, `intent.py` turns an operator's stick into goals, `trim.py` advises
-ballast.
+`levers.py` adds the water that counts, `watch.py` follows it, `spare.py` shares a plan's wrench out anew, `thrift.py`
+says how much power that may cost, `pulses.py` sends thrusts that no thruster can hold as pulses, `safeguard.py` sees to
+it that something that can be flown is sent in time, `intent.py` turns an operator's stick into goals, `trim.py`
+advises ballast.
 """
 
 from wakewise.control.levers import LeverSettings
@@ -17,6 +18,7 @@ from wakewise.control.loop import vehicle_layout
 from wakewise.control.methods import MAKERS, METHODS, ControlTask, make_controller
 from wakewise.control.pulses import in_pulses
 from wakewise.control.receding import PlanningController, planning_controller
+from wakewise.control.safeguard import Safeguard, safeguarded
 from wakewise.control.settings import ControlSettings
 from wakewise.control.stability import Gains, vehicle_axes, wished_gains
 from wakewise.control.tracker import make_tracker
@@ -29,10 +31,12 @@ __all__ = [
     "Gains",
     "LeverSettings",
     "PlanningController",
+    "Safeguard",
     "in_pulses",
     "make_controller",
     "make_tracker",
     "planning_controller",
+    "safeguarded",
     "vehicle_axes",
     "vehicle_layout",
     "wished_gains",

@@ -24,7 +24,7 @@ from wakewise.errors import InputError
 from wakewise.estimation.current import current_of_force
 from wakewise.estimation.settings import Priors
 from wakewise.geometry import matrix_from_quat
-from wakewise.vehicles import Vehicle, compile_body, coriolis_wrench, damping_wrench
+from wakewise.vehicles import Vehicle, compile_body, coriolis_wrench, damping_wrench, restoring_wrench
 from wakewise.vehicles.ballast import Block, net_buoyancy_N
 
 STEP_N, STEP_M = 0.5, 0.05
@@ -33,7 +33,9 @@ WORTH_NM = 0.05
 """A moment below this, half a newton at a decimetre, is left alone where no net weight goes with it."""
 SURE = 2.0
 """How many standard deviations a change must be worth."""
-LIFT_KNOWN = 0.5
+LIFT_KNOWN, RIGHTING_KNOWN = 0.5, 0.1
+"""Shares that count as unknown: of a current's lift and turning, and of the moment with which a vehicle rights itself,
+whose centres are known to a millimetre in ten."""
 _LOOKS = 200
 
 
@@ -154,14 +156,14 @@ def hover_trim(vehicle: Vehicle, q_WB: Array, loads_B: Array, thrusts_N: Array, 
     B, gain = vehicle.allocation_matrix, Priors().gain_std
     by_gain_N = np.mean(thrusts * (down_B @ B[:3]), axis=0)
     by_gain_Nm = np.mean(np.einsum("nij,jm->nim", places, B[3:]) * thrusts[:, None, :], axis=0)
-    by_turning = np.mean(places @ turning, axis=0)
+    body = compile_body(vehicle)
+    own = np.mean([places[k] @ restoring_wrench(body, q[k])[3:] for k in range(0, len(q), every)], axis=0)
+    doubts = np.square(LIFT_KNOWN * np.mean(places @ turning, axis=0)) + np.square(RIGHTING_KNOWN * own)
     return HoverTrim(
         weight_N=weight_N,
         weight_std_N=float(np.sqrt(weights.var() + gain**2 * by_gain_N @ by_gain_N + (LIFT_KNOWN * lift_N) ** 2)),
         moment_Nm=each.mean(axis=0),
-        moment_std_Nm=np.sqrt(
-            each.var(axis=0) + gain**2 * np.square(by_gain_Nm).sum(axis=1) + (LIFT_KNOWN * by_turning) ** 2
-        ),
+        moment_std_Nm=np.sqrt(each.var(axis=0) + gain**2 * np.square(by_gain_Nm).sum(axis=1) + doubts),
         own_N=net_buoyancy_N(vehicle),
         light_N=light_N,
         p_BB_m=vehicle.p_BB_m,

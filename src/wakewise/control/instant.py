@@ -5,17 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from wakewise.allocation.allocate import Allocation, Weights, gentle_allocation, least_thrusts
+from wakewise.allocation import Allocation, Weights, least_thrusts
 from wakewise.arrays import Array
 from wakewise.control.levers import with_bed_points
 from wakewise.control.loop import TrackingController, vehicle_layout
+from wakewise.control.poised import poised
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
 from wakewise.control.silt import silt_view
-from wakewise.control.spare import meeting_view
+from wakewise.control.spare import meeting_view, sharer_of
 from wakewise.control.tracker import make_tracker
 from wakewise.control.watch import Watch
 from wakewise.interfaces import Controller, WakeModel
 from wakewise.planning import Surroundings
+from wakewise.planning.surroundings import around_target
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
 from wakewise.wake import bed_of
@@ -28,8 +30,10 @@ def instant_allocator(
     """The same tracker as `dp`, and the gentlest thrusts that make the same wrench.
 
     D is divided by the sum of the region's weights, so that the cost does not depend on how many points sample it.
+    Where D has no weight, the least thrusts: what a planner without a disturbance term falls back on is `dp`.
     """
-    layout = vehicle_layout(vehicle)
+    sharer = sharer_of(vehicle, settings)
+    layout = sharer.layout
     view = WakeView.of(vehicle, region, wake, settings.superposition)
     weights = Weights(
         disturbance=settings.w_disturbance / view.total_weight,
@@ -38,9 +42,9 @@ def instant_allocator(
     )
 
     def allocate(wrench_B: Array, gram: Array | None, previous_N: Array) -> Allocation:
-        if gram is None:
-            return least_thrusts(layout, wrench_B)
-        return gentle_allocation(layout, wrench_B, gram, weights, previous_N)
+        if gram is None or weights.disturbance == 0.0:
+            return least_thrusts(layout, wrench_B, gram)
+        return sharer.shares(wrench_B, gram, weights, view.total_weight, previous_N)
 
     return TrackingController(
         name="instant",
@@ -55,12 +59,13 @@ def instant(
     region: Region,
     wake: WakeModel,
     settings: ControlSettings,
-    around: Surroundings | None = None,  # noqa: ARG001
+    around: Surroundings | None = None,
 ) -> Controller[Any]:
     """`instant`: the tracker, and the gentlest thrusts for its wrench, one instant at a time."""
     levers = settings.levers
     seen = with_bed_points(region, levers, bed_of(wake))
     controller = instant_allocator(vehicle, seen, wake, settings)
     view = meeting_view(controller.view, vehicle_layout(vehicle)) if levers.meet else controller.view
-    silt = silt_view(vehicle, region, wake, levers)
-    return replace(controller, view=view, watch=Watch(view=view, levers=levers, silt=silt))
+    watch = Watch(view=view, levers=levers, silt=silt_view(vehicle, region, wake, levers))
+    spared = replace(controller, view=view, watch=watch)
+    return poised(spared, watch, vehicle, settings, around or around_target(region))

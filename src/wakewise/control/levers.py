@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from wakewise.arrays import Array, IntArray
 from wakewise.settings import Settings
@@ -42,6 +42,14 @@ class LeverSettings(Settings):
     drift: bool = Field(
         default=True, description="follow the jets as the current bends, stops and brings them; needs spare"
     )
+    thrift: bool = Field(
+        default=True, description="bound the power that gentle shares cost by what the least thrusts would stir"
+    )
+    posture: bool | None = Field(
+        default=None,
+        description="lean the body as its thrusters like it where the camera's joint keeps the view (mission.aim: "
+        "auto); null: where there is a joint",
+    )
     drift_m_s: Velocity | None = Field(
         default=None, description="that current, north, east, down, if it is stated; null: as the estimator finds it"
     )
@@ -49,6 +57,14 @@ class LeverSettings(Settings):
         default="none",
         description="also count what jets lift from such a bed into the camera's view; none: sand, clear, or not",
     )
+
+    @model_validator(mode="after")
+    def _stated_current_can_act(self) -> LeverSettings:
+        if self.drift_m_s is not None and not self.drift:
+            raise ValueError("drift_m_s is stated but drift is off; leave it null, or turn drift on")
+        if self.drift_m_s is not None and not any(self.drift_m_s):
+            raise ValueError("drift_m_s is no current at all; null takes the estimator's, drift: false does without")
+        return self
 
 
 def with_bed_points(region: Region, levers: LeverSettings, bed_z_m: float | None = None) -> Region:

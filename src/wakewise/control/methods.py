@@ -2,12 +2,13 @@
 
 - `dp`: dynamic positioning, a PID with the least thrusts.
 - `manual`: a person at two sticks, with the autopilot that such vehicles have (see `wakewise.pilot`).
-- `bow-rule`: the same, with bow thrusters that never blow forward.
+- `ardusub`: the loops and the mixer that such vehicles are shipped with, holding the mission's pose.
+- `bow-rule`: `dp` whose bow thrusters never blow ahead.
 - `pseudo-inverse`: the motion of `wake-aware`, wrench for wrench, made with the least thrusts (an ablation).
 - `unaware`: the planner without a disturbance term.
 - `smooth`: the same with a price on change of thrust.
 - `linear`: `wake-aware` that believes in the `linear` wake model (an ablation).
-- `instant`: the PID of `dp` with the gentlest thrusts of each instant.
+- `instant`: the PID of `dp` with the gentlest thrusts of each instant, with the weights and levers of `wake-aware`.
 - `wake-aware`: model predictive control of the target's water, the exact allocator behind it.
 """
 
@@ -17,6 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, cast
 
+from wakewise.control.ardusub import ardusub
 from wakewise.control.bow_rule import bow_rule
 from wakewise.control.dynamic_positioning import dynamic_positioning
 from wakewise.control.instant import instant
@@ -62,6 +64,7 @@ MAKERS: dict[str, Maker] = {
     "dp": dynamic_positioning,
     "bow-rule": bow_rule,
     "manual": manual,
+    "ardusub": ardusub,
     "pseudo-inverse": planned_pseudo_inverse,
     "unaware": unaware,
     "smooth": smooth,

@@ -32,7 +32,7 @@ from wakewise.planning.guard import Guard
 from wakewise.planning.planner import PlanModel, Planner, compile_plan
 from wakewise.planning.problem import PLAN_EVERY_S, Horizon, PlanProblem, PlanTerms, state_of
 from wakewise.planning.reference import between, reference_of
-from wakewise.planning.surroundings import Surroundings
+from wakewise.planning.surroundings import Surroundings, around_target
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
 from wakewise.wake import FloorJet
@@ -347,13 +347,3 @@ def warmed(planner: Planner) -> Planner:
     )
     planner.plan(problem, np.zeros((N, n)))
     return planner
-
-
-def around_target(region: Region) -> Surroundings:
-    """The sphere round the region's surface points, which is all that a region tells of its surroundings."""
-    surface = region.points_W_m[region.distance_m <= 0.0]
-    if len(surface) == 0:
-        return Surroundings()
-    middle = 0.5 * (surface.min(axis=0) + surface.max(axis=0))
-    radius = float(np.linalg.norm(surface - middle, axis=1).max())
-    return Surroundings(spheres=np.array([[*middle, radius]]))

@@ -75,6 +75,11 @@ class ControlSettings(Settings):
         description="who flies `manual` or is the pilot `human`, by number; none = the one that the trial's seed draws",
     )
 
+    def without_posture(self) -> ControlSettings:
+        """The same where the body's attitude is the mission's."""
+        levers = self.levers.model_copy(update={"posture": False})
+        return self.model_copy(update={"levers": levers})
+
 
 def flown_by(settings: ControlSettings, seed: int) -> ControlSettings:
     """The settings with the person whom a seed draws, unless they name one."""

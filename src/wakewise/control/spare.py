@@ -18,11 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.allocation.allocate import Allocation, Layout, Weights, disturbance_of, gentle_allocation
+from wakewise.allocation import Allocation, Layout, Weights, disturbance_of
 from wakewise.arrays import Array, IntArray
 from wakewise.control.loop import vehicle_layout
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
 from wakewise.control.silt import silt_view
+from wakewise.control.thrift import Sharer, power_law
 from wakewise.control.watch import Watch
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Command, Controller, Goal, WakeModel
@@ -175,9 +176,14 @@ class Respared:
 
     name: str
     inner: Controller[Any]
-    layout: Layout
+    sharer: Sharer
     watch: Watch
     weights: Weights
+
+    @property
+    def layout(self) -> Layout:
+        """Allocation matrix and limits."""
+        return self.sharer.layout
 
     def init(self) -> SpareState:
         """State before the first step."""
@@ -200,10 +206,11 @@ class Respared:
             words = "wake model not finite: thrusts of the plan"
             return SpareState(inner=inner, thrusts_N=command.thrusts_N), replace(command, fallback=words)
         cost = self.watch.with_silt(G, estimate, state.thrusts_N)
-        found = gentle_allocation(self.layout, command.wrench_B, cost, weights, state.thrusts_N)
+        total = self.watch.view.total_weight
+        found = self.sharer.shares(command.wrench_B, cost, weights, total, state.thrusts_N)
         free_age_s = state.free_age_s + EVERY_S
         if free_age_s + 1e-6 >= FREE_EVERY_S:
-            anew = gentle_allocation(self.layout, command.wrench_B, cost, replace(weights, previous=0.0))
+            anew = self.sharer.shares(command.wrench_B, cost, replace(weights, previous=0.0), total)
             free_age_s = 0.0
             if _cost(anew, weights) < (1.0 - WORTH) * _cost(found, weights):
                 found = anew
@@ -231,12 +238,13 @@ def respared(
     Arguments as for `make_controller`; `region` with what the levers add but for drift, `wake` with the floor if it is
     to count.
     """
-    layout = vehicle_layout(vehicle)
+    sharer = sharer_of(vehicle, settings)
+    layout = sharer.layout
     view = WakeView.of(vehicle, region, wake, settings.superposition)
     return Respared(
         name=controller.name,
         inner=controller,
-        layout=layout,
+        sharer=sharer,
         watch=Watch(
             view=meeting_view(view, layout) if settings.levers.meet else view,
             levers=settings.levers,
@@ -248,3 +256,8 @@ def respared(
             previous=PREVIOUS_SHARE * settings.w_effort,
         ),
     )
+
+
+def sharer_of(vehicle: Vehicle, settings: ControlSettings) -> Sharer:
+    """What shares a vehicle's wrenches out, within the bound on power if that lever is on."""
+    return Sharer(layout=vehicle_layout(vehicle), law=power_law(vehicle) if settings.levers.thrift else None)

@@ -200,7 +200,7 @@ def stable_gain_scale(
         delay_s = force_delay_s if i < 3 else moment_delay_s
         if max(wished.kp, wished.kd, wished.ki) <= 0.0:
             continue
-        found = _axis_scale(axis, wished, dt_s, lag, delay_s)
+        found = axis_scale(axis, wished, dt_s, lag, delay_s)
         if found is None:
             raise InputError(
                 f"gains {forces.kp:g}/{forces.kd:g}/{forces.ki:g}: axis {'XYZKMN'[i]} of '{vehicle.name}' has no "
@@ -211,7 +211,7 @@ def stable_gain_scale(
 
 
 @lru_cache(maxsize=256)
-def _axis_scale(axis: Axis, wished: Gains, dt_s: float, lag_s: float, delay_s: float) -> float | None:
+def axis_scale(axis: Axis, wished: Gains, dt_s: float, lag_s: float, delay_s: float) -> float | None:
     """Largest bandwidth factor of one axis with enough margin: a coarse search downwards, then halving."""
 
     def enough(scale: float) -> bool:

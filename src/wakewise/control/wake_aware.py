@@ -11,14 +11,17 @@ from __future__ import annotations
 from typing import Any
 
 from wakewise.control.levers import with_bed_points
+from wakewise.control.poised import poised
 from wakewise.control.receding import planning_controller
 from wakewise.control.settings import ControlSettings
 from wakewise.control.spare import respared
+from wakewise.control.watch import Watch
 from wakewise.interfaces import Controller, WakeModel
 from wakewise.planning import Surroundings
+from wakewise.planning.surroundings import around_target
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
-from wakewise.wake import bed_of, free_jet, wake_model
+from wakewise.wake import WakeView, bed_of, free_jet, wake_model
 
 
 def planned(
@@ -53,6 +56,12 @@ def _planned(
 ) -> Controller[Any]:
     levers = settings.levers
     seen = with_bed_points(region, levers, bed_of(wake))
-    believed = free_jet(wake) if levers.spare else wake
-    controller = planning_controller(vehicle, seen, believed, settings, name=name, surroundings=around)
-    return respared(controller, vehicle, seen, wake, settings) if levers.spare else controller
+    solid = around or around_target(region)
+    if not levers.spare:
+        controller = planning_controller(vehicle, seen, wake, settings, name=name, surroundings=solid)
+        watch = Watch(view=WakeView.of(vehicle, seen, wake, settings.superposition), levers=levers)
+        return poised(controller, watch, vehicle, settings, solid)
+    # The motion spares the target alone: points beside it move only spare thrusts.
+    controller = planning_controller(vehicle, region, free_jet(wake), settings, name=name, surroundings=solid)
+    spared = respared(controller, vehicle, seen, wake, settings)
+    return poised(spared, spared.watch, vehicle, settings, solid)

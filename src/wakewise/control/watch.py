@@ -8,6 +8,7 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.control.levers import LeverSettings
+from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState
 from wakewise.wake.carried import Flow
 from wakewise.wake.silt import SiltView
@@ -27,16 +28,18 @@ class Watch:
     levers: LeverSettings
     silt: SiltView | None = None
 
-    def gram(self, estimate: BodyState, thrusts_N: Array) -> Array:
-        """Matrix G of D = s' G s at an estimate, shape (2 n, 2 n), in the flow that it tells of."""
-        return self.view.gram(estimate.X_WB, self.flow(estimate, thrusts_N))
+    def gram(self, estimate: BodyState, thrusts_N: Array, X_WB: Pose | None = None) -> Array:
+        """Matrix G of D = s' G s at an estimate or another pose, shape (2 n, 2 n), in the flow that it tells of."""
+        return self.view.gram(estimate.X_WB if X_WB is None else X_WB, self.flow(estimate, thrusts_N))
 
-    def with_silt(self, gram: Array, estimate: BodyState, thrusts_N: Array) -> Array:
+    def with_silt(self, gram: Array, estimate: BodyState, thrusts_N: Array, X_WB: Pose | None = None) -> Array:
         """That matrix, and what is lifted into the camera's view after such thrusts, where that counts."""
         if self.silt is None:
             return gram
         current, _ = self._believed(estimate)
-        silt = self.silt.gram(estimate.X_WB, thrusts_N, np.zeros(3) if current is None else current)
+        silt = self.silt.gram(
+            estimate.X_WB if X_WB is None else X_WB, thrusts_N, np.zeros(3) if current is None else current
+        )
         return gram + self.view.total_weight * silt
 
     def flow(self, estimate: BodyState, thrusts_N: Array) -> Flow | None:

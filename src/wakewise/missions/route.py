@@ -11,7 +11,8 @@ from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Goal
 from wakewise.missions.aim import CameraAim
-from wakewise.missions.orbit import Orbit, camera_pose, camera_twist, layered_orbits
+from wakewise.missions.orbit import camera_pose, camera_twist, layered_orbits
+from wakewise.missions.order import downstream_first
 from wakewise.missions.settings import MissionSettings
 
 SETTLING = "settle"
@@ -146,15 +147,24 @@ class Route:
         return (1 - fraction) * leg.start + fraction * leg.end, rate * (leg.end - leg.start)
 
 
-def plan_route(centre_W_m: Array, settings: MissionSettings) -> Route:
+def plan_route(centre_W_m: Array, settings: MissionSettings, current_W_m_s: Array | None = None) -> Route:
     """Settle, approach, then fly each orbit and the climb to the next; photographs on the orbits only.
+
+    Parameters
+    ----------
+    centre_W_m : ndarray, shape (3,)
+    settings : MissionSettings
+    current_W_m_s : ndarray, shape (3,), optional
+        What is known of the current before the flight, for `settings.order`; None if nothing is.
 
     Raises
     ------
     InputError
         If the flight would take longer than a day.
     """
-    orbits: tuple[Orbit, ...] = layered_orbits(settings)
+    orbits = layered_orbits(settings)
+    if settings.order == "current" and current_W_m_s is not None:
+        orbits = downstream_first(orbits, current_W_m_s)
     far, near = settings.standoff_m + settings.approach_m, settings.standoff_m
     here = np.array([orbits[0].azimuths_rad[0], orbits[0].elevation_rad, far])
     legs: list[Leg] = []

@@ -21,6 +21,11 @@ class MissionSettings(Settings):
     views: tuple[Views, ...] = Field(
         (20, 16, 12), min_length=1, max_length=8, description="photographs on each orbit, evenly spread"
     )
+    order: Literal["plain", "current"] = Field(
+        "plain",
+        description="where orbits begin: plain, in the north; current, downstream of the target by the surveyed "
+        "current, where the vehicle's wash is carried away",
+    )
     aim: Literal["auto", "pitch", "tilt", "both"] = Field(
         "auto",
         description="what aims the camera: the vehicle's pitch, the camera's tilt joint, or the joint to its stops and "

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wakewise.control import MAKERS, make_controller
+from wakewise.control import MAKERS, make_controller, safeguarded
 from wakewise.interfaces import BodyState, Command, Controller, Goal
 from wakewise.operation.pilots import PILOTS
 from wakewise.operation.worlds.makers import WORLDS, flow_name
 from wakewise.plugins import find, offered
 from wakewise.targets import coral_kinds
-from wakewise.wake.models import OWN_MODELS
+from wakewise.wake.models import OWN_MODELS, RIVALS
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
@@ -59,7 +59,7 @@ def _named(scenario: Scenario) -> dict[str, tuple[str, str, Mapping[str, Any]]]:
     """Kind, name and our own ones of each part that a scenario names."""
     return {
         "controller": ("method", scenario.method, MAKERS),
-        "wake": ("wake model", scenario.control.wake.model, dict.fromkeys(OWN_MODELS)),
+        "wake": ("wake model", scenario.control.wake.model, dict.fromkeys((*OWN_MODELS, *RIVALS))),
         "world": ("world", flow_name(scenario), WORLDS),
         "pilot": ("pilot", scenario.pilot, PILOTS),
         "target": ("target", scenario.target.kind, dict.fromkeys(coral_kinds())),
@@ -153,11 +153,13 @@ class Guarded:
 
 
 def guarded(parts: Parts) -> Controller[Any]:
-    """The flight's controller; one from outside with a guard round it, whose backup is `dp`."""
-    controller = parts.controller
+    """The flight's controller with a guard round each step; the backup of one from outside is `dp`.
+
+    The deadline is enforced in a world that says that it does not wait for its controller (see `World`).
+    """
+    controller, vehicle = parts.controller, parts.vehicle
     if is_ours(controller):
-        return controller
-    vehicle = parts.vehicle
+        return safeguarded(controller, vehicle, parts.control, enforce=not getattr(parts.world, "waits", True))
 
     def backup() -> Controller[Any]:
         return make_controller("dp", vehicle, parts.region, parts.wake, parts.control, parts.surroundings)

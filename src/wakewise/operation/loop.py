@@ -58,8 +58,9 @@ def run_loop(
     """Run the loop for `duration_s` at a fixed step.
 
     At each step the estimate of now, which is all a controller may know, meets the goal of now; the resulting thrusts
-    are held for `dt_s`. `start` is the first guess of the estimator, `tilt_rad` that of the camera's tilt. Solve times
-    are thread CPU.
+    are held for `dt_s`. A controller may answer with another goal of the same camera pose (`Command.goal`): that one is
+    recorded, and the camera is aimed by it. `start` is the first guess of the estimator, `tilt_rad` that of the tilt of
+    the camera. Solve times are thread CPU.
     """
     control_state, filter_state = controller.init(), estimator.init(start)
     estimate, thrusts, aim = start, np.zeros(thrusters), getattr(plant, "aim", None)
@@ -70,6 +71,7 @@ def run_loop(
         began = time.thread_time()
         control_state, command = controller.step(control_state, dt_s, estimate, goal)
         solve_s = time.thread_time() - began
+        goal = goal if command.goal is None else command.goal
         truth = witness.observe() if witness is not None else None
         record(
             Step(

@@ -11,6 +11,7 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from wakewise.arrays import Array
 from wakewise.control import ControlSettings, in_pulses, make_controller
 from wakewise.control.settings import flown_by
 from wakewise.errors import InputError
@@ -24,9 +25,10 @@ from wakewise.operation.preflight import Preflight, preflight
 from wakewise.operation.regions import region_of
 from wakewise.operation.seeds import Seeds
 from wakewise.operation.surroundings import surroundings_of, tank_bounds
-from wakewise.operation.survey import found_target
+from wakewise.operation.survey import found_target, surveyed_current
 from wakewise.operation.worlds.makers import make_world
 from wakewise.planning import Surroundings
+from wakewise.tank import build_ambient
 from wakewise.tank.swaying import DRAG, Loose, Yielding
 from wakewise.targets import Region, Sway, Target, find_target
 from wakewise.vehicles import Vehicle
@@ -171,7 +173,15 @@ class Parts:
     @part
     def route(self) -> Route:
         """Where the camera is wished to be, when, and when the shutter opens."""
-        return plan_route(self.found_target.centre_W_m, self.scenario.mission)
+        centre, mission = self.found_target.centre_W_m, self.scenario.mission
+        return plan_route(centre, mission, None if mission.order == "plain" else self.surveyed_current_W_m_s)
+
+    @cached_property
+    def surveyed_current_W_m_s(self) -> Array:
+        """The current at the target, shape (3,), as it is known before the flight."""
+        water_rng, error_rng = self.seeds.current()
+        water = build_ambient(self.scenario.tank, water_rng)
+        return surveyed_current(water, self.found_target.centre_W_m, error_rng)
 
     @part
     def pilot(self) -> Pilot:
@@ -181,7 +191,26 @@ class Parts:
     @cached_property
     def control(self) -> ControlSettings:
         """What the controllers are told: the scenario's settings and who flies, nothing of the water flown in."""
-        return flown_by(self.scenario.control, int(self.seeds.person().integers(2**32)))
+        told = flown_by(self.scenario.control, int(self.seeds.person().integers(2**32)))
+        return told if self._leans else told.without_posture()
+
+    @property
+    def _leans(self) -> bool:
+        """Whether a controller may choose the body's attitude: where the mission leaves it open, and no pilot flies by
+        the body's own place.
+
+        Raises
+        ------
+        InputError
+            If that is asked for and the mission says what aims the camera.
+        """
+        aim, wanted = self.scenario.mission.aim, self.scenario.control.levers.posture
+        if wanted and aim != "auto":
+            raise InputError(
+                f"control.levers.posture: true, but mission.aim is {aim}, which says how the body stands: leave "
+                "mission.aim at auto, or posture at null"
+            )
+        return aim == "auto" and (bool(wanted) or (self.scenario.pilot == "route" and "pilot" not in self.given))
 
     @part
     def wake(self) -> WakeModel:
@@ -242,7 +271,7 @@ class Parts:
 
     @cached_property
     def flying(self) -> Controller[Any]:
-        """The controller as it is flown: one from outside has a guard round it, small thrusts are sent as pulses."""
+        """The controller as it is flown: with a guard round each step, small thrusts sent as pulses."""
         return in_pulses(guarded(self), self.vehicle, self.scenario.control.pulse_s)
 
     @cached_property

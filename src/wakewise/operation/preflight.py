@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ import numpy as np
 from wakewise.errors import InputError
 from wakewise.missions import check_clearance, check_tilt
 from wakewise.operation.surroundings import surroundings_of
+from wakewise.operation.switches import idle_switches
 from wakewise.planning import check_start, state_of
 from wakewise.tank import Holding, holding, tank_ambient
 from wakewise.tank.preflight import check_fit
@@ -19,13 +21,19 @@ from wakewise.vehicles import possible_drags, with_drag
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
 
+log = logging.getLogger(__name__)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Preflight:
-    """What was found: the least clearance of the hull along the route, and the current that must be held."""
+    """What was found: the least clearance of the hull along the route, and the current that must be held.
+
+    `idle` says what is set and cannot act, a sentence each (see `switches.py`).
+    """
 
     clearance_m: float
     holding: Holding | None
+    idle: tuple[str, ...] = ()
 
 
 def preflight(parts: Parts) -> Preflight:
@@ -52,7 +60,10 @@ def preflight(parts: Parts) -> Preflight:
     check_target(parts)
     times_s = np.linspace(0.0, route.duration_s, 400)
     check_fit(scenario.tank, vehicle, [(float(t), route.body(float(t), parts.aim).X_WB) for t in times_s])
-    return Preflight(clearance_m=clearance_m, holding=check_current(parts))
+    idle = () if "controller" in parts.given else idle_switches(scenario, vehicle)
+    for words in idle:
+        log.warning("%s", words)
+    return Preflight(clearance_m=clearance_m, holding=check_current(parts), idle=idle)
 
 
 def check_target(parts: Parts, looks: int = 200) -> None:

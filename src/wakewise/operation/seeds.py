@@ -45,6 +45,11 @@ class Seeds:
         place, camera = self._child(5).spawn(2)
         return place, camera
 
+    def current(self) -> tuple[np.random.Generator, np.random.Generator]:
+        """What the crew sees of the current before the flight: the water's eddies then, and the error."""
+        water, error = np.random.default_rng([self.seed, 13]).spawn(2)
+        return water, error
+
     def person(self) -> np.random.Generator:
         """Who flies by hand."""
         return self._child(6)

@@ -1,18 +1,27 @@
-"""What the crew knows of target and camera before the flight, and how wrong that is."""
+"""What the crew knows of target, camera and current before the flight, and how wrong that is."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from pydantic import Field
 
+from wakewise.arrays import Array
+from wakewise.interfaces import Current
 from wakewise.settings import Settings
 from wakewise.targets import Target
 
 if TYPE_CHECKING:
     from wakewise.imaging import Calibration
+
+CURRENT_DEG = 15.0
+"""Error of the surveyed current's direction, one sigma: what a streamer's swing and a compass beside thrusters leave
+together, an estimate. Its speed is not asked for: only the direction orders the views."""
+WATCHED_S, WATCHED_EVERY_S = 60.0, 0.5
+"""How long the water at the target is watched for it, and how often: several periods of any swell, and many eddies."""
 
 
 class SurveySettings(Settings):
@@ -48,3 +57,20 @@ def known_calibration(true: Calibration, survey: SurveySettings, rng: np.random.
     bend = survey.distortion * np.array([1.0, 2.0, 0.25, 0.25]) * rng.normal(size=4)
     params = np.concatenate([true.params[:2] * (1.0 + focal), true.params[2:4] + centre, true.params[4:] + bend])
     return replace(true, params=params)
+
+
+def surveyed_current(water: Current, place_W_m: Array, rng: np.random.Generator) -> Array:
+    """Current at a place, shape (3,), as the crew knows it before the flight: the mean of a minute, turned by an error.
+
+    Parameters
+    ----------
+    water : Current
+        The water's own motion.
+    place_W_m : ndarray, shape (3,)
+    rng : numpy Generator
+    """
+    times_s = np.arange(0.0, WATCHED_S, WATCHED_EVERY_S)
+    north, east, down = np.mean([water.velocity(place_W_m[None], float(t))[0] for t in times_s], axis=0)
+    turn = math.radians(rng.normal(0.0, CURRENT_DEG))
+    c, s = math.cos(turn), math.sin(turn)
+    return np.array([c * north - s * east, s * north + c * east, down])

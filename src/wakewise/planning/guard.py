@@ -16,7 +16,7 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.errors import InputError, WakewiseError
 from wakewise.planning.planner import Planner, holding_thrusts, shifted
-from wakewise.planning.problem import Horizon, PlanProblem
+from wakewise.planning.problem import CLEARANCE_M, Horizon, PlanProblem
 from wakewise.planning.surroundings import Surroundings
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
@@ -49,7 +49,8 @@ class Guard:
         Seconds; `time.perf_counter` where the world does not wait. In a simulated world, which does, the time of the
         solving thread (`time.thread_time`) gives the same flight on a busy machine.
     counts : dict
-        How often each kind of trouble was met.
+        How often each kind of trouble was met, and how often a goal lay inside the clearance, which a plan keeps even
+        where it is asked to come nearer: the vehicle then stays off its goal for good, which is no trouble but news.
     enforce : bool
         Whether a late plan is left out. A simulated world waits for its controller; there a late plan is counted and
         flown, so that the same seed gives the same flight whether or not the machine was busy or had to compile.
@@ -89,6 +90,9 @@ class Guard:
             else:
                 trouble = ("late", words)
         if trouble is None:
+            if self.planner.crowded:
+                words = f"goal inside clearance: nearer than {1e3 * CLEARANCE_M:.0f} mm, plans stay off it"
+                self.count("goal inside clearance", words)
             return Guarded(plan, 0.0, None)
         words = self.count(*trouble)
         if previous is not None and age_s <= USABLE_SHARE * stage_s * len(previous.commands_N):

@@ -355,6 +355,11 @@ class Planner:
             return None
         return np.asarray(np.clip(U + shifts, model.table.lower, model.table.upper))
 
+    @property
+    def crowded(self) -> bool:
+        """Whether the last problem's goal lay nearer to something than the clearance, so that its plan stays off it."""
+        return bool(self._case.barrier[1] <= CLEARANCE_M)
+
     def _answer(self, U: Array, J: float, done: int, converged: bool, solver: str) -> Horizon:
         if self._predicted is not U:
             self.cost(U)

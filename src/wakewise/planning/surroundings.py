@@ -8,6 +8,7 @@ import numpy as np
 
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
+from wakewise.targets import Region
 
 TANK_FACES = ("the south wall", "the west wall", "the water surface", "the north wall", "the east wall", "the floor")
 """Names of the planes of `Surroundings.tank`, in their order."""
@@ -53,6 +54,16 @@ class Surroundings:
             return self.names[number]
         planes = len(self.planes)
         return f"plane {number + 1}" if number < planes else f"sphere {number - planes + 1}"
+
+
+def around_target(region: Region) -> Surroundings:
+    """The sphere round the region's surface points, which is all that a region tells of its surroundings."""
+    surface = region.points_W_m[region.distance_m <= 0.0]
+    if len(surface) == 0:
+        return Surroundings()
+    middle = 0.5 * (surface.min(axis=0) + surface.max(axis=0))
+    radius = float(np.linalg.norm(surface - middle, axis=1).max())
+    return Surroundings(spheres=np.array([[*middle, radius]]))
 
 
 def covering_spheres(points_W_m: Array, most_radius_m: float = 0.15, most: int = 12) -> Array:

@@ -28,7 +28,7 @@ Coordinate = Annotated[float, Field(ge=-5.0, le=5.0)]
 class Block(Settings):
     """One block of ballast on the vehicle, which everybody knows of."""
 
-    float_N: float = Field(ge=-500.0, le=500.0, description="what it lifts in water, a negative one is lead")
+    float_N: float = Field(ge=-5000.0, le=5000.0, description="what it lifts in water, a negative one is lead")
     at_B_m: tuple[Coordinate, Coordinate, Coordinate] | None = Field(
         None, description="where, in the body frame; null: at the centre of buoyancy"
     )
@@ -88,8 +88,8 @@ def ballasted(vehicle: Vehicle, float_N: float, shift_mm: float = 0.0) -> Vehicl
     InputError
         If `float_N` is not within what a block may have.
     """
-    if not abs(float_N) <= 500.0:
-        raise InputError(f"ballast: {float_N:g} N, a block has -500 to 500 N")
+    if not abs(float_N) <= 5000.0:
+        raise InputError(f"ballast: {float_N:g} N, a block has -5000 to 5000 N")
     shifted = replace(vehicle, p_BG_m=vehicle.p_BG_m + np.array([1e-3 * shift_mm, 0.0, 0.0]))
     return with_blocks(shifted, [Block(float_N=float_N)])
 

@@ -12,13 +12,15 @@ fitted to a flow (`wakewise wake fit`), which any scenario file can carry instea
 - `jet`: the momentum-conserving round jet, numbers from the literature (`RoundJet`).
 - `jet-fitted`: a Gaussian of a propeller's width (`RoundJet.of_propeller`) from the disk on, with the exit speed
   sqrt(T / (rho A)) at its middle and momentum T / rho: x0 = K sqrt(A) = 3.33 D and b0 = R sqrt(2) = 0.707 D.
+- `learned`: a rival, a small network trained on the tank's water and the lattice (`wakewise.wake.learned`); it takes no
+  numbers, and its derivatives are differences.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -30,6 +32,7 @@ from wakewise.settings import Settings
 from wakewise.wake.cones import PaperJet, PowerJet
 from wakewise.wake.floor import FloorJet
 from wakewise.wake.jets import AxialJet, GaussianJet, RoundJet
+from wakewise.wake.learned import learned_wake
 
 ModelName = Literal["paper", "paper-calibrated", "fitted", "linear", "jet", "jet-fitted"]
 """Our own models."""
@@ -107,7 +110,8 @@ class WakeSettings(Settings):
     @model_validator(mode="after")
     def _only_numbers_of_the_model(self) -> Self:
         recipe = _RECIPES.get(self.model, _FOREIGN)
-        if recipe is _FOREIGN and self.model not in offered("wake model") and ":" not in self.model:
+        known = self.model in RIVALS or self.model in offered("wake model") or ":" in self.model
+        if recipe is _FOREIGN and not known:
             raise ValueError(f"wake model '{self.model}': unknown, allowed: {', '.join(model_names())}")
         for name in type(self).model_fields:
             unknown = name not in recipe.numbers and name in _NUMBERS and getattr(self, name) is not None
@@ -120,6 +124,9 @@ class WakeSettings(Settings):
 OWN_MODELS: tuple[str, ...] = tuple(_RECIPES)
 """Names of our own models."""
 
+RIVALS: tuple[str, ...] = ("learned",)
+"""Models that come with the package and are none of our own: trained on the water that they may be judged in."""
+
 _FOREIGN = _Recipe(PaperJet, {})
 """What a model from outside takes from the settings: nothing; it brings its own numbers, and its own floor."""
 
@@ -127,8 +134,8 @@ _NUMBERS = frozenset(name for recipe in _RECIPES.values() for name in recipe.num
 
 
 def model_names() -> tuple[str, ...]:
-    """Names of the wake models: ours, then those that installed packages offer."""
-    return tuple(names("wake model", _RECIPES))
+    """Names of the wake models: ours, the rivals that come with them, then those that installed packages offer."""
+    return tuple(names("wake model", dict.fromkeys((*_RECIPES, *RIVALS))))
 
 
 def wake_model(which: str | WakeSettings, bed_z_m: float | None = None) -> WakeModel:
@@ -155,10 +162,14 @@ def wake_model(which: str | WakeSettings, bed_z_m: float | None = None) -> WakeM
     (1, 1, 3)
     """
     if isinstance(which, str):
+        if which in RIVALS:
+            return learned_wake()
         if which not in _RECIPES:
             return _from_outside(which)
         recipe = _RECIPES[which]
         return recipe.make(**recipe.numbers)
+    if which.model in RIVALS:
+        return learned_wake(_bed(which, bed_z_m))
     if which.model not in _RECIPES:
         return _from_outside(which.model)
     recipe = _RECIPES[which.model]
@@ -167,14 +178,19 @@ def wake_model(which: str | WakeSettings, bed_z_m: float | None = None) -> WakeM
     if which.edge_width_deg > 0.0:
         numbers["edge_width_rad"] = float(np.deg2rad(which.edge_width_deg))
     jet = recipe.make(**numbers)
-    if not which.floor:
-        return jet
-    if bed_z_m is None:
+    floor_z_m = _bed(which, bed_z_m)
+    return jet if floor_z_m is None else FloorJet(jet=jet, bed_z_m=floor_z_m)
+
+
+def _bed(which: WakeSettings, bed_z_m: float | None) -> float | None:
+    """Depth of the bed that jets run out along; None where they are wanted free."""
+    if which.floor and bed_z_m is None:
         raise InputError(f"wake model {which.model}: floor is set but there is no bed, allowed: give the bed's depth")
-    return FloorJet(jet=jet, bed_z_m=bed_z_m)
+    return bed_z_m if which.floor else None
 
 
 def _from_outside(name: str) -> WakeModel:
     """A model that an installed package offers (entry points `wakewise.wake_models`), or `package.module:make`."""
-    make: Callable[[], WakeModel] = find("wake model", name, _RECIPES).maker  # type: ignore[assignment]
+    own: dict[str, Any] = dict.fromkeys((*_RECIPES, *RIVALS))
+    make: Callable[[], WakeModel] = find("wake model", name, own).maker
     return make()

@@ -58,9 +58,13 @@ def run(options: BenchOptions) -> dict[str, Any]:
     words = f"{len(trials)} flights, some {expected / 60.0 / options.workers:.0f} min of {options.workers} free cores"
     options.progress(0, max(len(trials), 1), words)
     rows, failures, kept = side_by_side.fly_all(trials, fly_trial, store, options, _pool)
-    papers, lost, known = side_by_side.fly_all(
-        paper_trials(methods, options.seeds) if with_paper else {}, fly_paper, store, options, _pool
-    )
+    papers: dict[Key, Row] = {}
+    lost: list[Failure] = []
+    known = 0
+    if with_paper:
+        papers, lost, known = side_by_side.fly_all(
+            paper_trials(methods, options.seeds), fly_paper, store, options, _pool
+        )
     failed = {(failure.name, (failure.flow, failure.seed)) for failure in failures}
     trims = {(scenario, seed): trim_of(scenario, seed) for scenario, _, seed in trials}
     return {

@@ -1,0 +1,235 @@
+"""The attitude of a body whose camera tilts: leaned as its thrusters like it, under a camera that keeps its pose.
+
+A camera on a joint gives back what a fixed one takes: the mission says where the camera is and where it looks, and the
+body may pitch about the joint's hinge as far as the stops allow. That is a redundancy beside that of the thrusters.
+Pitched, a heavy vehicle's weight lies partly along its level thrusters, and which way their jets go, and from where,
+changes with the angle; what it costs is the moment with which the vehicle rights itself.
+
+A *lean* is the angle by which the joint stands above the mission's. The hinge turns the body the other way:
+
+    X_WB' = X_WB S(-lean),   S(a) the turn by a about the joint's axis through its hinge, in B,
+
+whatever the tilt is, since turns about one axis add up: X_BC(tilt) = S(tilt) X_BC(0). The camera's pose
+X_WB' X_BC(tilt + lean) = X_WB X_BC(tilt) is the mission's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wakewise.allocation import Layout, Weights, compile_layout, gentle_allocation, least_thrusts
+from wakewise.arrays import Array, freeze
+from wakewise.control.loop import FULL
+from wakewise.control.watch import Watch
+from wakewise.geometry import Pose, quat_from_rotvec
+from wakewise.interfaces import BodyState, Goal
+from wakewise.planning import Surroundings
+from wakewise.planning.barrier import least_gap
+from wakewise.planning.problem import CLEARANCE_M
+from wakewise.vehicles import RigidBody, TiltJoint, Vehicle, compile_body, restoring_wrench
+from wakewise.vehicles.dynamics import coriolis_wrench, damping_wrench
+
+STEP_RAD = float(np.radians(5.0))
+"""Distance between the leans that are compared: half a metre on, a jet moves by 4 cm, less than its own width there."""
+RESERVE = 0.8
+"""Share of the thrusters' limits that holding a posture may take; the rest is the tracker's."""
+RATE_RAD_S, ACCELERATION_RAD_S2 = 0.08, 0.04
+"""How fast a lean changes, and how fast that. The body's middle goes round a hinge at most a quarter of a metre away:
+at 2 cm/s, a third of a mission's speed on its orbits, with 1 cm/s2, a fifth of the acceleration of a mission's legs, so
+that a change of posture asks for less than the mission itself does."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Hinge:
+    """A camera's mount at no tilt and the joint that turns it, as a change of posture needs them."""
+
+    X_BC: Pose
+    joint: TiltJoint
+
+    def span(self, tilt_rad: float) -> tuple[float, float]:
+        """Least and largest lean that the stops allow a camera that the mission tilts so; they hold zero."""
+        return min(self.joint.low_rad - tilt_rad, 0.0), max(self.joint.high_rad - tilt_rad, 0.0)
+
+    def posed(self, goal: Goal, lean_rad: float, rate_rad_s: float = 0.0) -> Goal:
+        """The goal with another attitude and tilt, the camera's pose and motion as they were.
+
+        Parameters
+        ----------
+        goal : Goal
+        lean_rad, rate_rad_s : float
+            By how much the joint stands above the goal's tilt, and how fast that grows.
+
+        Returns
+        -------
+        Goal
+            Its twist is the derivative of its pose: the old one seen from the new frame, and the turn of the body
+            about the hinge, against the joint's.
+        """
+        if lean_rad == 0.0 and rate_rad_s == 0.0:
+            return goal
+        axis = self.X_BC.R[:, 0]
+        pivot = self.X_BC.p_m if self.joint.p_BJ_m is None else self.joint.p_BJ_m
+        turn = Pose(np.zeros(3), quat_from_rotvec(-lean_rad * axis))
+        R = turn.R
+        shift = pivot - R @ pivot
+        v, omega = goal.nu_B[:3], goal.nu_B[3:]
+        # Of the new origin, still in the old frame; then in the new one, and the turn about the pivot.
+        nu = np.concatenate([R.T @ (v + np.cross(omega, shift)), R.T @ omega])
+        nu += rate_rad_s * np.concatenate([np.cross(axis, pivot), -axis])
+        return replace(goal, X_WB=goal.X_WB @ Pose(shift, turn.q), nu_B=nu, tilt_rad=goal.tilt_rad + lean_rad)
+
+
+def eased(lean_rad: float, rate_rad_s: float, wished_rad: float, dt_s: float) -> tuple[float, float]:
+    """Lean and its rate a step later on the way to a wished lean at rest, within `RATE_RAD_S` and its own change.
+
+    The rate aimed at is the one from which the rest of the way just suffices to stop.
+    """
+    left = wished_rad - lean_rad
+    most = ACCELERATION_RAD_S2 * dt_s
+    if abs(left) <= most * dt_s and abs(rate_rad_s) <= most:
+        return wished_rad, 0.0
+    # Half a step's change is lost to steps being steps.
+    stops = float(np.sqrt(0.25 * most**2 + 2.0 * ACCELERATION_RAD_S2 * abs(left))) - 0.5 * most
+    aimed = min(RATE_RAD_S, stops, abs(left) / dt_s)
+    rate = rate_rad_s + float(np.clip(np.copysign(aimed, left) - rate_rad_s, -most, most))
+    return lean_rad + 0.5 * (rate_rad_s + rate) * dt_s, rate
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Hold:
+    """What is to be held: a goal, and the load on the vehicle there.
+
+    `force_W_N`, shape (3,), keeps its direction in the world (trim, current, cable), `moment_B_Nm`, shape (3,), in the
+    body; `watch` is the water that counts, and `estimate` tells of its current.
+    """
+
+    goal: Goal
+    force_W_N: Array
+    moment_B_Nm: Array
+    watch: Watch
+    estimate: BodyState
+
+    def __post_init__(self) -> None:
+        freeze(self, force_W_N=(3,), moment_B_Nm=(3,))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Price:
+    """What holding a posture costs: the allocators' own cost, and the power that it takes but for a factor, N^1.5.
+
+    An ideal propeller's power is T^1.5 / sqrt(2 rho A) (momentum theory). Both are infinite where it is not to be had.
+    """
+
+    cost: float
+    power: float
+
+
+NOT_TO_BE_HAD = Price(cost=np.inf, power=np.inf)
+NEAR = 4.0
+"""Postures that cost at most this many times the least are as good as the least: no wake model of ours knows the speeds
+of the water within a factor of two (docs/decisions/0014), and cost goes with their square."""
+MOST_POWER = 2.0
+"""A posture may take this many times the power of the mission's own. Where wash is carried off by a current or has
+nothing to disturb, wake models still find it, and a vehicle that hovers for nearly nothing would lean for it."""
+WORTH = 0.1
+"""Share of the power, or of the bound on the cost, by which another posture must be better than the present one."""
+
+
+def chosen(prices: Sequence[Price], own: int, present: int) -> int:
+    """Which of some postures to take: of those that cost about the least, the one of least power.
+
+    Thrusts are known, what they do to the water is known roughly: so what seems to be twice as gentle decides, and
+    below that the battery does. The present one stays while it is about as good by both.
+
+    Parameters
+    ----------
+    prices : sequence of Price
+    own, present : int
+        Numbers of the mission's own posture and of the present one.
+    """
+    most = MOST_POWER * prices[own].power
+    usable = [k for k, price in enumerate(prices) if price.power <= most and np.isfinite(price.cost)]
+    if not usable:
+        return own
+    least = NEAR * min(prices[k].cost for k in usable)
+    best = min((k for k in usable if prices[k].cost <= least), key=lambda k: prices[k].power)
+    cost, power = prices[present].cost, prices[present].power
+    stays = cost <= (1.0 + WORTH) * least and (1.0 - WORTH) * power <= min(prices[best].power, most)
+    return present if stays else best
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scale:
+    """What a posture is weighed by: the nominal vehicle, what it may not touch, and the allocators' own weights.
+
+    `half_m`, shape (3,), is half the hull's size; `layout` has the thrusters' limits less the tracker's reserve.
+    """
+
+    hinge: Hinge
+    body: RigidBody
+    layout: Layout
+    half_m: Array
+    around: Surroundings
+    w_disturbance: float
+    w_effort: float
+
+    @classmethod
+    def of(cls, vehicle: Vehicle, joint: TiltJoint, around: Surroundings, weights: tuple[float, float]) -> Scale:
+        """For a vehicle with this joint, and weights of disturbance (of its weighted mean) and effort."""
+        lower, upper = RESERVE * vehicle.thrust_lower_N, RESERVE * vehicle.thrust_upper_N
+        return cls(
+            hinge=Hinge(X_BC=vehicle.X_BC, joint=joint),
+            body=compile_body(vehicle),
+            layout=compile_layout(vehicle.allocation_matrix, lower, upper),
+            half_m=0.5 * np.asarray(vehicle.size_m),
+            around=around,
+            w_disturbance=weights[0],
+            w_effort=weights[1],
+        )
+
+    def leans(self, goal: Goal) -> tuple[float, ...]:
+        """Leans to compare: whole steps between the stops, and the stops."""
+        low, high = self.hinge.span(goal.tilt_rad)
+        steps = STEP_RAD * np.arange(np.ceil(low / STEP_RAD), np.floor(high / STEP_RAD) + 1.0)
+        return tuple(float(lean) for lean in np.unique(np.concatenate([[low], steps, [0.0], [high]]).round(9)))
+
+    def price(self, hold: Hold, lean_rad: float) -> Price:
+        """What the gentlest thrusts that hold a posture cost; `NOT_TO_BE_HAD` where there are none.
+
+        That is: where the hull would come nearer to anything than `CLEARANCE_M` and than the mission's own attitude
+        has it, or the thrusters' limits do not suffice. The wrench is the tracker's feed-forward: against weight,
+        buoyancy and the moment that rights the vehicle, against the drag of the goal's own motion and the load.
+        """
+        goal = self.hinge.posed(hold.goal, lean_rad)
+        if lean_rad != 0.0 and self.gap_m(goal) < min(CLEARANCE_M, self.gap_m(hold.goal)):
+            return NOT_TO_BE_HAD
+        nu = np.array(goal.nu_B)
+        wrench = -restoring_wrench(self.body, goal.X_WB.q) - damping_wrench(self.body, nu)
+        wrench -= coriolis_wrench(self.body, nu)
+        wrench[:3] -= goal.X_WB.R.T @ hold.force_W_N
+        wrench[3:] -= hold.moment_B_Nm
+        if not np.isfinite(wrench).all():
+            return NOT_TO_BE_HAD
+        # How far each jet gets is guessed by the least thrusts of the posture, not by those of the present one.
+        guess = least_thrusts(self.layout, wrench).thrusts_N
+        G = hold.watch.gram(hold.estimate, guess, goal.X_WB)
+        if not np.isfinite(G).all():
+            return NOT_TO_BE_HAD
+        G = hold.watch.with_silt(G, hold.estimate, guess, goal.X_WB)
+        weights = Weights(disturbance=self.w_disturbance / hold.watch.view.total_weight, effort=self.w_effort)
+        found = gentle_allocation(self.layout, wrench, G, weights)
+        if found.scale < FULL or found.disturbance is None:
+            return NOT_TO_BE_HAD
+        T = found.thrusts_N
+        return Price(
+            cost=weights.disturbance * found.disturbance + weights.effort * float(T @ T),
+            power=float(np.sum(np.abs(T) ** 1.5)),
+        )
+
+    def gap_m(self, goal: Goal) -> float:
+        """Least distance of the hull from what it may not touch."""
+        around, X_WB = self.around, goal.X_WB
+        return float(least_gap(X_WB.p_m, X_WB.R, self.half_m, around.planes, around.spheres))

@@ -1,0 +1,68 @@
+"""How much power gentle shares may cost: more where there is something to save, next to nothing where there is not.
+
+Sparing a target means load on fewer thrusters, and those need more power for the same wrench, up to 1.7 times. That is
+bought where the least thrusts would stir the target's water, and wasted where they would not. So the bound on power,
+over that of the least thrusts, goes with the speed that these would leave at the target, by the wake model and what it
+is known to be wrong by: `CALM` up to `CALM_M_S`, `TROUBLE` from `TROUBLE_M_S`, straight in between. The numbers were
+set beforehand: a flight may cost 1.3 times the energy of `dp` where that leaves more than 10 mm/s, 1.05 times where it
+leaves less than 5 (docs/decisions/0036). Of what lies above 1, a twentieth stays for what the bound does not see:
+pulses, the lag of rotors, corrections between two searches.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wakewise.allocation import Allocation, Layout, PowerLaw, Weights, gentle_allocation, least_thrusts, within_power
+from wakewise.arrays import Array
+from wakewise.thrusters import electrical_power_W
+from wakewise.vehicles import Vehicle
+
+KEPT = 0.95
+"""Share of the extra power of a whole flight that the bound of an instant hands out: with a bound of 1.3 two flights
+cost 1.307 and 1.299 times the energy of `dp`."""
+CALM, TROUBLE = 1.0 + KEPT * 0.05, 1.0 + KEPT * 0.3
+"""Most power over that of the least thrusts, where these leave the target's water calm, and where they do not."""
+CALM_M_S, TROUBLE_M_S = 0.005, 0.010
+TOO_FAST = 7.5
+"""How many times too fast the wake model has the target's water under the least thrusts, with the floor and jets that
+meet: the median over six hovers of `dp` in five worlds (2.9 to 10, and 60 where the current took the wash away)."""
+
+
+def allowed(speed_m_s: float) -> float:
+    """Most power over that of the least thrusts, if these leave a mean speed at the target."""
+    return float(np.interp(speed_m_s, (CALM_M_S, TROUBLE_M_S), (CALM, TROUBLE)))
+
+
+def power_law(vehicle: Vehicle) -> PowerLaw:
+    """Electrical power of a vehicle's thrusters as it is believed; below their least thrusts they run in pulses."""
+    one = np.ones(len(vehicle.thrusters))
+    forward_N, reverse_N = vehicle.least_thrusts_N
+    return PowerLaw(
+        forward=electrical_power_W(one, vehicle.disk_areas_m2),
+        reverse=electrical_power_W(-one, vehicle.disk_areas_m2),
+        least_forward_N=forward_N,
+        least_reverse_N=reverse_N,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sharer:
+    """Gentle shares of a wrench, within the bound on power if there is a power law."""
+
+    layout: Layout
+    law: PowerLaw | None = None
+
+    def shares(
+        self, wrench_B: Array, gram: Array, weights: Weights, total_weight: float, previous_N: Array | None = None
+    ) -> Allocation:
+        """Thrusts of least cost; arguments as for `gentle_allocation`, `total_weight` that of the points behind D."""
+        found = gentle_allocation(self.layout, wrench_B, gram, weights, previous_N)
+        if self.law is None:
+            return found
+        least = least_thrusts(self.layout, wrench_B, gram)
+        speed_m_s = float(np.sqrt(max(least.disturbance or 0.0, 0.0) / total_weight)) / TOO_FAST
+        most_W = allowed(speed_m_s) * float(self.law.power_W(least.thrusts_N))
+        return within_power(self.layout, found, least.thrusts_N, self.law, most_W, gram, weights, previous_N)

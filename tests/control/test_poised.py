@@ -1,0 +1,141 @@
+"""A controller that chooses the body's attitude, round one that flies it."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from posture_helpers import CENTRE, HEAVY, OPEN, VEHICLE, believed, looking, region
+
+from wakewise.control import ControlSettings, make_controller
+from wakewise.control.poised import Poised
+from wakewise.control.posture import RATE_RAD_S
+from wakewise.errors import InputError
+from wakewise.geometry import Pose, quat_from_euler
+from wakewise.interfaces import BodyState, Command, Goal
+from wakewise.vehicles import load_vehicle
+
+DT = 0.02
+
+
+def make(vehicle=HEAVY, method="instant", **levers) -> Poised:
+    settings = ControlSettings(levers={"drift": False, **levers})
+    return make_controller(method, vehicle, region(), believed(), settings, OPEN)
+
+
+def loaded(goal, down_N):
+    """An estimate that sits on its goal and is pulled down."""
+    load = np.concatenate([goal.X_WB.R.T @ np.array([0.0, 0.0, down_N]), np.zeros(3)])
+    return BodyState(X_WB=goal.X_WB, nu_B=goal.nu_B, load_B=load)
+
+
+def flown(controller, goal_at, seconds, down_N):
+    """The commands of a flight in which the vehicle is always where it should be."""
+    state, posed, commands = controller.init(), goal_at(0.0), []
+    for k in range(round(seconds / DT)):
+        state, command = controller.step(state, DT, loaded(posed, down_N), goal_at(k * DT))
+        posed = command.goal or goal_at(k * DT)
+        commands.append(command)
+    return state, commands
+
+
+def test_only_a_camera_with_a_joint_is_posed_and_a_wish_that_cannot_be_is_refused():
+    """Null is where there is a joint; false nowhere; true on a fixed camera is refused by its field."""
+    assert isinstance(make(), Poised) and isinstance(make(posture=True), Poised)
+    assert not isinstance(make(posture=False), Poised)
+    assert not isinstance(make(vehicle=load_vehicle("paper")), Poised)
+    with pytest.raises(InputError, match=r"control\.levers\.posture.*no joint"):
+        make(vehicle=load_vehicle("paper"), posture=True)
+
+
+def test_heavy_it_leans_and_the_camera_keeps_its_pose_on_the_way():
+    """To 1e-9 at every step; no faster than its rate; the joint within its stops; the goal's twist its own change."""
+    goal = looking(HEAVY, np.radians(20.0))
+    state, commands = flown(make(), lambda _: goal, 12.0, 5.0)
+    assert abs(state.lean_rad) > np.radians(4.0)
+    wished = goal.X_WB @ HEAVY.X_BC_at(goal.tilt_rad)
+    for before, after in pairwise(commands):
+        camera = after.goal.X_WB @ HEAVY.X_BC_at(after.goal.tilt_rad)
+        np.testing.assert_allclose(camera.p_m, wished.p_m, atol=1e-9)
+        np.testing.assert_allclose(camera.R, wished.R, atol=1e-9)
+        assert HEAVY.tilt.low_rad <= after.goal.tilt_rad <= HEAVY.tilt.high_rad
+        assert abs(after.goal.tilt_rad - before.goal.tilt_rad) <= RATE_RAD_S * DT + 1e-12
+        moved = after.goal.X_WB.p_m - before.goal.X_WB.p_m
+        mean_W = 0.5 * (before.goal.X_WB.R @ before.goal.nu_B[:3] + after.goal.X_WB.R @ after.goal.nu_B[:3])
+        np.testing.assert_allclose(moved, DT * mean_W, atol=5e-6)  # the last step of a way is rounded
+
+
+def test_neutral_in_still_water_it_stays_level():
+    """Whatever it weighs, the goal that it flies is the mission's."""
+    goal = looking(VEHICLE, np.radians(40.0))
+    state, commands = flown(make(VEHICLE), lambda _: goal, 4.5, 0.0)
+    assert state.lean_rad == 0.0 and all(c.goal is goal for c in commands)
+
+
+def test_a_mission_that_tilts_to_a_stop_takes_the_lean_with_it():
+    """The joint stays between its stops while the mission's own tilt runs faster than a lean may change."""
+    low = HEAVY.tilt.low_rad
+    start = looking(HEAVY, 0.0, tilt=0.0)
+
+    def goal_at(t):
+        tilt = max(low, -0.2 * max(t - 8.0, 0.0))
+        X_WC = start.X_WB @ HEAVY.X_BC_at(0.0)
+        down = Pose(np.zeros(3), quat_from_euler(tilt, 0.0, 0.0))  # the camera's first axis is its right
+        return Goal(X_WB=X_WC @ down @ HEAVY.X_BC_at(tilt).inverse(), tilt_rad=tilt)
+
+    controller = make()
+    pushed = replace(controller.init(), wished_rad=low, round=None)
+    state, tilts = pushed, []
+    for k in range(700):
+        goal = goal_at(k * DT)
+        # It always wishes to the lower stop.
+        state, command = controller.step(replace(state, wished_rad=low, round=None), DT, loaded(goal, 0.0), goal)
+        tilts.append(command.goal.tilt_rad)
+    assert min(tilts) >= low - 1e-12 and tilts[-1] == pytest.approx(low) and state.lean_rad == pytest.approx(0.0)
+
+
+def test_what_is_not_finite_reaches_the_inner_controller_as_it_is():
+    """A goal that is not finite is handed on; with an estimate that is not, the lean stays and nothing is chosen."""
+    goal = looking(HEAVY, np.radians(20.0))
+    controller = make()
+    state, _ = flown(controller, lambda _: goal, 8.0, 5.0)
+    lost = BodyState(X_WB=goal.X_WB)
+    object.__setattr__(lost, "load_B", np.full(6, np.nan))
+    after, command = controller.step(state, DT, lost, goal)
+    assert after.wished_rad == state.wished_rad and command.goal is not None
+    bad = Goal(X_WB=goal.X_WB, tilt_rad=goal.tilt_rad)
+    object.__setattr__(bad, "nu_B", np.full(6, np.nan))
+    _, command = controller.step(state, DT, loaded(goal, 5.0), bad)
+    assert command.goal is None and "not finite" in command.fallback
+
+
+@pytest.mark.parametrize("method", ["instant", "wake-aware"])
+def test_both_gentle_methods_are_posed_and_none_of_the_others(method):
+    """`dp` and the planner that spares nothing fly the mission's own attitude."""
+    assert isinstance(make(method=method), Poised) and make(method=method).name == method
+    for other in ("dp", "unaware", "bow-rule"):
+        assert not isinstance(make(method=other), Poised)
+
+
+def test_the_inner_controller_sees_the_posed_goal():
+    """What it is asked to fly is what the command tells the camera's joint."""
+
+    class Notes:
+        name = "notes"
+
+        def __init__(self):
+            self.goals = []
+
+        def init(self):
+            return None
+
+        def step(self, state, dt_s, estimate, goal):
+            self.goals.append(goal)
+            return state, Command(thrusts_N=np.zeros(8), wrench_B=np.zeros(6))
+
+    notes = Notes()
+    controller = replace(make(), inner=notes)
+    goal = looking(HEAVY, np.radians(20.0), range_m=0.5)
+    _, commands = flown(controller, lambda _: goal, 6.0, 5.0)
+    assert all(seen is told.goal for seen, told in zip(notes.goals, commands, strict=True))
+    assert np.linalg.norm(goal.X_WB.p_m - CENTRE) > 0.5
