@@ -218,7 +218,6 @@ class Scale:
         G = hold.watch.gram(hold.estimate, guess, goal.X_WB)
         if not np.isfinite(G).all():
             return NOT_TO_BE_HAD
-        G = hold.watch.with_silt(G, hold.estimate, guess, goal.X_WB)
         weights = Weights(disturbance=self.w_disturbance / hold.watch.view.total_weight, effort=self.w_effort)
         found = gentle_allocation(self.layout, wrench, G, weights)
         if found.scale < FULL or found.disturbance is None:
