@@ -123,10 +123,11 @@ def test_sway_is_judged_at_the_shutter_and_its_peaks_over_all():
     columns = {
         "sway_m": 1.5 * swing, "sway_peak_m": 4.0 * swing + (np.arange(n) == 7) * 0.1, "sway_x_m": swing,
         "sway_y_m": 0.0 * swing, "sway_z_m": 0.0 * swing, "target_stress_Pa": 1e6 * swing,
-        "shifted_m": np.linspace(0.0, 0.02, n),
+        "shifted_m": np.linspace(0.0, 0.02, n), "sway_wash_m": 0.5 * swing,
     }  # fmt: skip
     figures = flight_figures(table(exposing=exposing, **columns))
     assert figures["sway_rms_mm"] == pytest.approx(1.5 * np.sqrt(5.0))
+    assert figures["sway_wash_mm"] == pytest.approx(0.5 * np.sqrt(5.0))
     assert figures["sway_mean_mm"] == pytest.approx(2.0)
     assert figures["sway_about_mean_mm"] == pytest.approx(1.0)
     assert figures["sway_peak_mm"] == pytest.approx(112.0)

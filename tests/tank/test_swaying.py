@@ -243,6 +243,27 @@ def test_too_stiff_and_too_soft_are_refused_with_the_figures():
     check_sway(rod(), good, 1.2, np.array([0.1, 0.0, 0.0]), WATER, DT)
 
 
+class Pushed(Stream):
+    """A stream, and jets that add to it."""
+
+    def jets(self, points):
+        return np.tile([0.0, 0.05, 0.0], (len(points), 1))
+
+
+def test_what_the_wash_adds_is_told_apart_from_the_current():
+    """None of it in a current alone, however it sways; all that jets add to the same current with them."""
+    stream = Stream(lambda t: np.array([0.1 * np.sin(2.0 * t), 0.02, 0.0]), steady=False)
+    alone = swaying(rod(), tissue(), stream)
+    go_on(alone, stream, 3.0)
+    assert alone.posture().sway_m > 0.0
+    assert alone.posture().sway_wash_m == 0.0
+    pushed = swaying(rod(), tissue(), stream)
+    go_on(pushed, Pushed(lambda t: np.array([0.1 * np.sin(2.0 * t), 0.02, 0.0]), steady=False), 3.0)
+    np.testing.assert_array_equal(pushed.alone_m, alone.tips_m)
+    far = np.linalg.norm(pushed.tips_m - alone.tips_m)
+    assert 0.0 < pushed.posture().sway_wash_m == pytest.approx(0.4 * far, rel=0.35)
+
+
 def test_the_posture_tells_of_the_surface():
     """Root mean square, peak and mean way are those of a bent rod; a rigid one that lies loose has none."""
     stream = Stream([0.1, 0.0, 0.0])

@@ -11,7 +11,6 @@ from wakewise.control.levers import with_bed_points
 from wakewise.control.loop import TrackingController, vehicle_layout
 from wakewise.control.poised import poised
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
-from wakewise.control.silt import silt_view
 from wakewise.control.spare import meeting_view, sharer_of
 from wakewise.control.tracker import make_tracker
 from wakewise.control.watch import Watch
@@ -66,6 +65,6 @@ def instant(
     seen = with_bed_points(region, levers, bed_of(wake))
     controller = instant_allocator(vehicle, seen, wake, settings)
     view = meeting_view(controller.view, vehicle_layout(vehicle)) if levers.meet else controller.view
-    watch = Watch(view=view, levers=levers, silt=silt_view(vehicle, region, wake, levers))
+    watch = Watch(view=view, levers=levers)
     spared = replace(controller, view=view, watch=watch)
     return poised(spared, watch, vehicle, settings, around or around_target(region))

@@ -8,7 +8,7 @@ states.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -52,10 +52,6 @@ class LeverSettings(Settings):
     )
     drift_m_s: Velocity | None = Field(
         default=None, description="that current, north, east, down, if it is stated; null: as the estimator finds it"
-    )
-    silt: Literal["none", "silt", "fresh-mud", "fluff"] = Field(
-        default="none",
-        description="also count what jets lift from such a bed into the camera's view; none: sand, clear, or not",
     )
 
     @model_validator(mode="after")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wakewise.allocation import Allocation, Layout, compile_layout, disturbance_of
+from wakewise.allocation import Allocation, Layout, compile_layout
 from wakewise.arrays import Array, freeze
 from wakewise.control.tracker import Tracker, TrackerState
 from wakewise.control.watch import Watch
@@ -79,12 +79,10 @@ class TrackingController:
         gram = self.view.gram(estimate.X_WB) if watch is None else watch.gram(estimate, state.thrusts_N)
         usable = bool(np.isfinite(gram).all())
         fallback = None if usable else "wake model not finite: least thrusts"
-        cost = gram if watch is None or not usable else watch.with_silt(gram, estimate, state.thrusts_N)
-        found = self.allocate(wrench, cost if usable else None, state.thrusts_N)
+        found = self.allocate(wrench, gram if usable else None, state.thrusts_N)
         if found.scale < FULL and fallback is None:
             fallback = f"thrusters saturated: {100.0 * found.scale:.0f} % of the wrench"
-        D = None if found.disturbance is None else disturbance_of(gram, found.thrusts_N)
-        command = Command(thrusts_N=found.thrusts_N, wrench_B=wrench, disturbance=D, fallback=fallback)
+        command = Command(thrusts_N=found.thrusts_N, wrench_B=wrench, disturbance=found.disturbance, fallback=fallback)
         after = ControllerState(tracker=tracker_state, thrusts_N=found.thrusts_N, share=found.scale)
         return after, command
 

@@ -18,11 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.allocation import Allocation, Layout, Weights, disturbance_of
+from wakewise.allocation import Allocation, Layout, Weights
 from wakewise.arrays import Array, IntArray
 from wakewise.control.loop import vehicle_layout
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
-from wakewise.control.silt import silt_view
 from wakewise.control.thrift import Sharer, power_law
 from wakewise.control.watch import Watch
 from wakewise.geometry import Pose
@@ -205,18 +204,17 @@ class Respared:
         if not np.isfinite(G).all():
             words = "wake model not finite: thrusts of the plan"
             return SpareState(inner=inner, thrusts_N=command.thrusts_N), replace(command, fallback=words)
-        cost = self.watch.with_silt(G, estimate, state.thrusts_N)
         total = self.watch.view.total_weight
-        found = self.sharer.shares(command.wrench_B, cost, weights, total, state.thrusts_N)
+        found = self.sharer.shares(command.wrench_B, G, weights, total, state.thrusts_N)
         free_age_s = state.free_age_s + EVERY_S
         if free_age_s + 1e-6 >= FREE_EVERY_S:
-            anew = self.sharer.shares(command.wrench_B, cost, replace(weights, previous=0.0), total)
+            anew = self.sharer.shares(command.wrench_B, G, replace(weights, previous=0.0), total)
             free_age_s = 0.0
             if _cost(anew, weights) < (1.0 - WORTH) * _cost(found, weights):
                 found = anew
-        told, D = self._told(inner, found.thrusts_N, dt_s), disturbance_of(G, found.thrusts_N)
-        new = SpareState(told, found.thrusts_N, dt_s, D, free_age_s)
-        return new, replace(command, thrusts_N=found.thrusts_N, disturbance=D)
+        told = self._told(inner, found.thrusts_N, dt_s)
+        new = SpareState(told, found.thrusts_N, dt_s, found.disturbance, free_age_s)
+        return new, replace(command, thrusts_N=found.thrusts_N, disturbance=found.disturbance)
 
     def _told(self, inner: Any, thrusts_N: Array, dt_s: float) -> Any:
         """The other controller's state, told what was flown in place of its thrusts, if it can be told."""
@@ -248,7 +246,6 @@ def respared(
         watch=Watch(
             view=meeting_view(view, layout) if settings.levers.meet else view,
             levers=settings.levers,
-            silt=silt_view(vehicle, region, wake, settings.levers),
         ),
         weights=Weights(
             disturbance=settings.w_disturbance / view.total_weight,

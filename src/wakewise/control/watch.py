@@ -10,7 +10,6 @@ from wakewise.arrays import Array
 from wakewise.control.levers import LeverSettings
 from wakewise.interfaces import BodyState
 from wakewise.wake.carried import Flow
-from wakewise.wake.silt import SiltView
 from wakewise.wake.view import WakeView
 
 UNSURE = 0.2
@@ -21,27 +20,14 @@ estimator is unsure of: from the bed's own layer, where a current falls to a hal
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Watch:
-    """The view of a region with what the levers add to it, the levers, and the bed if silt counts."""
+    """The view of a region with what the levers add to it, and the levers."""
 
     view: WakeView
     levers: LeverSettings
-    silt: SiltView | None = None
 
     def gram(self, estimate: BodyState, thrusts_N: Array) -> Array:
         """Matrix G of D = s' G s at an estimate, shape (2 n, 2 n), in the flow that it tells of."""
         return self.view.gram(estimate.X_WB, self.flow(estimate, thrusts_N))
-
-    def cost(self, estimate: BodyState, thrusts_N: Array) -> Array:
-        """That matrix with what counts beside D."""
-        return self.with_silt(self.gram(estimate, thrusts_N), estimate, thrusts_N)
-
-    def with_silt(self, gram: Array, estimate: BodyState, thrusts_N: Array) -> Array:
-        """That matrix, and what is lifted into the camera's view after such thrusts, where that counts."""
-        if self.silt is None:
-            return gram
-        current, _ = self._believed(estimate)
-        silt = self.silt.gram(estimate.X_WB, thrusts_N, np.zeros(3) if current is None else current)
-        return gram + self.view.total_weight * silt
 
     def flow(self, estimate: BodyState, thrusts_N: Array) -> Flow | None:
         """The current to reckon with and the thrusts, shape (n,), to reckon from; None where it does not count.
