@@ -10,9 +10,8 @@ from wakewise.arrays import Array
 from wakewise.control.levers import with_bed_points
 from wakewise.control.loop import TrackingController, vehicle_layout
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
-from wakewise.control.spare import meeting_view
+from wakewise.control.spare import watching
 from wakewise.control.tracker import make_tracker
-from wakewise.control.watch import Watch
 from wakewise.interfaces import Controller, WakeModel
 from wakewise.planning import Surroundings
 from wakewise.targets import Region
@@ -57,8 +56,7 @@ def instant(
     around: Surroundings | None = None,  # noqa: ARG001
 ) -> Controller[Any]:
     """`instant`: the tracker, and the gentlest thrusts for its wrench, one instant at a time."""
-    levers = settings.levers
-    seen = with_bed_points(region, levers, bed_of(wake))
+    seen = with_bed_points(region, settings.levers, bed_of(wake))
     controller = instant_allocator(vehicle, seen, wake, settings)
-    view = meeting_view(controller.view, vehicle_layout(vehicle)) if levers.meet else controller.view
-    return replace(controller, view=view, watch=Watch(view=view, levers=levers))
+    watch = watching(vehicle, seen, wake, settings)
+    return replace(controller, view=watch.view, watch=watch)
