@@ -19,8 +19,8 @@ s is the distance from the disk and U the jet's own centreline speed U_0(s), whi
   root at every section if the current's opposing part counts by at most sqrt(8) / 3 in the speed of the section, and it
   counts so; fronts then stop at 2.2 to 2.3 D U_j / |c|, where 2.4 to 2.8 are published (Koenig and Fiedler, Exp. Fluids
   10 (1991) 212; Yoda and Fiedler, Exp. Fluids 21 (1996) 427).
-- *Across the current* the path is within a quarter of z / rD = 2.05 (x / rD)^.28, r = U_j / |c| (B. D. Pratte and
-  W. D. Baines, J. Hydraul. Div. ASCE 93 (1967) 53), for x from rD to 10 rD.
+- *Across the current* the path is within 30 % of z / rD = 2.05 (x / rD)^.28, r = U_j / |c| (B. D. Pratte and W. D.
+  Baines, J. Hydraul. Div. ASCE 93 (1967) 53), for x from rD to 5 rD and r from 5 on.
 - *Unsure.* A current known to sigma_c puts the section sigma_c t elsewhere. What counts is the mean square of the
   speed, and that of a Gaussian whose place is normal is a wider and lower one: width^2 grows by (2 sigma_c t)^2, the
   root mean square of the greatest speed falls as one over the width.
@@ -174,6 +174,8 @@ def follow(kind, parameters, own, origin, e, thrust, current, unsure, curve):  #
     ds, dg, U, still = _rates(kind, numbers, own, s, grown, root, e, current, along, current2, 1e3, v)
     curve[0, :3] = X
     curve[0, 3], curve[0, 4], curve[0, 5], curve[0, 6] = 0.0, 0.0, 1.0, 1.0
+    for x in range(3):
+        X[x] += s * e[x]
     for k in range(1, SECTIONS + 1):
         then = FOLLOWED_S * (k / SECTIONS) ** 2
         dt = then - t
@@ -235,6 +237,8 @@ def fill_plume(points, ball, kind, parameters, own, curve, end, speed):  # type:
                 continue
             along = a[4] + share * (b[4] - a[4])
             stretch = a[6] + share * (b[6] - a[6])
+            if r2 > (own[3] + own[4] * along + (own[5] - 1.0) * along * along) * stretch * stretch:
+                continue
             f, _, _ = speed_and_slope(
                 kind, numbers, own[0], own[1], own[2], along, along * along + r2 / (stretch * stretch)
             )

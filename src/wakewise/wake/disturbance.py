@@ -71,7 +71,6 @@ def gram(
         twice, directions = np.concatenate([origins_W, origins_W]), np.concatenate([-axes_W, axes_W])
         jets = (twice, directions, np.concatenate([areas_m2, areas_m2]))
         G = velocity_gram(carried_velocity(model, region_points_W, *jets, flow.guessed, flow), weights)
-        # A flow that is not finite is the estimator's doing and gives a matrix that is not; the rest is the caller's.
         check = float(np.min(weights, initial=0.0) < 0.0 or np.min(areas_m2) <= 0.0)
     elif isinstance(model, AxialJet):
         G, check = gram_sum(*place, *model.law)
