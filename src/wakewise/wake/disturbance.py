@@ -68,10 +68,11 @@ def gram(
     same_sizes(region_points_W, weights, origins_W, axes_W, areas_m2)
     place = (region_points_W, weights, origins_W, axes_W, areas_m2)
     if flow is not None and isinstance(free_jet(model), AxialJet):
-        twice, directions = np.concatenate([origins_W, origins_W]), np.concatenate([-axes_W, axes_W])
-        jets = (twice, directions, np.concatenate([areas_m2, areas_m2]))
-        G = velocity_gram(carried_velocity(model, region_points_W, *jets, flow.guessed, flow), weights)
         check = float(np.min(weights, initial=0.0) < 0.0 or np.min(areas_m2) <= 0.0)
+        if check == 0.0:
+            twice, directions = np.concatenate([origins_W, origins_W]), np.concatenate([-axes_W, axes_W])
+            jets = (twice, directions, np.concatenate([areas_m2, areas_m2]))
+            G = velocity_gram(carried_velocity(model, region_points_W, *jets, flow.guessed, flow), weights)
     elif isinstance(model, AxialJet):
         G, check = gram_sum(*place, *model.law)
     elif isinstance(model, FloorJet):
