@@ -5,7 +5,7 @@ import pytest
 from pydantic import ValidationError
 
 from wakewise.control import ControlSettings, LeverSettings, make_controller
-from wakewise.control.levers import BED_POINTS, BED_RADIUS_M, BED_WEIGHT, with_bed_points, with_drift
+from wakewise.control.levers import BED_POINTS, BED_RADIUS_M, BED_WEIGHT, with_bed_points
 from wakewise.control.receding import plan_superposition
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Goal
@@ -25,7 +25,6 @@ def test_levers_that_are_off_leave_the_region_alone():
     """The very same object, so that nothing can differ by rounding."""
     given = region()
     assert with_bed_points(given, LeverSettings()) is given
-    assert with_drift(given, np.zeros(3)) is given, "there is no current"
 
 
 def test_bed_points_lie_in_a_thin_disk_round_the_foot():
@@ -71,7 +70,7 @@ def test_planner_and_allocator_weigh_alike():
     for how in ("coherent", "incoherent"):
         settings = ControlSettings(superposition=how, w_disturbance=70.0, w_effort=2e-3)
         controller = make_controller("wake-aware", vehicle, region(), jet, settings)
-        terms, weights = controller.inner.model.terms, controller.weights
+        terms, weights = controller.inner.model.terms, controller.watch.weights
         assert (terms.superposition, controller.watch.view.superposition) == (how, how)
         assert (terms.w_disturbance, terms.w_effort, weights.effort) == (70.0, 2e-3, 2e-3)
         assert weights.disturbance == pytest.approx(70.0 / controller.watch.view.total_weight)

@@ -1,19 +1,19 @@
-"""Spare thrusts shared out anew: jets that meet, water that drifts, and the controllers that use them."""
+"""Spare thrusts shared out anew: jets that meet, and the controllers that use them."""
 
 import numpy as np
 import pytest
 
 from wakewise.allocation import Weights, gentle_allocation
 from wakewise.control import ControlSettings, make_controller, vehicle_layout
-from wakewise.control.levers import BED_POINTS, DRIFT_POINTS, DRIFT_WEIGHT, LeverSettings, with_bed_points, with_drift
+from wakewise.control.levers import LeverSettings
 from wakewise.control.spare import Respared, SpareState, joined_jets, meeting_pairs, meeting_view
-from wakewise.control.thrift import Sharer
 from wakewise.control.watch import Watch
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Command, Goal
 from wakewise.targets import Region
 from wakewise.vehicles import load_vehicle
-from wakewise.wake import RoundJet, WakeView
+from wakewise.wake import RoundJet, WakeView, disturbance
+from wakewise.wake.carried import Flow
 
 VEHICLE = load_vehicle("paper")
 LAYOUT = vehicle_layout(VEHICLE)
@@ -25,9 +25,10 @@ AHEAD = Region(
 """Points ahead of a vehicle at the origin that looks north, where its camera looks."""
 
 
-def watching(view):
-    """What is seen through a view, and nothing that drifts there."""
-    return Watch(region=AHEAD, view=view, levers=LeverSettings(drift=False))
+def watching(view, previous=1e-3):
+    """What is seen through a view, in still water."""
+    weights = Weights(disturbance=150.0, effort=1e-3, previous=previous)
+    return Watch(view=view, levers=LeverSettings(drift=False), layout=LAYOUT, weights=weights)
 
 
 def test_two_equal_jets_join_along_the_middle_with_the_sum_of_their_momenta():
@@ -114,9 +115,7 @@ def test_respared_thrusts_make_the_same_wrench_and_a_fallback_is_left_alone():
     spared = Respared(
         name="x",
         inner=inner,
-        sharer=Sharer(layout=LAYOUT),
         watch=watching(view),
-        weights=Weights(disturbance=150.0, effort=1e-3, previous=1e-3),
     )
     state, rng, searches = spared.init(), np.random.default_rng(1), []
     for k in range(12):
@@ -141,8 +140,7 @@ def test_shares_leave_a_poor_minimum_within_two_seconds():
         points_W_m=np.array([[0.085, 0.14, 0.6], [-0.085, -0.14, 0.6]]), weights=np.ones(2), distance_m=np.zeros(2)
     )
     view = WakeView.of(VEHICLE, below, RoundJet())
-    weights = Weights(disturbance=150.0, effort=1e-3, previous=100.0)
-    spared = Respared(name="x", inner=inner, sharer=Sharer(layout=LAYOUT), watch=watching(view), weights=weights)
+    spared = Respared(name="x", inner=inner, watch=watching(view, previous=100.0))
     best = gentle_allocation(LAYOUT, inner.wrench, view.gram(body.X_WB), Weights(disturbance=150.0, effort=1e-3))
     poor = LAYOUT.inverse @ inner.wrench
     state = SpareState(inner=0, thrusts_N=poor, free_age_s=0.0)
@@ -154,21 +152,22 @@ def test_shares_leave_a_poor_minimum_within_two_seconds():
     assert shares[40] > 0.1 and shares[-1] < 0.05
 
 
-def test_water_that_will_drift_to_the_target_lies_upstream_of_it():
-    """Points are the surface's, moved against the current by up to DRIFT_S; the farther, the wider and the lighter."""
-    found = with_drift(AHEAD, np.array([0.03, 0.0, 0.0]))
-    new = found.points_W_m[3:]
-    assert len(new) == DRIFT_POINTS and new[:, 0].max() < 0.72 + 0.02 * 25.0 and new[:, 0].min() > 0.7 - 0.05 * 25.0
-    np.testing.assert_allclose(found.weights[3:].sum(), DRIFT_WEIGHT)
-    order = np.argsort(found.distance_m[3:])
-    assert found.weights[3:][order[0]] > 10.0 * found.weights[3:][order[-1]]
-    assert np.all(found.distance_m[3:] > 0.0)
-    far = order[-DRIFT_POINTS // 4 :]
-    assert np.ptp(new[far, 1]) > 0.3 > np.ptp(AHEAD.points_W_m[:, 1])
-    assert set(np.round(new[:, 2], 9)) <= set(np.round(AHEAD.points_W_m[:, 2], 9))
-    assert with_drift(AHEAD, np.zeros(3)) is AHEAD
-    both = with_drift(with_bed_points(AHEAD, LeverSettings(bed=True), 1.5), np.array([0.03, 0.0, 0.0]))
-    assert len(both.weights) == 3 + DRIFT_POINTS + BED_POINTS
+def test_what_two_jets_become_turns_to_the_stronger_and_the_two_end_there():
+    """In a flow the joined jet of unequal thrusts leaves the bisector; squarely met, the single ones do not go on."""
+    origins = np.array([[0.0, 0.3, 0.0], [0.0, -0.3, 0.0]])
+    axes = -np.array([[1.0, -1.0, 0.0], [1.0, 1.0, 0.0]]) / np.sqrt(2.0)
+    met = joined_jets(origins, axes, ((0, 1),), np.array([3.0, 1.0, 1e-9, 1e-9]))
+    np.testing.assert_allclose(met.momentum * met.strength_N, np.sqrt(10.0))
+    np.testing.assert_allclose(met.directions[0], np.array([4.0, -2.0, 0.0]) / np.sqrt(20.0), atol=1e-12)
+    np.testing.assert_allclose(met.ways_m, [[0.3 * np.sqrt(2.0)] * 2])
+    ahead = meeting_view(WakeView.of(VEHICLE, AHEAD, RoundJet()), LAYOUT)
+    slow = np.array([1e-9, 0.0, 0.0])
+    pair = {}
+    for thrusts in ((1.0, 1.0), (1.0, 0.0), (0.0, 1.0)):
+        T = np.array([*thrusts, 0, 0, 0, 0, 0, 0])
+        G = ahead.gram(Pose(np.zeros(3)), Flow(current_W_m_s=slow, unsure_m_s=0.0, thrusts_N=T))
+        pair[thrusts] = disturbance(G, T)
+    assert pair[1.0, 1.0] > 20.0 * max(pair[1.0, 0.0], pair[0.0, 1.0]), "only both together blow ahead"
 
 
 @pytest.mark.parametrize("method", ["instant", "wake-aware"])

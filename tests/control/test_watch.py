@@ -3,14 +3,16 @@
 import numpy as np
 import pytest
 
+from wakewise.allocation import least_thrusts
 from wakewise.control import ControlSettings, LeverSettings, make_controller
-from wakewise.control.levers import DRIFT_POINTS
-from wakewise.control.watch import MOVED_M_S, Watch
+from wakewise.control.spare import watching
+from wakewise.control.watch import UNSURE
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Goal
 from wakewise.targets import Region
 from wakewise.vehicles import load_vehicle
-from wakewise.wake import RoundJet, WakeView
+from wakewise.wake import FloorJet, RoundJet
+from wakewise.water.water import Water
 
 VEHICLE = load_vehicle("paper")
 AHEAD = Region(
@@ -18,12 +20,12 @@ AHEAD = Region(
     weights=np.full(3, 1.0 / 3.0),
     distance_m=np.zeros(3),
 )
+THRUSTS = np.array([1.0, 0.5, -0.5, -1.0, -0.3, -0.5, -1.2, -1.4])
 
 
-def watch(**levers):
+def watch(wake=None, **levers):
     """Eyes on the points ahead."""
-    view = WakeView.of(VEHICLE, AHEAD, RoundJet())
-    return Watch(region=AHEAD, view=view, levers=LeverSettings(**levers))
+    return watching(VEHICLE, AHEAD, wake or RoundJet(), ControlSettings(levers=LeverSettings(**levers)))
 
 
 def estimate(*current_m_s, **of):
@@ -31,36 +33,93 @@ def estimate(*current_m_s, **of):
     return BodyState(X_WB=Pose(np.zeros(3)), current_W_m_s=np.array(current_m_s) if current_m_s else None, **of)
 
 
-def test_an_unknown_current_adds_no_points():
-    """None, or the lever off: the view is the very same."""
-    eyes = watch()
-    assert eyes.at(None, estimate()).view is eyes.view
-    assert not watch(drift=False).at(None, estimate(0.05, 0.0, 0.0)).current_W_m_s.any()
-
-
-def test_points_lie_upstream_of_the_target_as_the_estimate_says():
-    """A current that runs north brings what is south; one that turns round, what is north."""
-    eyes, middle = watch(), AHEAD.points_W_m.mean(axis=0)
-    north = eyes.at(None, estimate(0.05, 0.0, 0.0))
-    south = eyes.at(north, estimate(-0.05, 0.0, 0.0))
-    for seen, sign in ((north, -1.0), (south, 1.0)):
-        drifting = seen.view.points_W_m[len(AHEAD.weights) :]
-        assert len(drifting) == DRIFT_POINTS
-        assert sign * (drifting[:, 0].mean() - middle[0]) > 0.3
-
-
-def test_points_stay_while_the_current_hardly_changes():
-    """Below the threshold it is the same object; above, another."""
-    eyes = watch()
-    seen = eyes.at(None, estimate(0.03, 0.0, 0.0))
-    assert eyes.at(seen, estimate(0.03 + 0.9 * MOVED_M_S, 0.0, 0.0)) is seen
-    assert eyes.at(seen, estimate(0.03 + 1.1 * MOVED_M_S, 0.0, 0.0)) is not seen
+def test_an_unknown_current_leaves_the_water_still():
+    """None, or the lever off: the matrix is that of the view alone."""
+    still = watch().view.gram(Pose(np.zeros(3)))
+    np.testing.assert_array_equal(watch().gram(estimate(), THRUSTS), still)
+    np.testing.assert_array_equal(watch(drift=False).gram(estimate(0.05, 0.0, 0.0), THRUSTS), still)
+    assert not np.allclose(watch().gram(estimate(0.05, 0.0, 0.0), THRUSTS), still)
 
 
 def test_a_stated_current_is_believed_against_the_estimate():
-    """What a user states stands, whatever the estimator finds."""
-    seen = watch(drift_m_s=(0.0, 0.02, 0.0)).at(None, estimate(0.05, 0.0, 0.0))
-    np.testing.assert_array_equal(seen.current_W_m_s, [0.0, 0.02, 0.0])
+    """What a user states stands, whatever the estimator finds and however sure it is."""
+    found = watch(drift_m_s=(0.0, 0.02, 0.0)).flow(estimate(0.05, 0.0, 0.0, current_covariance=np.eye(3)), THRUSTS)
+    np.testing.assert_array_equal(found.current_W_m_s, [0.0, 0.02, 0.0])
+    assert found.unsure_m_s == pytest.approx(UNSURE * 0.02)
+
+
+def test_what_the_estimator_is_unsure_of_is_added():
+    """In squares: a component's variance and the share of the current."""
+    found = watch().flow(estimate(0.0, 0.1, 0.0, current_covariance=np.diag([1e-4, 4e-4, 4e-4])), THRUSTS)
+    assert found.unsure_m_s == pytest.approx(np.sqrt(3e-4 + (UNSURE * 0.1) ** 2))
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_shares_make_the_wrench_and_are_never_worse_than_the_least_by_their_own_matrix(free):
+    """For currents from all sides; the matrix that comes with them is that of these thrusts."""
+    eyes, rng = watch(), np.random.default_rng(4)
+    layout = eyes.layout
+    for angle in np.linspace(0.0, 2.0 * np.pi, 7)[:-1]:
+        here = estimate(0.09 * np.cos(angle), 0.09 * np.sin(angle), 0.0)
+        wrench = np.array([-2.6, 0.9, -3.3, 0.0, -0.3, 0.0]) + 0.1 * rng.normal(size=6)
+        found, G = eyes.share_out(wrench, here, np.zeros(8), free=free)
+        np.testing.assert_allclose(layout.B @ found.thrusts_N, wrench, atol=1e-9)
+        np.testing.assert_allclose(G, eyes.gram(here, found.thrusts_N), atol=1e-15)
+        least = least_thrusts(layout, wrench).thrusts_N
+        before = None if free else np.zeros(8)
+        own = eyes.cost(found.thrusts_N, G, before)
+        assert own <= eyes.cost(least, eyes.gram(here, least), before) * (1.0 + 1e-9)
+
+
+def test_where_the_wake_model_gives_nonsense_there_are_no_shares():
+    """A model that is not finite gives None, and the controllers fall back."""
+
+    class Nonsense:
+        name = "nonsense"
+
+        def unit_velocity(self, points, origins, directions, area):
+            return np.full((len(origins), len(points), 3), np.nan)
+
+    eyes = watch(Nonsense(), meet=False)
+    assert eyes.share_out(np.ones(6), estimate(0.1, 0.0, 0.0), np.zeros(8)) is None
+
+
+def tank_speed_m_s(thrusts, current):
+    """Mean speed of the tank's water at the points ahead, 15 to 30 s after thrusts began that stay as they are."""
+    water = Water(
+        VEHICLE.disk_areas_m2,
+        density_kg_m3=1000.0,
+        bed_z_m=1.5,
+        rng=np.random.default_rng(0),
+        current_W_m_s=np.array(current),
+    )
+    lift = np.array([0.0, 0.0, 0.9])
+    places, speeds = VEHICLE.thruster_positions_B_m + lift, []
+    for k in range(600):
+        impulse = 0.05 * np.stack([np.maximum(thrusts, 0.0), np.maximum(-thrusts, 0.0)], axis=1)
+        water.step(0.05, places, places, VEHICLE.thruster_axes_B, impulse)
+        if k >= 300 and k % 20 == 0:
+            speeds.append(np.linalg.norm(water.excess_velocity(AHEAD.points_W_m + lift), axis=1).mean())
+    return float(np.mean(speeds))
+
+
+def test_where_the_current_brings_the_wash_back_shares_are_gentler_for_knowing_it():
+    """4 N heavy, pushing astern, 9 cm/s abeam: predicted and true water at the target, against still water's shares.
+
+    A rear thruster that blows forward past the hull is harmless in still water; here its jet is carried to the target.
+    """
+    wrench, here = np.array([-2.64, 0.93, -3.33, 0.0, -0.28, 0.0]), estimate(-0.017, -0.083, 0.0)
+    floor = FloorJet(jet=RoundJet(), bed_z_m=0.6)
+    eyes, blind = watch(floor), watch(floor, drift=False)
+    unknowing = blind.share_out(wrench, here, np.zeros(8), free=True)[0].thrusts_N
+    thrusts = np.zeros(8)
+    for k in range(20):
+        found, _ = eyes.share_out(wrench, here, thrusts, free=k == 0)
+        thrusts = found.thrusts_N
+    cost = {name: eyes.cost(T, eyes.gram(here, T)) for name, T in (("knows", thrusts), ("does not", unknowing))}
+    assert cost["knows"] < 0.5 * cost["does not"]
+    slow, fast = (tank_speed_m_s(T, here.current_W_m_s) for T in (thrusts, unknowing))
+    assert slow < 0.6 * fast
 
 
 @pytest.mark.parametrize("method", ["instant", "wake-aware"])

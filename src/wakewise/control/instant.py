@@ -8,12 +8,12 @@ from typing import Any
 from wakewise.allocation import Allocation, Weights, least_thrusts
 from wakewise.arrays import Array
 from wakewise.control.levers import with_bed_points
-from wakewise.control.loop import TrackingController, vehicle_layout
+from wakewise.control.loop import TrackingController
 from wakewise.control.poised import poised
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
-from wakewise.control.spare import meeting_view, sharer_of
+from wakewise.control.spare import watching
+from wakewise.control.thrift import sharer_of
 from wakewise.control.tracker import make_tracker
-from wakewise.control.watch import Watch
 from wakewise.interfaces import Controller, WakeModel
 from wakewise.planning import Surroundings
 from wakewise.planning.surroundings import around_target
@@ -61,10 +61,8 @@ def instant(
     around: Surroundings | None = None,
 ) -> Controller[Any]:
     """`instant`: the tracker, and the gentlest thrusts for its wrench, one instant at a time."""
-    levers = settings.levers
-    seen = with_bed_points(region, levers, bed_of(wake))
+    seen = with_bed_points(region, settings.levers, bed_of(wake))
     controller = instant_allocator(vehicle, seen, wake, settings)
-    view = meeting_view(controller.view, vehicle_layout(vehicle)) if levers.meet else controller.view
-    watch = Watch(view=view, levers=levers)
-    spared = replace(controller, view=view, watch=watch)
+    watch = watching(vehicle, seen, wake, settings)
+    spared = replace(controller, view=watch.view, watch=watch)
     return poised(spared, watch, vehicle, settings, around or around_target(region))

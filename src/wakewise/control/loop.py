@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wakewise.allocation import Allocation, Layout, compile_layout
+from wakewise.allocation.allocate import disturbance_of
 from wakewise.arrays import Array, freeze
 from wakewise.control.tracker import Tracker, TrackerState
 from wakewise.control.watch import Watch
@@ -24,6 +25,8 @@ def vehicle_layout(vehicle: Vehicle) -> Layout:
     return compile_layout(vehicle.allocation_matrix, vehicle.thrust_lower_N, vehicle.thrust_upper_N)
 
 
+EVERY_S = 0.1
+"""Time between two searches for the best shares: the planner's own, and a thruster's lag."""
 HOLD_S = 0.5
 """Time constant with which thrusts fade while there is no usable estimate: some filter updates may be missed, a
 vehicle that is lost must not go on pushing."""
@@ -35,12 +38,15 @@ FULL = 1.0 - 1e-9
 class ControllerState:
     """What a controller remembers between steps.
 
-    The tracker's integral, the thrusts last asked for, shape (n,), and the share of the last wrench that they made.
+    The tracker's integral, the thrusts last asked for, shape (n,), and the share of the last wrench that they made;
+    with a `watch`, its Gram matrix, shape (2 n, 2 n), and how old that is.
     """
 
     tracker: TrackerState
     thrusts_N: Array
     share: float = 1.0
+    gram: Array | None = None
+    age_s: float = np.inf
 
     def __post_init__(self) -> None:
         freeze(self, thrusts_N=(None,))
@@ -51,7 +57,7 @@ class TrackingController:
     """A tracker and a way to allocate; implements `wakewise.interfaces.Controller`.
 
     An estimate or goal that is not finite gives the last thrusts, fading with `HOLD_S`, and says so in `fallback`.
-    Where there is a `watch`, the estimate's current carries the jets.
+    Where there is a `watch`, the estimate's current carries the jets; where that takes them is looked up `EVERY_S`.
     """
 
     name: str
@@ -75,15 +81,29 @@ class TrackingController:
         tracker_state, wrench = self.tracker.wrench(state.tracker, dt_s, estimate, goal, saturated=state.share < FULL)
         if not np.isfinite(wrench.sum()):
             return self._hold(state, dt_s, "wrench not finite: holding the last thrusts, fading")
-        watch = self.watch
-        gram = self.view.gram(estimate.X_WB) if watch is None else watch.gram(estimate, state.thrusts_N)
-        usable = bool(np.isfinite(gram).all())
+        gram, age_s, found = state.gram, state.age_s + dt_s, None
+        if self.watch is None:
+            gram = self.view.gram(estimate.X_WB)
+        else:
+            moved = self.watch.moved(wrench, state.thrusts_N)
+            if gram is not None and age_s + 1e-6 < EVERY_S and self.watch.allowed(moved):
+                found = replace(self.allocate(wrench, None, moved), thrusts_N=moved, wrench_B=wrench)
+                found = replace(found, disturbance=disturbance_of(gram, moved))
+            else:
+                shared = self.watch.share_out(wrench, estimate, state.thrusts_N)
+                found, gram = (None, None) if shared is None else shared
+                age_s = 0.0
+        usable = gram is not None and bool(np.isfinite(gram).all())
         fallback = None if usable else "wake model not finite: least thrusts"
-        found = self.allocate(wrench, gram if usable else None, state.thrusts_N)
+        if found is None:
+            found = self.allocate(wrench, gram if usable else None, state.thrusts_N)
         if found.scale < FULL and fallback is None:
             fallback = f"thrusters saturated: {100.0 * found.scale:.0f} % of the wrench"
         command = Command(thrusts_N=found.thrusts_N, wrench_B=wrench, disturbance=found.disturbance, fallback=fallback)
-        after = ControllerState(tracker=tracker_state, thrusts_N=found.thrusts_N, share=found.scale)
+        kept = gram if self.watch is not None and usable else None
+        after = ControllerState(
+            tracker=tracker_state, thrusts_N=found.thrusts_N, share=found.scale, gram=kept, age_s=age_s
+        )
         return after, command
 
     def _hold(self, state: ControllerState, dt_s: float, why: str) -> tuple[ControllerState, Command]:

@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.allocation import Allocation, Layout, Weights
+from wakewise.allocation import Layout, Weights
 from wakewise.arrays import Array, IntArray
-from wakewise.control.loop import vehicle_layout
+from wakewise.control.loop import EVERY_S
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
-from wakewise.control.thrift import Sharer, power_law
+from wakewise.control.thrift import sharer_of
 from wakewise.control.watch import Watch
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Command, Controller, Goal, WakeModel
@@ -30,15 +30,13 @@ from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
 from wakewise.wake import AxialJet, free_jet
 from wakewise.wake.carried import Flow
-from wakewise.wake.disturbance import carried_velocity
+from wakewise.wake.disturbance import carried_velocity, incoherent, velocity_gram
 from wakewise.wake.view import WakeView
 
 LEAST_COSINE = -0.5
 """Cosine of 120 deg: jets that cross at more turn aside rather than join."""
 HALF_WIDTH_SLOPE = 0.096
 """Half-speed radius of a round jet over the distance along it (see `wakewise.wake.RoundJet`)."""
-EVERY_S = 0.1
-"""Time between two searches for the best shares: the planner's own, and a thruster's lag."""
 FREE_EVERY_S = 2.0
 """Time between two searches without a price on change: the planner's horizon."""
 WORTH = 0.05
@@ -60,22 +58,52 @@ class MeetingView(WakeView):
     pairs: tuple[tuple[int, int], ...] = field(default=())
 
     def gram(self, X_WB: Pose, flow: Flow | None = None) -> Array:
-        """Matrix G of D = s' G s, shape (2 n, 2 n); what two jets become is carried as they are."""
-        G = np.array(super().gram(X_WB, flow))
+        """Matrix G of D = s' G s, shape (2 n, 2 n); in a flow what two jets become takes their own place."""
         origins, axes = X_WB.apply(self.positions_B_m), self.axes_B @ X_WB.R.T
+        if flow is not None and isinstance(free_jet(self.wake), AxialJet):
+            velocity = self._carried(origins, axes, flow)
+            G = velocity_gram(velocity, self.weights)
+            return incoherent(G) if self.superposition == "incoherent" else G
+        G = np.array(super().gram(X_WB))
         met = joined_jets(origins, axes, self.pairs)
         if len(met.share):
             areas = self.areas_m2[met.first % len(self.areas_m2)]
-            jets = (self.points_W_m, met.origins_m, met.directions, areas)
-            if flow is None or not isinstance(free_jet(self.wake), AxialJet):
-                speed = self.wake.unit_velocity(*jets)
-            else:
-                pushed = met.momentum * np.sqrt(flow.guessed[met.first] * flow.guessed[met.second])
-                speed = carried_velocity(self.wake, *jets, pushed, flow)
+            speed = self.wake.unit_velocity(self.points_W_m, met.origins_m, met.directions, areas)
             D = met.momentum * met.share * np.einsum("n,inx,inx->i", self.weights, speed, speed)
             np.add.at(G, (met.first, met.second), 0.5 * D)
             np.add.at(G, (met.second, met.first), 0.5 * D)
         return G
+
+    def _carried(self, origins: Array, axes: Array, flow: Flow) -> Array:
+        """Velocity per square root of newton of all slots, shape (2 m, n, 3), with jets that join at these thrusts.
+
+        Of a pair a share goes on as one, the rest as if alone. The velocity of the one is counted to its two by their
+        thrusts, so that it is right where the thrusts are those reckoned from, and D stays a sum of squares.
+        """
+        m = len(origins)
+        pushing = np.concatenate([flow.thrusts_N, -flow.thrusts_N])
+        met = joined_jets(origins, axes, self.pairs, np.maximum(pushing, 1e-9))
+        ends = np.tile([np.inf, 1.0], (2 * m, 1))
+        real = (pushing[met.first] > 0.0) & (pushing[met.second] > 0.0) if len(met.share) else np.zeros(0, bool)
+        chosen = []
+        for k in np.argsort(-met.share, kind="stable"):
+            a, b = met.first[k], met.second[k]
+            # Each jet joins one other, the one it meets most squarely.
+            if real[k] and ends[a, 1] == 1.0 and ends[b, 1] == 1.0:
+                ends[a] = met.ways_m[k, 0], 1.0 - met.share[k]
+                ends[b] = met.ways_m[k, 1], 1.0 - met.share[k]
+                chosen.append(k)
+        slots = (np.concatenate([origins, origins]), np.concatenate([-axes, axes]), np.tile(self.areas_m2, 2))
+        velocity = carried_velocity(self.wake, self.points_W_m, *slots, flow.guessed, flow, ends)
+        if chosen:
+            a, b, share = met.first[chosen], met.second[chosen], met.share[chosen]
+            momentum = met.momentum[chosen] * met.strength_N[chosen]
+            jets = (met.origins_m[chosen], met.directions[chosen], self.areas_m2[a % m])
+            joined = carried_velocity(self.wake, self.points_W_m, *jets, momentum, flow)
+            joined *= (share * np.sqrt(momentum) / (pushing[a] + pushing[b]))[:, None, None]
+            velocity[a] += np.sqrt(pushing[a])[:, None, None] * joined
+            velocity[b] += np.sqrt(pushing[b])[:, None, None] * joined
+        return velocity
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,8 +111,9 @@ class JoinedJets:
     """Jets made of two, of m pairs of slots (slot i is thruster i with T > 0, slot n + i the same with T < 0).
 
     `origins_m`, shape (m, 3), lie as far behind the place of meeting as the two jets came on average, so that the
-    joined jet is as wide there as they are; `directions`, shape (m, 3); `momentum`, shape (m,), over that of one of
-    two equal jets; `share`, shape (m,), tells how squarely they meet: 1/2 where their axes pass one half-width apart.
+    joined jet is as wide there as they are; `directions`, shape (m, 3); `momentum`, shape (m,), over `strength_N`, the
+    geometric mean of the two; `share`, shape (m,), tells how squarely they meet: 1/2 where their axes pass one
+    half-width apart; `ways_m`, shape (m, 2), how far each comes until then.
     """
 
     first: IntArray
@@ -93,10 +122,17 @@ class JoinedJets:
     directions: Array
     momentum: Array
     share: Array
+    strength_N: Array
+    ways_m: Array
 
 
-def joined_jets(origins_m: Array, axes: Array, pairs: tuple[tuple[int, int], ...]) -> JoinedJets:
-    """Which jets meet and what they become, from disks, shape (n, 3), and force axes, shape (n, 3), in any frame."""
+def joined_jets(
+    origins_m: Array, axes: Array, pairs: tuple[tuple[int, int], ...], thrusts_N: Array | None = None
+) -> JoinedJets:
+    """Which jets meet and what they become, from disks, shape (n, 3), and force axes, shape (n, 3), in any frame.
+
+    `thrusts_N`, shape (2 n,), are sizes to reckon with, more than 0; without them all jets are alike.
+    """
     n = len(origins_m)
     wanted = [(a, b) for i, j in pairs for a in (i, i + n) for b in (j, j + n)]
     first, second = np.array(wanted, dtype=np.int64).reshape(-1, 2).T
@@ -113,7 +149,9 @@ def joined_jets(origins_m: Array, axes: Array, pairs: tuple[tuple[int, int], ...
     width = np.maximum(HALF_WIDTH_SLOPE * (x + y), 1e-9)
     share = np.exp(-np.log(2.0) * np.einsum("ix,ix->i", there - here, there - here) / width**2)
     usable &= share > _LEAST_SHARE
-    total = d + e
+    size = np.ones(2 * n) if thrusts_N is None else thrusts_N
+    strength = np.sqrt(size[first] * size[second])
+    total = (size[first] / strength)[:, None] * d + (size[second] / strength)[:, None] * e
     momentum = np.maximum(np.linalg.norm(total, axis=1), 1e-9)
     onward = total / momentum[:, None]
     start = 0.5 * (here + there) - 0.5 * (x + y)[:, None] * onward
@@ -124,6 +162,8 @@ def joined_jets(origins_m: Array, axes: Array, pairs: tuple[tuple[int, int], ...
         directions=np.ascontiguousarray(onward[usable]),
         momentum=momentum[usable],
         share=share[usable],
+        strength_N=strength[usable],
+        ways_m=np.stack([x, y], axis=1)[usable],
     )
 
 
@@ -175,14 +215,12 @@ class Respared:
 
     name: str
     inner: Controller[Any]
-    sharer: Sharer
     watch: Watch
-    weights: Weights
 
     @property
     def layout(self) -> Layout:
-        """Allocation matrix and limits."""
-        return self.sharer.layout
+        """Thrusters and their limits."""
+        return self.watch.layout
 
     def init(self) -> SpareState:
         """State before the first step."""
@@ -194,24 +232,24 @@ class Respared:
         if command.fallback is not None:
             return SpareState(inner=inner, thrusts_N=command.thrusts_N), command
         if state.age_s + 1e-6 < EVERY_S:
-            missing = command.wrench_B - self.layout.B @ state.thrusts_N
-            thrusts = state.thrusts_N + self.layout.inverse @ missing
-            if np.all((thrusts >= self.layout.lower_N) & (thrusts <= self.layout.upper_N)):
+            thrusts = self.watch.moved(command.wrench_B, state.thrusts_N)
+            if self.watch.allowed(thrusts):
                 told = self._told(inner, thrusts, dt_s)
                 held = replace(state, inner=told, thrusts_N=thrusts, age_s=state.age_s + dt_s)
                 return held, replace(command, thrusts_N=thrusts, disturbance=state.disturbance)
-        G, weights = self.watch.gram(estimate, state.thrusts_N), self.weights
-        if not np.isfinite(G).all():
+        watch, wrench = self.watch, command.wrench_B
+        shared = watch.share_out(wrench, estimate, state.thrusts_N)
+        if shared is None:
             words = "wake model not finite: thrusts of the plan"
             return SpareState(inner=inner, thrusts_N=command.thrusts_N), replace(command, fallback=words)
-        total = self.watch.view.total_weight
-        found = self.sharer.shares(command.wrench_B, G, weights, total, state.thrusts_N)
+        found, G = shared
         free_age_s = state.free_age_s + EVERY_S
         if free_age_s + 1e-6 >= FREE_EVERY_S:
-            anew = self.sharer.shares(command.wrench_B, G, replace(weights, previous=0.0), total)
             free_age_s = 0.0
-            if _cost(anew, weights) < (1.0 - WORTH) * _cost(found, weights):
-                found = anew
+            anew = watch.share_out(wrench, estimate, state.thrusts_N, free=True)
+            if anew is not None:
+                saved = watch.cost(found.thrusts_N, G) - watch.cost(anew[0].thrusts_N, anew[1])
+                found = anew[0] if saved > WORTH * watch.cost(found.thrusts_N, G) else found
         told = self._told(inner, found.thrusts_N, dt_s)
         new = SpareState(told, found.thrusts_N, dt_s, found.disturbance, free_age_s)
         return new, replace(command, thrusts_N=found.thrusts_N, disturbance=found.disturbance)
@@ -222,12 +260,6 @@ class Respared:
         return inner if tell is None else tell(inner, thrusts_N, dt_s)
 
 
-def _cost(found: Allocation, weights: Weights) -> float:
-    """Cost of shares without the price on change."""
-    D = 0.0 if found.disturbance is None else found.disturbance
-    return weights.disturbance * D + weights.effort * float(found.thrusts_N @ found.thrusts_N)
-
-
 def respared(
     controller: Controller[Any], vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings
 ) -> Respared:
@@ -236,25 +268,20 @@ def respared(
     Arguments as for `make_controller`; `region` with what the levers add but for drift, `wake` with the floor if it is
     to count.
     """
+    return Respared(name=controller.name, inner=controller, watch=watching(vehicle, region, wake, settings))
+
+
+def watching(vehicle: Vehicle, region: Region, wake: WakeModel, settings: ControlSettings) -> Watch:
+    """What a method watches with the levers of its settings. Arguments as for `respared`."""
     sharer = sharer_of(vehicle, settings)
-    layout = sharer.layout
     view = WakeView.of(vehicle, region, wake, settings.superposition)
-    return Respared(
-        name=controller.name,
-        inner=controller,
+    return Watch(
+        view=meeting_view(view, sharer.layout) if settings.levers.meet else view,
+        levers=settings.levers,
         sharer=sharer,
-        watch=Watch(
-            view=meeting_view(view, layout) if settings.levers.meet else view,
-            levers=settings.levers,
-        ),
         weights=Weights(
             disturbance=settings.w_disturbance / view.total_weight,
             effort=settings.w_effort,
             previous=PREVIOUS_SHARE * settings.w_effort,
         ),
     )
-
-
-def sharer_of(vehicle: Vehicle, settings: ControlSettings) -> Sharer:
-    """What shares a vehicle's wrenches out, within the bound on power if that lever is on."""
-    return Sharer(layout=vehicle_layout(vehicle), law=power_law(vehicle) if settings.levers.thrift else None)

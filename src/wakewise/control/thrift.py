@@ -15,8 +15,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wakewise.allocation import Allocation, Layout, PowerLaw, Weights, gentle_allocation, least_thrusts, within_power
+from wakewise.allocation import (
+    Allocation,
+    Layout,
+    PowerLaw,
+    Weights,
+    compile_layout,
+    gentle_allocation,
+    least_thrusts,
+    within_power,
+)
 from wakewise.arrays import Array
+from wakewise.control.settings import ControlSettings
 from wakewise.thrusters import electrical_power_W
 from wakewise.vehicles import Vehicle
 
@@ -66,3 +76,9 @@ class Sharer:
         speed_m_s = float(np.sqrt(max(least.disturbance or 0.0, 0.0) / total_weight)) / TOO_FAST
         most_W = allowed(speed_m_s) * float(self.law.power_W(least.thrusts_N))
         return within_power(self.layout, found, least.thrusts_N, self.law, most_W, gram, weights, previous_N)
+
+
+def sharer_of(vehicle: Vehicle, settings: ControlSettings) -> Sharer:
+    """What shares a vehicle's wrenches out, within the bound on power if that lever is on."""
+    layout = compile_layout(vehicle.allocation_matrix, vehicle.thrust_lower_N, vehicle.thrust_upper_N)
+    return Sharer(layout=layout, law=power_law(vehicle) if settings.levers.thrift else None)

@@ -19,8 +19,8 @@ s is the distance from the disk and U the jet's own centreline speed U_0(s), whi
   root at every section if the current's opposing part counts by at most sqrt(8) / 3 in the speed of the section, and it
   counts so; fronts then stop at 2.2 to 2.3 D U_j / |c|, where 2.4 to 2.8 are published (Koenig and Fiedler, Exp. Fluids
   10 (1991) 212; Yoda and Fiedler, Exp. Fluids 21 (1996) 427).
-- *Across the current* the path is within a quarter of z / rD = 2.05 (x / rD)^.28, r = U_j / |c| (B. D. Pratte and
-  W. D. Baines, J. Hydraul. Div. ASCE 93 (1967) 53), for x from rD to 10 rD.
+- *Across the current* the path is within 30 % of z / rD = 2.05 (x / rD)^.28, r = U_j / |c| (B. D. Pratte and W. D.
+  Baines, J. Hydraul. Div. ASCE 93 (1967) 53), for x from rD to 5 rD and r from 5 on.
 - *Unsure.* A current known to sigma_c puts the section sigma_c t elsewhere. What counts is the mean square of the
   speed, and that of a Gaussian whose place is normal is a wider and lower one: width^2 grows by (2 sigma_c t)^2, the
   root mean square of the greatest speed falls as one over the width.
@@ -106,10 +106,13 @@ def _profile(kind, numbers, own, s):  # type: ignore[no-untyped-def]
 
 
 @njit
-def excess_speed(strength, chi, along, current2):  # type: ignore[no-untyped-def]
-    """U of U |chi U e + c| = strength, `along` = c . e with what opposes already lessened, `current2` = c . c."""
+def excess_speed(strength, chi, along, current2, near):  # type: ignore[no-untyped-def]
+    """U of U |chi U e + c| = strength, `along` = c . e with what opposes already lessened, `current2` = c . c.
+
+    The search begins at `near`.
+    """
     low, high = 0.0, np.sqrt(strength / chi) + 2.0 * np.sqrt(current2) / chi
-    U = high
+    U = min(near, high)
     for _ in range(60):
         own = chi * U
         over = U * U * (own * own + 2.0 * own * along + current2) - strength * strength
@@ -121,19 +124,19 @@ def excess_speed(strength, chi, along, current2):  # type: ignore[no-untyped-def
         after = U - over / (U * (4.0 * own * own + 6.0 * own * along + 2.0 * current2))
         if not low < after < high:
             after = 0.5 * (low + high)
-        if abs(after - U) <= 1e-13 * U:
+        if abs(after - U) <= 1e-12 * U:
             return after
         U = after
     return U
 
 
 @njit
-def _rates(kind, numbers, own, s, grown, root, e, current, along, current2, v):  # type: ignore[no-untyped-def]
+def _rates(kind, numbers, own, s, grown, root, e, current, along, current2, near, v):  # type: ignore[no-untyped-def]
     """(ds/dt, d grown/dt, U, U_0) at one section, and dX/dt into `v`; `grown` / s is the width over still water's."""
     unit, chi, _ = _profile(kind, numbers, own, s)
     still = unit * root
     wider = max(grown / s, 1.0)
-    U = excess_speed(chi * still * still / (wider * wider), chi, along, current2)
+    U = excess_speed(chi * still * still / (wider * wider), chi, along, current2, near)
     size2, forward = 0.0, 0.0
     for x in range(3):
         v[x] = chi * U * e[x] + current[x]
@@ -167,20 +170,22 @@ def follow(kind, parameters, own, origin, e, thrust, current, unsure, curve):  #
     # A cone has no speed at its tip.
     s = 1e-6 if kind == ROUND_JET else 0.05
     grown, t = s, 0.0
-    X, v, w = origin.copy(), np.empty(3), np.empty(3)
+    X, v = origin.copy(), np.empty(3)
+    ds, dg, U, still = _rates(kind, numbers, own, s, grown, root, e, current, along, current2, 1e3, v)
     curve[0, :3] = X
     curve[0, 3], curve[0, 4], curve[0, 5], curve[0, 6] = 0.0, 0.0, 1.0, 1.0
+    for x in range(3):
+        X[x] += s * e[x]
     for k in range(1, SECTIONS + 1):
         then = FOLLOWED_S * (k / SECTIONS) ** 2
         dt = then - t
-        ds, dg, _, _ = _rates(kind, numbers, own, s, grown, root, e, current, along, current2, v)
-        ds, dg, _, _ = _rates(
-            kind, numbers, own, s + 0.5 * dt * ds, grown + 0.5 * dt * dg, root, e, current, along, current2, w
-        )
+        # The midpoint rule; the rates at a section's end are those at the next one's beginning.
+        half_s, half_grown = s + 0.5 * dt * ds, grown + 0.5 * dt * dg
+        ds, dg, U, _ = _rates(kind, numbers, own, half_s, half_grown, root, e, current, along, current2, U, v)
         for x in range(3):
-            X[x] += dt * w[x]
+            X[x] += dt * v[x]
         s, grown, t = s + dt * ds, grown + dt * dg, then
-        _, _, U, still = _rates(kind, numbers, own, s, grown, root, e, current, along, current2, v)
+        ds, dg, U, still = _rates(kind, numbers, own, s, grown, root, e, current, along, current2, U, v)
         _, _, width = _profile(kind, numbers, own, s)
         wider = max(grown / s, 1.0)
         blurred = np.sqrt(1.0 + (2.0 * unsure * t / (wider * width)) ** 2)
@@ -189,8 +194,11 @@ def follow(kind, parameters, own, origin, e, thrust, current, unsure, curve):  #
 
 
 @njit
-def fill_plume(points, ball, kind, parameters, own, curve, speed):  # type: ignore[no-untyped-def]
-    """Raise `speed`, shape (n,), to the plume's speed per square root of newton at points, shape (n, 3), in a ball."""
+def fill_plume(points, ball, kind, parameters, own, curve, end, speed):  # type: ignore[no-untyped-def]
+    """Raise `speed`, shape (n,), to the plume's speed per square root of newton at points, shape (n, 3), in a ball.
+
+    `end`, shape (2,): how far along itself the jet is whole, and what share of it goes on from there.
+    """
     numbers = as_tuple(parameters)
     count = SECTIONS
     d, length = np.zeros((count, 3)), np.empty(count)
@@ -229,17 +237,21 @@ def fill_plume(points, ball, kind, parameters, own, curve, speed):  # type: igno
                 continue
             along = a[4] + share * (b[4] - a[4])
             stretch = a[6] + share * (b[6] - a[6])
+            if r2 > (own[3] + own[4] * along + (own[5] - 1.0) * along * along) * stretch * stretch:
+                continue
             f, _, _ = speed_and_slope(
                 kind, numbers, own[0], own[1], own[2], along, along * along + r2 / (stretch * stretch)
             )
-            speed[j] = max(speed[j], f * (a[5] + share * (b[5] - a[5])))
+            left = end[1] if along > end[0] else 1.0
+            speed[j] = max(speed[j], left * f * (a[5] + share * (b[5] - a[5])))
 
 
 @njit
-def plume_speeds(points, origins, directions, areas, kind, parameters, thrusts, current, unsure):  # type: ignore[no-untyped-def]
+def plume_speeds(points, origins, directions, areas, kind, parameters, thrusts, current, unsure, ends):  # type: ignore[no-untyped-def]
     """Speed per square root of newton of m jets at n points, shape (m, n), and their curves, (m, SECTIONS + 1, 7).
 
-    Jets leave along `directions`, shape (m, 3), and move the water in excess of the current along them, too.
+    Jets leave along `directions`, shape (m, 3), and move the water in excess of the current along them, too. `ends`,
+    shape (m, 2), as for `fill_plume`.
     """
     m = origins.shape[0]
     own = own_constants(kind, parameters, areas)
@@ -254,7 +266,7 @@ def plume_speeds(points, origins, directions, areas, kind, parameters, thrusts, 
         ball[3] = max(ball[3], np.sqrt(r2))
     for i in range(m):
         follow(kind, parameters, own[i], origins[i], directions[i], thrusts[i], current, unsure, curves[i])
-        fill_plume(points, ball, kind, parameters, own[i], curves[i], speeds[i])
+        fill_plume(points, ball, kind, parameters, own[i], curves[i], ends[i], speeds[i])
     return speeds, curves
 
 
@@ -266,6 +278,7 @@ def plumes(
     law: tuple[int, Array],
     thrusts_N: Array,
     flow: Flow,
+    ends: Array,
 ) -> tuple[Array, Array]:
     """`plume_speeds` of jets of a law, of these sizes, in a flow."""
     found = plume_speeds(
@@ -277,5 +290,6 @@ def plumes(
         thrusts_N,
         flow.current_W_m_s,
         flow.unsure_m_s,
+        ends,
     )
     return cast("tuple[Array, Array]", found)

@@ -68,12 +68,11 @@ def gram(
     same_sizes(region_points_W, weights, origins_W, axes_W, areas_m2)
     place = (region_points_W, weights, origins_W, axes_W, areas_m2)
     if flow is not None and isinstance(free_jet(model), AxialJet):
-        twice, directions = np.concatenate([origins_W, origins_W]), np.concatenate([-axes_W, axes_W])
-        jets = (twice, directions, np.concatenate([areas_m2, areas_m2]))
-        moved = carried_velocity(model, region_points_W, *jets, flow.guessed, flow) * np.sqrt(weights)[:, None]
-        rows = moved.reshape(len(moved), -1)
-        # A flow that is not finite is the estimator's doing and gives a matrix that is not; the rest is the caller's.
-        G, check = rows @ rows.T, float(np.min(weights, initial=0.0) < 0.0 or np.min(areas_m2) <= 0.0)
+        check = float(np.min(weights, initial=0.0) < 0.0 or np.min(areas_m2) <= 0.0)
+        if check == 0.0:
+            twice, directions = np.concatenate([origins_W, origins_W]), np.concatenate([-axes_W, axes_W])
+            jets = (twice, directions, np.concatenate([areas_m2, areas_m2]))
+            G = velocity_gram(carried_velocity(model, region_points_W, *jets, flow.guessed, flow), weights)
     elif isinstance(model, AxialJet):
         G, check = gram_sum(*place, *model.law)
     elif isinstance(model, FloorJet):
@@ -92,6 +91,12 @@ def gram(
     return incoherent(G) if superposition == "incoherent" else G
 
 
+def velocity_gram(velocity: Array, weights: Array) -> Array:
+    """G, shape (k, k), of velocities per square root of newton, shape (k, n, 3), at points of weights, shape (n,)."""
+    rows = (velocity * np.sqrt(weights)[:, None]).reshape(len(velocity), -1)
+    return np.asarray(rows @ rows.T)
+
+
 def carried_velocity(
     model: WakeModel,
     points_W_m: Array,
@@ -100,20 +105,24 @@ def carried_velocity(
     areas_m2: Array,
     thrusts_N: Array,
     flow: Flow,
+    ends: Array | None = None,
 ) -> Array:
     """Velocity per square root of newton, shape (m, n, 3), that jets of these thrusts have in excess of a current.
 
-    Arguments as for `WakeModel.unit_velocity`; `thrusts_N`, shape (m,), more than 0, sets how far each jet gets. The
-    model must be one of ours (an `AxialJet`, with a floor or without).
+    Arguments as for `WakeModel.unit_velocity`; `thrusts_N`, shape (m,), more than 0, sets how far each jet gets. Of
+    jets that join others `ends`, shape (m, 2), says after what way, and what share goes on as itself. The model must be
+    one of ours (an `AxialJet`, with a floor or without).
     """
     jet = free_jet(model)
     if not isinstance(jet, AxialJet):
         raise InputError(f"wake model {model.name}: brings no law of a jet that a current could carry")
-    speeds, curves = plumes(points_W_m, origins_W_m, directions_W, areas_m2, jet.law, thrusts_N, flow)
+    if ends is None:
+        ends = np.tile([np.inf, 1.0], (len(origins_W_m), 1))
+    speeds, curves = plumes(points_W_m, origins_W_m, directions_W, areas_m2, jet.law, thrusts_N, flow, ends)
     velocity = speeds[:, :, None] * directions_W[:, None, :]
     if isinstance(model, FloorJet):
         walls = (np.ascontiguousarray(directions_W), areas_m2, model.numbers, thrusts_N)
-        add_carried_walls(points_W_m, curves, *walls, flow.current_W_m_s, flow.unsure_m_s, velocity)
+        add_carried_walls(points_W_m, curves, *walls, flow.current_W_m_s, flow.unsure_m_s, ends, velocity)
     return np.asarray(velocity)
 
 

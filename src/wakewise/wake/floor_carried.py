@@ -47,8 +47,11 @@ def strike(curve, bed_z):  # type: ignore[no-untyped-def]
 
 
 @njit(apart=True)
-def add_carried_walls(points, curves, directions, areas, floor, thrusts, current, unsure, velocity):  # type: ignore[no-untyped-def]
-    """Add wall jets' velocity per square root of newton to `velocity`, shape (m, n, 3); `floor` as of `FloorJet`."""
+def add_carried_walls(points, curves, directions, areas, floor, thrusts, current, unsure, ends, velocity):  # type: ignore[no-untyped-def]
+    """Add wall jets' velocity per square root of newton to `velocity`, shape (m, n, 3); `floor` as of `FloorJet`.
+
+    `ends`, shape (m, 2), as for `carried.fill_plume`: of what joins others on its way only a share strikes as itself.
+    """
     cx, cy = current[0], current[1]
     c2 = cx * cx + cy * cy
     c = np.sqrt(c2)
@@ -60,6 +63,7 @@ def add_carried_walls(points, curves, directions, areas, floor, thrusts, current
         far = (H**6 + (ROUND_DECAY * np.sqrt(areas[i])) ** 6) ** (1.0 / 6.0)
         r0 = 0.5 * WALL_SPEED / ROUND_DECAY * far
         strength, root = floor[1] * dz * np.sqrt(dz), np.sqrt(thrusts[i])
+        left = ends[i, 1] if ends[i, 0] < H else 1.0
         for j in range(points.shape[0]):
             x, y = points[j, 0] - strike_x, points[j, 1] - strike_y
             away = np.sqrt(x * x + y * y)
@@ -85,11 +89,11 @@ def add_carried_walls(points, curves, directions, areas, floor, thrusts, current
             speed = still * r * root
             if c > 0.0:
                 with_it = (rx * cx + ry * cy) / r
-                speed = excess_speed(CHI * speed * speed, CHI, with_it * (OPPOSED if with_it < 0.0 else 1.0), c2)
+                speed = excess_speed(CHI * speed * speed, CHI, with_it * (OPPOSED if with_it < 0.0 else 1.0), c2, speed)
             height = max(floor[0] - points[j, 2], 0.0)
             layer = np.exp(-np.log(2.0) * height * height / (HALF_THICKNESS**2 * square))
             soft = max(blur, SOFT * away) + _TINY
             edge = np.exp(-((beyond / soft) ** 2))
-            share = speed / root * layer * edge * np.sqrt(square / (square + blur * blur)) / r
+            share = left * speed / root * layer * edge * np.sqrt(square / (square + blur * blur)) / r
             velocity[i, j, 0] += share * rx
             velocity[i, j, 1] += share * ry
