@@ -175,3 +175,109 @@ def _show_validation(values: dict[str, Any]) -> None:
     typer.echo(f"lattice, two grids, centreline speed at 0.3 m: {shown(convergence)} % apart")
     for key, reason in values["why"].items():
         typer.echo(f"not computed: {key}: {reason}")
+
+
+Draws = Annotated[int, typer.Option("--draws", min=1, max=1000, help="Waters of the tank to train on, each drawn.")]
+Steps = Annotated[int, typer.Option("--steps", min=100, max=1_000_000, help="Steps of the training.")]
+NetworkOut = Annotated[
+    Path | None, typer.Option("--out", help="Write the network here; else it is judged and thrown away.")
+]
+Shipped = Annotated[bool, typer.Option("--shipped", help="Judge the network that ships instead of training one.")]
+HeldOut = Annotated[int, typer.Option("--held-out", min=1, max=100, help="Waters of the tank to judge on.")]
+
+
+@app.command("learn")
+def learn(
+    draws: Draws = 60,
+    steps: Steps = 8000,
+    out: NetworkOut = None,
+    shipped: Shipped = False,
+    held_out: HeldOut = 8,
+    seed: Seed = 0,
+    json: Json = False,
+) -> None:
+    """Train the learned rival on tank and lattice; hold every model against water that none was fitted to."""
+    from wakewise.studies.learned_wake import judging
+    from wakewise.studies.learned_wake.making import Recipe, make
+    from wakewise.wake.learned import load_network
+
+    with Bars().stage("learn") as progress:
+        if shipped:
+            network = load_network()
+        else:
+            network, _ = make(Recipe(draws=draws, steps=steps, seed=seed), out, progress)
+        result = judging.judge(network, judging.held_out(held_out, progress=progress))
+    if json:
+        print_json(result | {"out": None if out is None else str(out)})
+        return
+    _show_rivals(result)
+    if out is not None:
+        typer.echo(f"written: {out}")
+
+
+def _show_rivals(result: dict[str, Any]) -> None:
+    from rich.table import Table
+
+    for key, words in (
+        ("error_share", "root mean square error of the velocity over that of the velocity itself"),
+        ("factor_of_2_pct", "share of the points with more than 1 cm/s (at 1 N) right within a factor of two, %"),
+    ):
+        table = Table(title=f"{key}: {words}", title_justify="left")
+        table.add_column("model")
+        for truth in result["scores"]:
+            table.add_column(truth, justify="right")
+        for model in next(iter(result["scores"].values())):
+            table.add_row(model, *(shown(by_model[model][key]) for by_model in result["scores"].values()))
+        print_table(table)
+    typer.echo(f"learned: {result['weights']} weights, {result['circular']}")
+
+
+World = Annotated[str, typer.Option("--world", help="World of the library to fly in.")]
+Method = Annotated[str, typer.Option("--method", help="Who holds the hover.")]
+Minutes = Annotated[float, typer.Option("--minutes", min=0.5, max=30.0, help="How long the hover is.")]
+HeldStill = Annotated[bool, typer.Option("--held", help="Hold the vehicle and let its bow thrusters push in turn.")]
+FlightSeed = Annotated[int, typer.Option("--seed", help="Seed of the world, which draws the jets' width.")]
+
+
+@app.command("calibrate-flight")
+def calibrate_flight(
+    world: World = "payload",
+    method: Method = "dp",
+    minutes: Minutes = 5.0,
+    seed: FlightSeed = 1,
+    held: HeldStill = False,
+    json: Json = False,
+) -> None:
+    """Calibrate the jet from a hover, by flakes that the camera sees drift; its error against minutes."""
+    from wakewise.studies.flight_fit.curve import CalibrationFlight, curve, held_curve
+
+    if held:
+        result = held_curve(world, seed, minutes)
+    else:
+        with Bars().stage("fly") as progress:
+            result = curve(CalibrationFlight(world=world, method=method, seed=seed, minutes=minutes), progress)
+    if json:
+        print_json(result)
+        return
+    from rich.table import Table
+
+    table = Table(title=f"half width slope, drawn {result['true_half_width_growth']:.3f}")
+    for name in ("minutes", "flakes", "slope", "+-", "strength", "+-", "off by, %", "error of the water, share"):
+        table.add_column(name, justify="right")
+    table.add_row(
+        "0",
+        "0",
+        *map(shown, (result["believed"]["slope"], None, 1.0, None)),
+        "",
+        shown(result["believed"]["error_share"]),
+    )
+    for row in result["curve"]:
+        numbers = (row["half_width_slope"], row["slope_standard_error"], row["gain"], row["gain_standard_error"])
+        table.add_row(
+            shown(row["minutes"]),
+            str(row["flakes"]),
+            *map(shown, numbers),
+            shown(row["slope_error_pct"]),
+            shown(row["error_share"]),
+        )
+    print_table(table)

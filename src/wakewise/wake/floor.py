@@ -29,7 +29,6 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.compiled import njit
 from wakewise.errors import InputError
-from wakewise.interfaces import WakeModel
 from wakewise.physics import FRESH_WATER_KG_M3
 from wakewise.wake.jets import AxialJet, RoundJet
 from wakewise.wake.sums import FAST, fill_rows, pose_slopes
@@ -214,13 +213,3 @@ def fill_velocities(  # type: ignore[no-untyped-def]
             V[k],
             dV[k],
         )
-
-
-def bed_of(wake: WakeModel) -> float | None:
-    """Depth of the bed (m) that a model knows of; None for models of free jets."""
-    return wake.bed_z_m if isinstance(wake, FloorJet) else None
-
-
-def free_jet(wake: WakeModel) -> WakeModel:
-    """The free jet of a model, without its floor."""
-    return wake.jet if isinstance(wake, FloorJet) else wake

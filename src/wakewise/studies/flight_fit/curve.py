@@ -19,9 +19,11 @@ from wakewise.interfaces import Progress, no_progress
 from wakewise.missions import Leg, Route
 from wakewise.operation import Parts, Scenario, fly
 from wakewise.studies.flight_fit.fitting import FlightFit, fit_flight
+from wakewise.studies.flight_fit.held import held_sightings
 from wakewise.studies.flight_fit.sightings import Sightings, Watcher
 from wakewise.studies.learned_wake.judging import Score, unit_f
 from wakewise.studies.learned_wake.truth import Drawn, even_parcel_rows
+from wakewise.vehicles import Vehicle
 from wakewise.wake import RoundJet
 
 MINUTES = (0.5, 1.0, 2.0, 5.0)
@@ -74,10 +76,9 @@ def hover_parts(flight: CalibrationFlight) -> Parts:
 def watched(flight: CalibrationFlight, progress: Progress = no_progress) -> tuple[Sightings, Parts, Array | None]:
     """What the camera saw on the flight, its parts, and the last current that the filter had."""
     parts = hover_parts(flight)
-    imaging = parts.scenario.imaging
-    camera = PinholeCamera(imaging.width, imaging.height, float(np.radians(imaging.fov_deg)))
     rng = np.random.default_rng([flight.seed, 11])
-    watcher = Watcher(camera=camera, vehicle=parts.vehicle, rng=rng, per_m3=imaging.flakes_per_m3)
+    per_m3 = parts.scenario.imaging.flakes_per_m3
+    watcher = Watcher(camera=camera_of(parts), vehicle=parts.vehicle, rng=rng, per_m3=per_m3)
     current: list[Array | None] = [None]
 
     def watch(step: Any, witness: Any) -> None:
@@ -90,27 +91,55 @@ def watched(flight: CalibrationFlight, progress: Progress = no_progress) -> tupl
 
 
 def curve(flight: CalibrationFlight, progress: Progress = no_progress) -> dict[str, Any]:
-    """Fits of the first minutes, as plain values with the truth that they are judged by."""
+    """Fits of the first minutes of a hover, as plain values with the truth that they are judged by."""
     began = time.process_time()
     seen, parts, current = watched(flight, progress)
-    imaging = parts.scenario.imaging
-    camera = PinholeCamera(imaging.width, imaging.height, float(np.radians(imaging.fov_deg)))
     jets = parts.scenario.tank.jets
     water = Drawn(half_width_growth=jets.half_width_growth, wake_life=jets.wake_life)
-    flown = time.process_time() - began
+    found = _curve(seen, camera_of(parts), parts.vehicle, water, flight.minutes, SETTLE_S, current)
+    true_current = [float(v) for v in parts.scenario.tank.current.velocity_m_s]
+    told = {"way": flight.method, "world": flight.world, "seed": flight.seed, "true_current_m_s": true_current}
+    return told | found | {"cpu_s": time.process_time() - began}
+
+
+def held_curve(world: str, seed: int, minutes: float = 5.0) -> dict[str, Any]:
+    """The same of a vehicle that is held while its bow thrusters push in turn, in the jets that a world draws."""
+    began = time.process_time()
+    parts = Scenario.preset("quick", world=world, seed=seed).parts()
+    jets = parts.scenario.tank.jets
+    water = Drawn(half_width_growth=jets.half_width_growth, wake_life=jets.wake_life)
+    current = np.array(parts.scenario.tank.current.velocity_m_s)
+    rng = np.random.default_rng([seed, 13])
+    camera, per_m3 = camera_of(parts), parts.scenario.imaging.flakes_per_m3
+    seen = held_sightings(parts.vehicle, camera, water, current, rng, minutes=minutes, per_m3=per_m3)
+    told = {"way": "held", "world": world, "seed": seed, "true_current_m_s": [float(v) for v in current]}
+    found = _curve(seen, camera, parts.vehicle, water, minutes, 0.0, None)
+    return told | found | {"cpu_s": time.process_time() - began}
+
+
+def camera_of(parts: Parts) -> PinholeCamera:
+    """The pinhole that a calibrated and undistorted view is."""
+    imaging = parts.scenario.imaging
+    return PinholeCamera(imaging.width, imaging.height, float(np.radians(imaging.fov_deg)))
+
+
+def _curve(
+    seen: Sightings,
+    camera: PinholeCamera,
+    vehicle: Vehicle,
+    water: Drawn,
+    minutes: float,
+    start_s: float,
+    current_m_s: Array | None,
+) -> dict[str, Any]:
     rows = []
-    for minutes in (m for m in MINUTES if m <= flight.minutes + 1e-9):
-        fit = fit_flight(seen.until(SETTLE_S + 60.0 * minutes), camera, parts.vehicle, current)
-        rows.append({"minutes": minutes, **fit_figures(fit, water)})
+    for until in (m for m in MINUTES if m <= minutes + 1e-9):
+        fit = fit_flight(seen.until(start_s + 60.0 * until), camera, vehicle, current_m_s)
+        rows.append({"minutes": until, **fit_figures(fit, water)})
     return {
-        "world": flight.world,
-        "method": flight.method,
-        "seed": flight.seed,
         "true_half_width_growth": water.half_width_growth,
-        "believed": judged(BELIEVED_SLOPE, 1.0, water),
+        "believed": {"slope": BELIEVED_SLOPE, **judged(BELIEVED_SLOPE, 1.0, water)},
         "curve": rows,
-        "flight_cpu_s": flown,
-        "fit_cpu_s": time.process_time() - began - flown,
     }
 
 

@@ -20,8 +20,8 @@ from wakewise.interfaces import FlakeCloud, Witness
 from wakewise.operation.loop import Step
 from wakewise.vehicles import Vehicle
 
-APART_S = 0.25
-"""Between the two frames of a pair."""
+APART_S = 0.04
+"""Between the two frames of a pair, video's 25 a second: farther apart the fast ones are lost, and jets look slow."""
 EVERY_S = 1.0
 """Between pairs: a video camera gives thirty times as many, which see the same flakes."""
 PIXEL_NOISE = 0.3
@@ -31,8 +31,9 @@ BLUR_NOISE = 0.25
 """Of a disk's radius, px."""
 LEAST_COVER = 0.1
 """Share of the light behind it that a flake must hide to be found."""
-LOST_PX = 15.0
-"""A flake is not found again where its way differs more than this from that of something that stands still."""
+LOST_PX = 60.0
+"""A flake is not found again where its way differs more than this from that of something that stands still: 1 m/s at
+0.3 m, and about the distance between flakes in the picture."""
 MOST_PER_PAIR = 30
 """Flakes of a pair of frames that are followed, drawn from those that could be."""
 PUSHING_S = 3.0

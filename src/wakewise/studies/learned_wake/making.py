@@ -28,8 +28,8 @@ SHARES = {"parcels": 0.4, "parcels, even": 0.25, "lattice": 0.15, "lattice, even
 class Recipe:
     """How much is computed: draws of the tank's water, steps of Adam, and whether the lattice runs."""
 
-    draws: int = 24
-    steps: int = 6000
+    draws: int = 60
+    steps: int = 8000
     lattice: bool = True
     seed: int = 0
 
