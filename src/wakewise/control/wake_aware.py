@@ -14,14 +14,13 @@ from wakewise.control.levers import with_bed_points
 from wakewise.control.poised import poised
 from wakewise.control.receding import planning_controller
 from wakewise.control.settings import ControlSettings
-from wakewise.control.spare import respared
-from wakewise.control.watch import Watch
+from wakewise.control.spare import respared, watching
 from wakewise.interfaces import Controller, WakeModel
 from wakewise.planning import Surroundings
 from wakewise.planning.surroundings import around_target
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
-from wakewise.wake import WakeView, bed_of, free_jet, wake_model
+from wakewise.wake import bed_of, free_jet, wake_model
 
 
 def planned(
@@ -59,8 +58,7 @@ def _planned(
     solid = around or around_target(region)
     if not levers.spare:
         controller = planning_controller(vehicle, seen, wake, settings, name=name, surroundings=solid)
-        watch = Watch(view=WakeView.of(vehicle, seen, wake, settings.superposition), levers=levers)
-        return poised(controller, watch, vehicle, settings, solid)
+        return poised(controller, watching(vehicle, seen, wake, settings), vehicle, settings, solid)
     # The motion spares the target alone: points beside it move only spare thrusts.
     controller = planning_controller(vehicle, region, free_jet(wake), settings, name=name, surroundings=solid)
     spared = respared(controller, vehicle, seen, wake, settings)

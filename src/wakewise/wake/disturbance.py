@@ -17,9 +17,10 @@ from numpy.typing import ArrayLike
 from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.interfaces import WakeModel
+from wakewise.wake.beds import free_jet
 from wakewise.wake.carried import Flow, plumes
 from wakewise.wake.checks import explain, same_sizes
-from wakewise.wake.floor import FloorJet, free_jet
+from wakewise.wake.floor import FloorJet
 from wakewise.wake.floor_carried import add_carried_walls
 from wakewise.wake.floor_sums import floor_gram_sum
 from wakewise.wake.gradients import Superposition
