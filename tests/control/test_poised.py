@@ -15,7 +15,8 @@ from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_from_euler
 from wakewise.interfaces import BodyState, Command, Goal
 from wakewise.operation import Scenario, fly
-from wakewise.studies.gentle.flight import camera_rmse_mm, gentle_route
+from wakewise.studies.gentle.courses import gentle_route
+from wakewise.studies.gentle.flight import camera_errors
 from wakewise.vehicles import load_vehicle
 
 DT = 0.02
@@ -169,7 +170,7 @@ def test_a_heavy_vehicle_that_leans_halves_the_wash_and_keeps_its_camera_in_plac
         parts = Scenario.preset("quick", world="payload", seed=2, **fields).parts()
         hover = gentle_route(parts.target.centre_W_m, parts.scenario.mission.standoff_m, -2.4)
         frame = fly(parts.replace(route=hover), checked=False, duration_s=18.0).steps.filter(pl.col("time_s") > 14.0)
-        error_mm = camera_rmse_mm(frame, parts.vehicle)
+        error_mm = camera_errors(frame, parts.vehicle)["camera_rmse_mm"]
         seen[posture] = (frame["target_speed_mean_m_s"].mean(), frame["ray_optical_depth"].mean(), error_mm)
     leaned, level = seen[None], seen[False]
     assert leaned[0] < 0.5 * level[0]

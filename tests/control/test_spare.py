@@ -7,6 +7,7 @@ from wakewise.allocation import Weights, gentle_allocation
 from wakewise.control import ControlSettings, make_controller, vehicle_layout
 from wakewise.control.levers import LeverSettings
 from wakewise.control.spare import Respared, SpareState, joined_jets, meeting_pairs, meeting_view
+from wakewise.control.thrift import Sharer
 from wakewise.control.watch import Watch
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Command, Goal
@@ -28,7 +29,7 @@ AHEAD = Region(
 def watching(view, previous=1e-3):
     """What is seen through a view, in still water."""
     weights = Weights(disturbance=150.0, effort=1e-3, previous=previous)
-    return Watch(view=view, levers=LeverSettings(drift=False), layout=LAYOUT, weights=weights)
+    return Watch(view=view, levers=LeverSettings(drift=False), sharer=Sharer(layout=LAYOUT), weights=weights)
 
 
 def test_two_equal_jets_join_along_the_middle_with_the_sum_of_their_momenta():

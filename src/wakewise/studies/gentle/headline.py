@@ -17,6 +17,8 @@ TROUBLE_M_S, CALM_M_S = 0.010, 0.005
 POSITION_SHARE, POSITION_MM = 1.05, 0.2
 """The camera may be off by so much of what `dp` leaves, and so much more."""
 SILT, SWAY, PLACE, ENERGY = "ray_optical_depth", "sway_rms_mm", "camera_rmse_mm", "energy_kJ"
+SWAY_WASH = "sway_wash_mm"
+"""What the vehicle adds to the sway of the same water without it: all that a controller can take away (decision 0038)."""
 BODY = "position_rmse_mm"
 RIVALS = ("dp", "unaware", "bow-rule")
 WRONG = "wake-aware, wrong current"
@@ -41,7 +43,7 @@ def headline(flights: Flights, trims: Mapping[Known, str], failed: set[tuple[str
             "calm": calm(method, {k for k in by if by[k] < CALM_M_S}, flights, trims),
         }
 
-    beside = [name for name in ("instant", "wake-aware+trim", "bow-rule") if flights.get(name)]
+    beside = [name for name in ("instant", "wake-aware+trim", "dp+trim", "bow-rule") if flights.get(name)]
     return {
         "method": "wake-aware",
         **table("wake-aware", speeds),
@@ -78,7 +80,7 @@ def trouble(
     answer["by_world_pct"] = worst
     answer |= place(dp, ours, len(lost))
     answer["energy_ratio"], answer["energy_ratio_interval"] = ratio(pairs_of(dp, ours, ENERGY, trims))
-    for name, figure in (("silt_rays", SILT), ("sway", SWAY)):
+    for name, figure in (("silt_rays", SILT), ("sway", SWAY), ("sway_wash", SWAY_WASH)):
         less = _less(ratio(pairs_of(dp, ours, figure, trims)))
         answer[f"{name}_reduction_pct"], answer[f"{name}_reduction_interval_pct"] = less
         answer[f"{name}_worst_world_pct"] = _worst_ratio(dp, ours, figure, answer["scenarios"])

@@ -15,6 +15,8 @@ LEVERS: dict[str, Settings] = {
     "drift": {"levers.drift": False},
     "jets that meet": {"levers.meet": False},
     "floor": {"wake.floor": False},
+    "posture": {"levers.posture": False},
+    "thrift": {"levers.thrift": False},
 }
 """Fields of `ControlSettings` that take a lever away, by its name. Sharing out (`levers.spare`) is no lever of its own:
 the others need it."""

@@ -22,6 +22,7 @@ METHODS = (
     "instant",
     "wake-aware",
     "wake-aware+trim",
+    "dp+trim",
 )
 """The first is what the others are held against."""
 

@@ -26,7 +26,7 @@ from wakewise.studies.worlds.flight import FLIGHT_FIGURES, MODEL_FIGURES, WorldT
 from wakewise.studies.worlds.judge import JUDGED, judge_table, judge_trials
 from wakewise.trials.timing import BenchOptions
 
-METHODS = ("dp", "manual", "unaware", "smooth", "bow-rule", "wake-aware")
+METHODS = ("dp", "manual", "ardusub", "unaware", "smooth", "bow-rule", "instant", "wake-aware")
 """The first is what the others are held against."""
 
 EMERGENT = (
