@@ -130,7 +130,8 @@ def test_respared_thrusts_make_the_same_wrench_and_a_fallback_is_left_alone():
             np.testing.assert_allclose(command.thrusts_N, LAYOUT.inverse @ inner.wrench)
         else:
             assert not np.allclose(command.thrusts_N, LAYOUT.inverse @ inner.wrench)
-    assert sum(searches) == 3
+    # The searches at the start and after the trouble are made at once, the others between two plans.
+    assert [k for k, found in enumerate(searches) if found] == [2, 7]
 
 
 def test_shares_leave_a_poor_minimum_within_two_seconds():

@@ -6,7 +6,7 @@ import pytest
 from wakewise.allocation import least_thrusts
 from wakewise.control import ControlSettings, LeverSettings, make_controller
 from wakewise.control.spare import watching
-from wakewise.control.watch import UNSURE
+from wakewise.control.watch import UNSURE, WORTH
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Goal
 from wakewise.targets import Region
@@ -54,21 +54,38 @@ def test_what_the_estimator_is_unsure_of_is_added():
     assert found.unsure_m_s == pytest.approx(np.sqrt(3e-4 + (UNSURE * 0.1) ** 2))
 
 
-@pytest.mark.parametrize("free", [False, True])
-def test_shares_make_the_wrench_and_are_never_worse_than_the_least_by_their_own_matrix(free):
+def test_shares_make_the_wrench_and_are_never_worse_than_those_of_before_by_their_own_matrix():
     """For currents from all sides; the matrix that comes with them is that of these thrusts."""
     eyes, rng = watch(), np.random.default_rng(4)
     layout = eyes.layout
     for angle in np.linspace(0.0, 2.0 * np.pi, 7)[:-1]:
         here = estimate(0.09 * np.cos(angle), 0.09 * np.sin(angle), 0.0)
         wrench = np.array([-2.6, 0.9, -3.3, 0.0, -0.3, 0.0]) + 0.1 * rng.normal(size=6)
-        found, G = eyes.share_out(wrench, here, np.zeros(8), free=free)
+        before = least_thrusts(layout, wrench).thrusts_N
+        found, G = eyes.share_out(wrench, here, before)
         np.testing.assert_allclose(layout.B @ found.thrusts_N, wrench, atol=1e-9)
         np.testing.assert_allclose(G, eyes.gram(here, found.thrusts_N), atol=1e-15)
-        least = least_thrusts(layout, wrench).thrusts_N
-        before = None if free else np.zeros(8)
-        own = eyes.cost(found.thrusts_N, G, before)
-        assert own <= eyes.cost(least, eyes.gram(here, least), before) * (1.0 + 1e-9)
+        assert eyes.cost(found.thrusts_N, G, before) <= eyes.cost(before, eyes.gram(here, before)) * (1.0 + 1e-9)
+
+
+def test_a_jump_is_worth_it_or_not_made():
+    """It makes the wrench, costs less than what is flown, each by its own matrix, and is not repeated."""
+    eyes, made = watch(), 0
+    layout = eyes.layout
+    for angle in np.linspace(0.0, 2.0 * np.pi, 7)[:-1]:
+        here = estimate(0.09 * np.cos(angle), 0.09 * np.sin(angle), 0.0)
+        wrench = np.array([-2.6, 0.9, -3.3, 0.0, -0.3, 0.0])
+        present = least_thrusts(layout, wrench).thrusts_N
+        anew = eyes.jump(wrench, here, present)
+        if anew is None:
+            continue
+        found, G = anew
+        made += 1
+        np.testing.assert_allclose(layout.B @ found.thrusts_N, wrench, atol=1e-9)
+        np.testing.assert_allclose(G, eyes.gram(here, found.thrusts_N), atol=1e-15)
+        assert eyes.cost(found.thrusts_N, G) < (1.0 - WORTH) * eyes.cost(present, eyes.gram(here, present))
+        assert eyes.jump(wrench, here, found.thrusts_N) is None
+    assert made >= 2
 
 
 def test_where_the_wake_model_gives_nonsense_there_are_no_shares():
@@ -111,11 +128,12 @@ def test_where_the_current_brings_the_wash_back_shares_are_gentler_for_knowing_i
     wrench, here = np.array([-2.64, 0.93, -3.33, 0.0, -0.28, 0.0]), estimate(-0.017, -0.083, 0.0)
     floor = FloorJet(jet=RoundJet(), bed_z_m=0.6)
     eyes, blind = watch(floor), watch(floor, drift=False)
-    unknowing = blind.share_out(wrench, here, np.zeros(8), free=True)[0].thrusts_N
-    thrusts = np.zeros(8)
+    least = least_thrusts(eyes.layout, wrench).thrusts_N
+    unknowing = blind.jump(wrench, here, least)[0].thrusts_N
+    thrusts = least
     for k in range(20):
-        found, _ = eyes.share_out(wrench, here, thrusts, free=k == 0)
-        thrusts = found.thrusts_N
+        found = (eyes.jump(wrench, here, thrusts) if k == 0 else None) or eyes.share_out(wrench, here, thrusts)
+        thrusts = found[0].thrusts_N
     cost = {name: eyes.cost(T, eyes.gram(here, T)) for name, T in (("knows", thrusts), ("does not", unknowing))}
     assert cost["knows"] < 0.5 * cost["does not"]
     slow, fast = (tank_speed_m_s(T, here.current_W_m_s) for T in (thrusts, unknowing))

@@ -11,7 +11,7 @@ from wakewise.allocation import Allocation, Layout, compile_layout
 from wakewise.allocation.allocate import disturbance_of
 from wakewise.arrays import Array, freeze
 from wakewise.control.tracker import Tracker, TrackerState
-from wakewise.control.watch import Watch
+from wakewise.control.watch import APART_S, EVERY_S, FULL, JUMP_EVERY_S, Watch
 from wakewise.interfaces import BodyState, Command, Goal
 from wakewise.vehicles import Vehicle
 from wakewise.wake.view import WakeView
@@ -25,13 +25,9 @@ def vehicle_layout(vehicle: Vehicle) -> Layout:
     return compile_layout(vehicle.allocation_matrix, vehicle.thrust_lower_N, vehicle.thrust_upper_N)
 
 
-EVERY_S = 0.1
-"""Time between two searches for the best shares: the planner's own, and a thruster's lag."""
 HOLD_S = 0.5
 """Time constant with which thrusts fade while there is no usable estimate: some filter updates may be missed, a
 vehicle that is lost must not go on pushing."""
-FULL = 1.0 - 1e-9
-"""Shares of a wrench above this are all of it, but for rounding."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,7 +35,7 @@ class ControllerState:
     """What a controller remembers between steps.
 
     The tracker's integral, the thrusts last asked for, shape (n,), and the share of the last wrench that they made;
-    with a `watch`, its Gram matrix, shape (2 n, 2 n), and how old that is.
+    with a `watch`, its Gram matrix, shape (2 n, 2 n), how old that is, and how long ago a jump was looked for.
     """
 
     tracker: TrackerState
@@ -47,6 +43,7 @@ class ControllerState:
     share: float = 1.0
     gram: Array | None = None
     age_s: float = np.inf
+    since_s: float = np.inf
 
     def __post_init__(self) -> None:
         freeze(self, thrusts_N=(None,))
@@ -81,7 +78,7 @@ class TrackingController:
         tracker_state, wrench = self.tracker.wrench(state.tracker, dt_s, estimate, goal, saturated=state.share < FULL)
         if not np.isfinite(wrench.sum()):
             return self._hold(state, dt_s, "wrench not finite: holding the last thrusts, fading")
-        gram, age_s, found = state.gram, state.age_s + dt_s, None
+        gram, age_s, since_s, found = state.gram, state.age_s + dt_s, state.since_s + dt_s, None
         if self.watch is None:
             gram = self.view.gram(estimate.X_WB)
         else:
@@ -89,6 +86,9 @@ class TrackingController:
             if gram is not None and age_s + 1e-6 < EVERY_S and self.watch.allowed(moved):
                 found = replace(self.allocate(wrench, None, moved), thrusts_N=moved, wrench_B=wrench)
                 found = replace(found, disturbance=disturbance_of(gram, moved))
+                if since_s >= JUMP_EVERY_S and age_s + 1e-6 >= APART_S:
+                    since_s, anew = 0.0, self.watch.jump(wrench, estimate, moved)
+                    found, gram = (found, gram) if anew is None else anew
             else:
                 shared = self.watch.share_out(wrench, estimate, state.thrusts_N)
                 found, gram = (None, None) if shared is None else shared
@@ -102,7 +102,7 @@ class TrackingController:
         command = Command(thrusts_N=found.thrusts_N, wrench_B=wrench, disturbance=found.disturbance, fallback=fallback)
         kept = gram if self.watch is not None and usable else None
         after = ControllerState(
-            tracker=tracker_state, thrusts_N=found.thrusts_N, share=found.scale, gram=kept, age_s=age_s
+            tracker=tracker_state, thrusts_N=found.thrusts_N, share=found.scale, gram=kept, age_s=age_s, since_s=since_s
         )
         return after, command
 

@@ -21,9 +21,10 @@ import numpy as np
 
 from wakewise.allocation import Layout, least_thrusts
 from wakewise.arrays import Array, freeze
-from wakewise.control.loop import FULL, HOLD_S, vehicle_layout
+from wakewise.control.loop import HOLD_S, vehicle_layout
 from wakewise.control.settings import ControlSettings
 from wakewise.control.tracker import Tracker, TrackerState, make_tracker
+from wakewise.control.watch import FULL
 from wakewise.geometry import Pose, euler_from_quat, quat_from_euler
 from wakewise.interfaces import BodyState, Command, Goal, WakeModel
 from wakewise.pilot import Person, PersonState, Sticks, View, begin, draw_person, steer

@@ -22,7 +22,7 @@ import numpy as np
 
 from wakewise.allocation import Layout, Weights, compile_layout, gentle_allocation
 from wakewise.arrays import Array, freeze
-from wakewise.control.loop import FULL
+from wakewise.control.watch import FULL
 from wakewise.geometry import Pose, quat_from_rotvec
 from wakewise.interfaces import Goal
 from wakewise.planning import Surroundings

@@ -29,9 +29,10 @@ import numpy as np
 
 from wakewise.allocation import Layout, least_thrusts
 from wakewise.arrays import Array
-from wakewise.control.loop import FULL, HOLD_S, vehicle_layout
+from wakewise.control.loop import HOLD_S, vehicle_layout
 from wakewise.control.settings import ControlSettings
 from wakewise.control.tracker import Tracker, TrackerState, make_tracker
+from wakewise.control.watch import FULL
 from wakewise.interfaces import BodyState, Command, Controller, Goal
 from wakewise.vehicles import Vehicle
 

@@ -20,10 +20,9 @@ import numpy as np
 
 from wakewise.allocation import Layout, Weights
 from wakewise.arrays import Array, IntArray
-from wakewise.control.loop import EVERY_S
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
 from wakewise.control.thrift import sharer_of
-from wakewise.control.watch import Watch
+from wakewise.control.watch import APART_S, EVERY_S, JUMP_EVERY_S, Watch
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Command, Controller, Goal, WakeModel
 from wakewise.targets import Region
@@ -37,10 +36,6 @@ LEAST_COSINE = -0.5
 """Cosine of 120 deg: jets that cross at more turn aside rather than join."""
 HALF_WIDTH_SLOPE = 0.096
 """Half-speed radius of a round jet over the distance along it (see `wakewise.wake.RoundJet`)."""
-FREE_EVERY_S = 2.0
-"""Time between two searches without a price on change: the planner's horizon."""
-WORTH = 0.05
-"""Share of the cost that a jump must save: less is within what a wake model may claim to know."""
 _PARALLEL = 0.999
 _LEAST_SHARE = 1e-3
 
@@ -209,8 +204,9 @@ class Respared:
     exact allocator, so it can neither slow the plan nor make it swing. Shares are found `EVERY_S`, as often as plans
     are made; in between the wrench's change is made with the least thrusts, which leaves the spare ones as they are.
     The price on change keeps shares near to the last ones, and for good where another minimum lies apart (the load on
-    one diagonal pair of verticals or the other). So every `FREE_EVERY_S` they are sought without it, and taken where
-    that is better by more than `WORTH`. A step on which the other fell back is flown as it is.
+    one diagonal pair of verticals or the other). So every `JUMP_EVERY_S` they are sought without it, on a step of its
+    own, and taken where that is better by more than `WORTH` (see `watch`). A step on which the other fell back is flown
+    as it is.
     """
 
     name: str
@@ -231,27 +227,26 @@ class Respared:
         inner, command = self.inner.step(state.inner, dt_s, estimate, goal)
         if command.fallback is not None:
             return SpareState(inner=inner, thrusts_N=command.thrusts_N), command
-        if state.age_s + 1e-6 < EVERY_S:
-            thrusts = self.watch.moved(command.wrench_B, state.thrusts_N)
-            if self.watch.allowed(thrusts):
-                told = self._told(inner, thrusts, dt_s)
-                held = replace(state, inner=told, thrusts_N=thrusts, age_s=state.age_s + dt_s)
-                return held, replace(command, thrusts_N=thrusts, disturbance=state.disturbance)
         watch, wrench = self.watch, command.wrench_B
+        thrusts, since_s = watch.moved(wrench, state.thrusts_N), state.free_age_s + dt_s
+        if state.age_s + 1e-6 < EVERY_S and watch.allowed(thrusts):
+            held = replace(state, thrusts_N=thrusts, age_s=state.age_s + dt_s, free_age_s=since_s)
+            if state.free_age_s + 1e-6 >= JUMP_EVERY_S and state.age_s + 1e-6 >= APART_S:
+                anew = watch.jump(wrench, estimate, thrusts)
+                held = replace(held, free_age_s=dt_s)
+                if anew is not None:
+                    held = replace(held, thrusts_N=anew[0].thrusts_N, disturbance=anew[0].disturbance)
+            held = replace(held, inner=self._told(inner, held.thrusts_N, dt_s))
+            return held, replace(command, thrusts_N=held.thrusts_N, disturbance=held.disturbance)
         shared = watch.share_out(wrench, estimate, state.thrusts_N)
         if shared is None:
             words = "wake model not finite: thrusts of the plan"
             return SpareState(inner=inner, thrusts_N=command.thrusts_N), replace(command, fallback=words)
-        found, G = shared
-        free_age_s = state.free_age_s + EVERY_S
-        if free_age_s + 1e-6 >= FREE_EVERY_S:
-            free_age_s = 0.0
-            anew = watch.share_out(wrench, estimate, state.thrusts_N, free=True)
-            if anew is not None:
-                saved = watch.cost(found.thrusts_N, G) - watch.cost(anew[0].thrusts_N, anew[1])
-                found = anew[0] if saved > WORTH * watch.cost(found.thrusts_N, G) else found
+        found, _ = shared
+        # The first search is made with the first plan, the next ones between two plans.
+        age_s = dt_s if np.isfinite(state.age_s) else EVERY_S - APART_S + dt_s
         told = self._told(inner, found.thrusts_N, dt_s)
-        new = SpareState(told, found.thrusts_N, dt_s, found.disturbance, free_age_s)
+        new = SpareState(told, found.thrusts_N, age_s, found.disturbance, since_s)
         return new, replace(command, thrusts_N=found.thrusts_N, disturbance=found.disturbance)
 
     def _told(self, inner: Any, thrusts_N: Array, dt_s: float) -> Any:

@@ -1,9 +1,10 @@
 """What a method watches: the region as the jets reach it, carried by the current that the estimator finds.
 
-Where a jet's water goes depends on how hard it is sent, so in a current the Gram matrix holds near the thrusts that it
-was made with. Shares are therefore judged by the matrix of their own thrusts: those of before, the least, and what the
-exact allocator makes of the matrix of either; the best of the four is flown, and the next search begins there. So
-no share is flown that its own matrix calls worse than the least thrusts.
+Where a jet's water goes depends on how hard it is sent, so in a current the Gram matrix holds near the thrusts that
+it was made with. Shares are therefore judged by the matrix of their own thrusts. Ten times a second those of before
+are held against what the exact allocator makes of their matrix, and the next search begins at the better; every two
+seconds, on a step of its own, the least thrusts and what the allocator makes of theirs are looked at. So no share is
+flown for longer that its own matrix calls worse than the least thrusts.
 """
 
 from __future__ import annotations
@@ -24,6 +25,17 @@ UNSURE = 0.2
 """Standard deviation of each component of the current along a jet's way over its speed at the vehicle, beside what the
 estimator is unsure of: from the bed's own layer, where a current falls to a half, and eddies of a tenth to a fifth
 (I. Nezu and H. Nakagawa, Turbulence in Open-Channel Flows, 1993)."""
+
+WORTH = 0.05
+"""Share of the cost that a jump must save: less is within what a wake model may claim to know."""
+EVERY_S = 0.1
+"""Time between two searches for the best shares: the planner's own, and a thruster's lag."""
+JUMP_EVERY_S = 2.0
+"""Time between two looks for better shares elsewhere: the planner's horizon."""
+APART_S = 0.04
+"""Plan, shares and jumps are made so long after one another, so that no step has two of them."""
+FULL = 1.0 - 1e-9
+"""Shares of a wrench above this are all of it, but for rounding."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,38 +83,46 @@ class Watch:
         """Whether thrusts, shape (n,), are within the limits."""
         return bool(np.all((thrusts_N >= self.layout.lower_N) & (thrusts_N <= self.layout.upper_N)))
 
-    def share_out(
-        self, wrench_B: Array, estimate: BodyState, previous_N: Array, *, free: bool = False
-    ) -> tuple[Allocation, Array] | None:
-        """The gentlest thrusts found for a wrench, and the Gram matrix that says so, shape (2 n, 2 n).
+    def share_out(self, wrench_B: Array, estimate: BodyState, previous_N: Array) -> tuple[Allocation, Array] | None:
+        """Gentle thrusts for a wrench, near those of before, and the Gram matrix that says so, shape (2 n, 2 n).
 
-        `previous_N`, shape (n,), are the thrusts of before; `free` leaves out the price on change. None if the wake
-        model gives what is not finite.
+        The gentler of two: those of before, `previous_N`, shape (n,), with the least change, and what the exact
+        allocator makes of their matrix. None if the wake model gives what is not finite.
         """
-        layout, weights = self.layout, replace(self.weights, previous=0.0) if free else self.weights
-        before = None if free else previous_N
         moved = self.moved(wrench_B, previous_N)
-        least = least_thrusts(layout, wrench_B)
-        still = self.flow(estimate, previous_N) is None
-        best: tuple[float, Allocation, Array] | None = None
-        for guess in (moved,) if still or least.scale < 1.0 - 1e-9 else (moved, least.thrusts_N):
-            G = self.gram(estimate, guess)
-            if not np.isfinite(G).all():
-                return None
-            found = self.sharer.shares(wrench_B, G, weights, self.view.total_weight, previous_N)
-            if still:
-                return found, G
-            choices = [(found, self.gram(estimate, found.thrusts_N))]
-            if self.allowed(guess):
-                choices.append((replace(found, thrusts_N=guess, wrench_B=layout.B @ guess), G))
-            for choice, own in choices:
-                value = self.cost(choice.thrusts_N, own, before)
-                if best is None or value < best[0]:
-                    best = value, choice, own
-        if best is None or not np.isfinite(best[0]):
+        before = self.gram(estimate, moved)
+        if not np.isfinite(before).all():
             return None
-        _, chosen, own = best
-        return replace(chosen, disturbance=disturbance_of(own, chosen.thrusts_N)), own
+        found = self.sharer.shares(wrench_B, before, self.weights, self.view.total_weight, previous_N)
+        if self.flow(estimate, previous_N) is None:
+            return found, before
+        after = self.gram(estimate, found.thrusts_N)
+        if self.allowed(moved):
+            stays = self.cost(moved, before, previous_N)
+            if not self.cost(found.thrusts_N, after, previous_N) < stays:
+                same = replace(found, thrusts_N=moved, wrench_B=self.layout.B @ moved)
+                return replace(same, disturbance=disturbance_of(before, moved)), before
+        if not np.isfinite(after).all():
+            return None
+        return replace(found, disturbance=disturbance_of(after, found.thrusts_N)), after
+
+    def jump(self, wrench_B: Array, estimate: BodyState, present_N: Array) -> tuple[Allocation, Array] | None:
+        """Other thrusts for a wrench, better by more than `WORTH` than those that make it now; None if there are none.
+
+        Without a price on change, from the least thrusts on: the price keeps shares near to the last ones, and for good
+        where another minimum lies apart. `present_N`, shape (n,), must make the wrench.
+        """
+        least = least_thrusts(self.layout, wrench_B)
+        first, there = (self.gram(estimate, thrusts) for thrusts in (present_N, least.thrusts_N))
+        if not (np.isfinite(first).all() and np.isfinite(there).all()):
+            return None
+        free = replace(self.weights, previous=0.0)
+        found = self.sharer.shares(wrench_B, there, free, self.view.total_weight)
+        own = there if self.flow(estimate, present_N) is None else self.gram(estimate, found.thrusts_N)
+        best, G = min(((least, there), (found, own)), key=lambda pair: self.cost(pair[0].thrusts_N, pair[1]))
+        if best.scale < FULL or not self.cost(best.thrusts_N, G) < (1.0 - WORTH) * self.cost(present_N, first):
+            return None
+        return replace(best, disturbance=disturbance_of(G, best.thrusts_N)), G
 
     def _believed(self, estimate: BodyState) -> tuple[Array | None, Array | None]:
         """The current, shape (3,), and its covariance, shape (3, 3), None each where nothing is known or sure."""

@@ -18,7 +18,7 @@ POSITION_SHARE, POSITION_MM = 1.05, 0.2
 """The camera may be off by so much of what `dp` leaves, and so much more."""
 SILT, SWAY, PLACE, ENERGY = "ray_optical_depth", "sway_rms_mm", "camera_rmse_mm", "energy_kJ"
 SWAY_WASH = "sway_wash_mm"
-"""What the vehicle adds to the sway of the same water without it: all that a controller can take away (decision 0038)."""
+"""What the vehicle adds to the sway of the same water without it: all that a controller can take away (0038)."""
 BODY = "position_rmse_mm"
 RIVALS = ("dp", "unaware", "bow-rule")
 WRONG = "wake-aware, wrong current"
