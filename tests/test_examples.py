@@ -81,7 +81,7 @@ def test_the_gentle_thrusts_of_one_wrench_are_gentler_and_drawn(tmp_path):
 def test_ballast_is_advised_and_tried_in_the_tank(tmp_path):
     """Advice by the wake model, then two flights; less thrust to hold is less energy."""
     advice, before, after = run("ballast.py", tmp_path, "paper", SECONDS).splitlines()
-    assert "12 poses held: move the centre of gravity" in advice
+    assert "12 poses held: add floats of" in advice
     assert before.startswith("as it is: dp") and after.startswith("as advised: dp")
     energies = [float(kJ) for line in (before, after) for kJ in re.findall(r"([\d.]+) kJ", line)]
     assert energies[1] < energies[0]
