@@ -20,7 +20,13 @@ def test_a_flight_gives_every_figure(row):
     """Numbers that are finite; none for a rigid target, a float that nobody added, a shutter that did not open."""
     missing = {key for key in FIGURES if row[key] is None}
     assert set(row) == set(FIGURES)
-    assert missing <= {"sway_rms_mm", "sway_about_mean_mm", "sway_wash_mm", "float_N", *(key for key in FIGURES if "exposure" in key)}
+    assert missing <= {
+        "sway_rms_mm",
+        "sway_about_mean_mm",
+        "sway_wash_mm",
+        "float_N",
+        *(key for key in FIGURES if "exposure" in key),
+    }
     assert all(math.isfinite(value) for value in row.values() if value is not None)
     assert row["energy_kJ"] > 0.0 and row["collisions"] == 0 and 0.0 <= row["exceedance_1cm_s_pct"] <= 100.0
 
