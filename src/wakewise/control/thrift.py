@@ -36,9 +36,10 @@ cost 1.307 and 1.299 times the energy of `dp`."""
 CALM, TROUBLE = 1.0 + KEPT * 0.05, 1.0 + KEPT * 0.3
 """Most power over that of the least thrusts, where these leave the target's water calm, and where they do not."""
 CALM_M_S, TROUBLE_M_S = 0.005, 0.010
-TOO_FAST = 7.5
-"""How many times too fast the wake model has the target's water under the least thrusts, with the floor and jets that
-meet: the median over six hovers of `dp` in five worlds (2.9 to 10, and 60 where the current took the wash away)."""
+TOO_FAST = 2.6
+"""How many times too fast the wake model has the target's water under the least thrusts, jets carried by the current:
+the median over ten hovers of `dp` in seven worlds (2 to 8 where it sees the wash that is there; in three, where next to
+none of it comes straight, a half and less)."""
 
 
 def allowed(speed_m_s: float) -> float:
