@@ -7,7 +7,8 @@ import pytest
 from wakewise.control.trim import net_buoyancy_N
 from wakewise.operation.worlds.makers import true_vehicle
 from wakewise.studies.gentle.flight import FIGURES, Trial, fly_trial, parts_of
-from wakewise.studies.gentle.trimmed import BLOCK_N, ballasted_world
+from wakewise.studies.gentle.trimmed import ballasted_world
+from wakewise.vehicles.ballast import Block
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +41,7 @@ def test_the_camera_is_off_by_about_what_the_body_is(row):
 def test_a_float_changes_the_true_vehicle_alone():
     """True net buoyancy rises by the float; what is believed, and all that is drawn, stays."""
     parts = parts_of(Trial(scenario="orbit/paper", method="dp", seed=1))
-    light = ballasted_world(parts, 5 * BLOCK_N)
+    light = ballasted_world(parts, (Block(float_N=2.5),))
     before, after = true_vehicle(parts), light.world.vehicle
     assert net_buoyancy_N(after) - net_buoyancy_N(before) == pytest.approx(2.5)
     assert after.mass_kg > before.mass_kg  # foam weighs, too

@@ -30,7 +30,7 @@ from wakewise.studies.gentle.courses import (
 )
 from wakewise.studies.gentle.library import WORLD, Drawn, drawn, fields_of, load_scenario_file
 from wakewise.studies.gentle.paper import WATER_EVERY_S
-from wakewise.studies.gentle.trimmed import ballasted_world, blocks_N
+from wakewise.studies.gentle.trimmed import ballasted_world, blocks_of
 from wakewise.studies.worlds.flight import WorldTrial, short_flight
 from wakewise.tank.tether import DRAG_COEFFICIENT
 from wakewise.vehicles import Vehicle
@@ -191,8 +191,9 @@ def fly_trial(trial: Trial) -> dict[str, float | None]:
     began = time.process_time()
     parts, float_N = parts_of(trial), None
     if trial.method.endswith(TRIM):
-        float_N = blocks_N(parts)
-        parts = ballasted_world(parts, float_N)
+        blocks = blocks_of(parts)
+        float_N = float(sum(block.float_N for block in blocks))
+        parts = ballasted_world(parts, blocks)
     solve_ms: list[float] = []
 
     def heard(step: Step, witness: Witness | None) -> None:  # noqa: ARG001
