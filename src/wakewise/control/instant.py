@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from wakewise.allocation import Allocation, Weights, least_thrusts
+from wakewise.allocation import Allocation, least_thrusts
 from wakewise.arrays import Array
 from wakewise.control.levers import with_bed_points
 from wakewise.control.loop import TrackingController
 from wakewise.control.poised import poised
-from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
+from wakewise.control.settings import ControlSettings
 from wakewise.control.spare import watching
-from wakewise.control.thrift import sharer_of
+from wakewise.control.thrift import sharer_of, weights_of
 from wakewise.control.tracker import make_tracker
 from wakewise.interfaces import Controller, WakeModel
 from wakewise.planning import Surroundings
@@ -34,11 +34,7 @@ def instant_allocator(
     sharer = sharer_of(vehicle, settings)
     layout = sharer.layout
     view = WakeView.of(vehicle, region, wake, settings.superposition)
-    weights = Weights(
-        disturbance=settings.w_disturbance / view.total_weight,
-        effort=settings.w_effort,
-        previous=PREVIOUS_SHARE * settings.w_effort,
-    )
+    weights = weights_of(settings, view.total_weight)
 
     def allocate(wrench_B: Array, gram: Array | None, previous_N: Array) -> Allocation:
         if gram is None or weights.disturbance == 0.0:

@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.allocation import Layout, Weights
+from wakewise.allocation import Layout
 from wakewise.arrays import Array, IntArray
-from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
-from wakewise.control.thrift import sharer_of
+from wakewise.control.settings import ControlSettings
+from wakewise.control.thrift import sharer_of, weights_of
 from wakewise.control.watch import APART_S, EVERY_S, JUMP_EVERY_S, Watch
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Command, Controller, Goal, WakeModel
@@ -274,9 +274,5 @@ def watching(vehicle: Vehicle, region: Region, wake: WakeModel, settings: Contro
         view=meeting_view(view, sharer.layout) if settings.levers.meet else view,
         levers=settings.levers,
         sharer=sharer,
-        weights=Weights(
-            disturbance=settings.w_disturbance / view.total_weight,
-            effort=settings.w_effort,
-            previous=PREVIOUS_SHARE * settings.w_effort,
-        ),
+        weights=weights_of(settings, view.total_weight),
     )

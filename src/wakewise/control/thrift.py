@@ -26,7 +26,7 @@ from wakewise.allocation import (
     within_power,
 )
 from wakewise.arrays import Array
-from wakewise.control.settings import ControlSettings
+from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
 from wakewise.thrusters import electrical_power_W
 from wakewise.vehicles import Vehicle
 
@@ -83,3 +83,12 @@ def sharer_of(vehicle: Vehicle, settings: ControlSettings) -> Sharer:
     """What shares a vehicle's wrenches out, within the bound on power if that lever is on."""
     layout = compile_layout(vehicle.allocation_matrix, vehicle.thrust_lower_N, vehicle.thrust_upper_N)
     return Sharer(layout=layout, law=power_law(vehicle) if settings.levers.thrift else None)
+
+
+def weights_of(settings: ControlSettings, total_weight: float) -> Weights:
+    """Weights of an allocation; D over the points' total weight, so that their number does not matter."""
+    return Weights(
+        disturbance=settings.w_disturbance / total_weight,
+        effort=settings.w_effort,
+        previous=PREVIOUS_SHARE * settings.w_effort,
+    )
