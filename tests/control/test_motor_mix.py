@@ -7,27 +7,13 @@ import pytest
 
 from wakewise.control.motor_mix import motor_mix
 from wakewise.errors import InputError
-from wakewise.vehicles import load_vehicle
-
-FRAME = np.array(
-    [
-        [0, 0, 1, 0, -1, 1],
-        [0, 0, -1, 0, -1, -1],
-        [0, 0, -1, 0, 1, 1],
-        [0, 0, 1, 0, 1, -1],
-        [1, -1, 0, -1, 0, 0],
-        [-1, -1, 0, -1, 0, 0],
-        [1, 1, 0, -1, 0, 0],
-        [-1, 1, 0, -1, 0, 0],
-    ]
-)
-"""Roll, pitch, yaw, throttle, forward, lateral of motors 1 to 8 of the frame vectored_6dof, as its source has them."""
+from wakewise.vehicles import ARDUSUB_VECTORED_6DOF, load_vehicle
 
 
 @pytest.mark.parametrize("name", ["paper", "bluerov2-heavy", "bluerov2-heavy-wu", "bluerov2-heavy-gazebo"])
 def test_the_factors_of_the_frame_are_the_signs_of_the_geometry(name):
     """Vehicles in the frame's order and with its signs get its own table."""
-    assert np.array_equal(motor_mix(load_vehicle(name)).factors, FRAME)
+    assert np.array_equal(motor_mix(load_vehicle(name)).factors, ARDUSUB_VECTORED_6DOF)
 
 
 def test_a_thruster_that_is_mounted_the_other_way_round_is_turned_back():
@@ -35,7 +21,9 @@ def test_a_thruster_that_is_mounted_the_other_way_round_is_turned_back():
     paper = load_vehicle("paper")
     first = replace(paper.thrusters[0], axis_B=-paper.thrusters[0].axis_B)
     factors = motor_mix(replace(paper, thrusters=(first, *paper.thrusters[1:]))).factors
-    assert np.array_equal(factors[0], -FRAME[0]) and np.array_equal(factors[1:], FRAME[1:])
+    assert np.array_equal(factors[0], -ARDUSUB_VECTORED_6DOF[0]) and np.array_equal(
+        factors[1:], ARDUSUB_VECTORED_6DOF[1:]
+    )
 
 
 @pytest.mark.parametrize("axis", range(6))
@@ -59,8 +47,8 @@ def test_sums_above_one_are_divided_by_the_largest_each_group_for_itself():
     mix = motor_mix(load_vehicle("paper"))
     outputs, saturated = mix.outputs(np.array([0.5, 0.0, 0.0, 1.0, 0.2, 0.0]))
     assert saturated and np.abs(outputs).max() == pytest.approx(1.0)
-    np.testing.assert_allclose(outputs[:4], 0.2 * FRAME[:4, 4])
-    np.testing.assert_allclose(outputs[4:], (0.5 * FRAME[4:, 0] + FRAME[4:, 3]) / 1.5)
+    np.testing.assert_allclose(outputs[:4], 0.2 * ARDUSUB_VECTORED_6DOF[:4, 4])
+    np.testing.assert_allclose(outputs[4:], (0.5 * ARDUSUB_VECTORED_6DOF[4:, 0] + ARDUSUB_VECTORED_6DOF[4:, 3]) / 1.5)
 
 
 def test_pulses_are_in_proportion_and_small_ones_turn_no_propeller():
