@@ -1,9 +1,9 @@
 """The gentle bench: its trials, its keys, what it keeps, what it says of what failed."""
 
 import json
-from concurrent.futures import Future
 
 import pytest
+from pools import Here
 
 from wakewise.cli.bench_gentle import show_gentle
 from wakewise.control import METHODS as MADE
@@ -27,24 +27,6 @@ def made_up(trial):
     """Figures that depend on the trial alone: less without a lever."""
     worse = 1.0 + len(trial.control) + trial.wrong_current
     return ROW | {SPEED: 0.02 * trial.seed * SHARE.get(trial.method, 0.8) * worse}
-
-
-class Here:
-    """A pool of this process: as executors go, and no other process."""
-
-    def submit(self, work, trial):
-        future = Future()
-        try:
-            future.set_result(work(trial))
-        except StageError as error:
-            future.set_exception(error)
-        return future
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        return None
 
 
 @pytest.fixture

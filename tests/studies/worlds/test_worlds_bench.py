@@ -1,9 +1,8 @@
 """The bench of worlds: its statistics, what it plans, what it keeps, and one flight."""
 
-from concurrent.futures import Future
-
 import numpy as np
 import pytest
+from pools import Here
 
 from wakewise.cli.bench_worlds import show_worlds
 from wakewise.errors import InputError, StageError
@@ -14,24 +13,6 @@ from wakewise.studies.worlds.judge import judge_table, judge_trials
 from wakewise.trials import BenchOptions
 
 SPEED = "target_speed_mean_m_s"
-
-
-class Here:
-    """A pool of this process."""
-
-    def submit(self, work, trial):
-        future = Future()
-        try:
-            future.set_result(work(trial))
-        except StageError as error:
-            future.set_exception(error)
-        return future
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        return None
 
 
 def flight(trial):
