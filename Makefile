@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 .PHONY: help setup scan test check bench docs lock clean
 
 help:
-	@echo "make setup   virtual environment in .venv: core, extras photos, reports, logs and piv (GPL), tools for tests"
+	@echo "make setup   virtual environment in .venv: core, extras photos, reports, logs, cockpit, gamepad (LGPL) and piv (GPL), tools for tests"
 	@echo "make scan    fly, photograph, reconstruct and judge a coral; leaves runs/quick/report.html"
 	@echo "make test    ruff, mypy, the import contract and the tests"
 	@echo "make check   the same without the tests"
@@ -38,6 +38,7 @@ check: setup
 	$(BIN)/lint-imports
 
 test: check
+	@sh tools/browser.sh
 	$(BIN)/wakewise warm
 	@# A file at a time: what its tests share is made once, and its kernels are loaded by one of the two workers.
 	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
@@ -50,7 +51,7 @@ docs: setup
 
 lock:
 	$(BIN)/python -m pip install --quiet uv
-	$(BIN)/uv pip compile pyproject.toml --extra all --extra piv --group dev --universal --python-version 3.11 --generate-hashes --no-header --no-annotate -o requirements.lock
+	$(BIN)/uv pip compile pyproject.toml --extra all --extra piv --extra gamepad --group dev --universal --python-version 3.11 --generate-hashes --no-header --no-annotate -o requirements.lock
 
 clean:
 	rm -rf $(VENV) runs dist

@@ -22,7 +22,7 @@ def test_the_extras_are_those_of_the_project_file():
     stated = {name: packages(them) for name, them in PROJECT["optional-dependencies"].items() if name != "all"}
     assert stated == {name: set(modules.values()) for name, modules in EXTRAS.items()}
     assert not packages(PROJECT["dependencies"]) & set().union(*stated.values())
-    assert PROJECT["optional-dependencies"]["all"] == ["wakewise[photos,reports,logs]"]
+    assert PROJECT["optional-dependencies"]["all"] == ["wakewise[photos,reports,logs,cockpit]"]
 
 
 def test_all_that_is_missing_is_said_at_once(monkeypatch):
