@@ -39,9 +39,8 @@ class Gate:
             return "no Host header"
         if not self.open_to_net and not self._local(caller.host):
             return f"Host {_short(caller.host)}: this page is served as {self._names()} only"
-        if caller.origin is not None and caller.origin != f"http://{caller.host}":
-            if not (self._local(caller.host) and self._local(caller.origin.removeprefix("http://"))):
-                return f"Origin {_short(caller.origin)}: pages of other sites may not fly"
+        if caller.origin is not None and caller.origin not in self._origins(caller.host):
+            return f"Origin {_short(caller.origin)}: pages of other sites may not fly"
         return None
 
     def needs_token(self, caller: Caller) -> bool:
@@ -51,6 +50,11 @@ class Gate:
     def fits(self, token: str | None) -> bool:
         """Whether a token is the right one; takes the same time whatever is wrong with it."""
         return token is not None and hmac.compare_digest(token.encode(), self.token.encode())
+
+    def _origins(self, host: str) -> set[str]:
+        """Where a page must come from that was asked for under this name."""
+        own = {f"http://{name}:{self.port}" for name in LOOPBACK} if self._local(host) else set()
+        return own | {f"http://{host}"}
 
     def _local(self, host: str) -> bool:
         return host.lower() in {f"{name}:{self.port}" for name in LOOPBACK}

@@ -89,7 +89,7 @@ class Amiss:
 Message = Hello | HelmWish | Consent | Sticks | Press | DeskChange | Seen
 
 
-class _Wrong(Exception):
+class _Wrong(Exception):  # noqa: N818  (it never leaves this file)
     pass
 
 
