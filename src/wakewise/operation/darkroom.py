@@ -24,7 +24,7 @@ from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
-from wakewise.operation.recorder import ExposureRecord, exposure_arrays, read_exposures
+from wakewise.operation.exposures import ExposureRecord, exposure_arrays, read_exposures
 from wakewise.processes import sweep
 
 if TYPE_CHECKING:

@@ -13,13 +13,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.control.intent import moved_on
+from wakewise.control.intent import FULL_M_S, FULL_RAD_S, moved_on
 from wakewise.geometry import Pose, euler_from_quat, matrix_from_quat, quat_from_euler
 from wakewise.interfaces import BodyState, Goal, Pilot
 from wakewise.pilot import Person, PersonState, Sticks, View, begin, draw_person, steer
 
-FULL_M_S, FULL_RAD_S = 0.5, math.radians(90.0)
-"""What full stick asks for at gain 1; estimate: five times the pace of a mission."""
 ANSWER_S = 0.5
 """How much later the vehicle answers a velocity; estimate, from the trackers' bandwidth of two radians a second."""
 STICKS = Sticks(
