@@ -18,29 +18,22 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.control import make_controller, vehicle_layout
-from wakewise.control.intent import FULL_M_S, FULL_RAD_S, HIGHEST_RAD, PAPER_W_TRACK, moved_on, slewed
+from wakewise.control.intent import PAPER_W_TRACK
 from wakewise.control.switching import Switched
 from wakewise.interfaces import BodyState, Controller, Goal
 from wakewise.missions import CameraAim
-from wakewise.operation.assists import elevation_rad, level_frame, sphere_frame, watching
 from wakewise.operation.desk import WAYS, Desk, DeskState
-from wakewise.operation.motion import STEEPEST_RAD, Attitude, Motion, turned_to, turning
+from wakewise.operation.motion import Motion
 from wakewise.operation.scanning import Mission, Scan
+from wakewise.operation.steering import BRAKING_M_S2, Sphere, steered, turned
 from wakewise.pilot import CENTRED, Controls, ControlSource
+from wakewise.pilot.trace import TraceWriter
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
 
-FASTER_M_S2, BRAKING_M_S2 = 0.15, 0.2
-"""How fast a commanded velocity grows and falls; from 0.3 m/s to rest it takes 1.5 s and 0.23 m."""
-PULL_M_S = 0.5
-"""Fastest that the leash pulls the commanded place towards a vehicle that is held up or far off."""
-RANGE_PER_S, RANGE_M_S = 1.0, 0.05
-"""How an orbit keeps its range: speed per distance, and at most."""
 DIAL_PER_S = 2.0
 """How fast the obedience follows its dial, in natural logarithms a second: from end to end in 2.3 s."""
-TILT_RAD_S = math.radians(40.0)
-"""What the tilt stick asks for at gain 1."""
 MEAN_S, LEAST_M_S = 2.0, 0.01
 """Time over which deviations are averaged, and the mean command below which there is nothing to deviate from."""
 KEPT = 200
@@ -80,6 +73,8 @@ class AssistedPilot:
         Asked for, as slewed.
     deviation_pct : float or None
         Of the estimated velocity from the one asked for, rms over the last seconds; None while none is asked for.
+    trace : TraceWriter
+        Hands and desk of the whole flight, to be written beside its record.
     motion : Motion
     """
 
@@ -90,13 +85,12 @@ class AssistedPilot:
     dt_s: float
     begin: DeskState | None = None
     controls: Controls | None = None
+    trace: TraceWriter = field(default_factory=TraceWriter)
     motion: Motion = field(init=False)
     _scan: Scan = field(init=False)
     _mode: str = "hold"
     _dial: float = 0.0
-    _frame: Array | None = None
-    _orbits: bool = False
-    _range_m: float | None = None
+    _sphere: Sphere = field(default_factory=Sphere)
     _asked: float = 0.0
     _missed: float = 0.0
     _there: bool = True
@@ -144,13 +138,14 @@ class AssistedPilot:
         first = time_s <= 0.0
         if first:
             self._begin(estimate)
-        controls = self._read(time_s)
+        controls = self._read(time_s, estimate)
         for action in () if controls is None else controls.pressed:
             if action in ("capture", "stop"):
                 self._actions.append(action)
             else:
                 self.desk.press(action)
-        state = self.desk.state
+        state = self._set(time_s)
+        self.trace.take(time_s, controls, vars(state))
         self._enter(state.mode, time_s, first)
         if not first:
             self._move(state, CENTRED if controls is None else controls, time_s, estimate)
@@ -160,19 +155,37 @@ class AssistedPilot:
         self._dial += min(max(wished - self._dial, -most), most)
         return self.motion.goal(obedience=math.exp(self._dial))
 
+    @property
+    def leg(self) -> str:
+        """What is flown now, as the record calls it."""
+        if self._mode != "scan":
+            return {"operator": "by hand", "hold": "hold"}[self._mode]
+        flying = self._scan.phase == "flying"
+        return self.mission.route.leg_name(self._scan.mission_s) if flying else "back to the mission"
+
+    def _set(self, time_s: float) -> DeskState:
+        """What is set on the desk; where hands are played back, as it was set then."""
+        recorded = getattr(self.source, "desk_at", None)
+        played = None if recorded is None else recorded(time_s)
+        return self.desk.state if played is None else self.desk.set(**played)
+
     def _begin(self, estimate: BodyState) -> None:
         if self.begin is not None:
             self.desk.set(**vars(self.begin))
         self.motion = Motion.at(estimate, self.mission.route.tilt(0.0, self.aim)[0])
         self._scan, self._mode = Scan(), "hold"
-        self._frame, self._range_m, self._asked, self._missed, self._there = None, None, 0.0, 0.0, True
+        self._sphere, self._asked, self._missed, self._there = Sphere(), 0.0, 0.0, True
         self._dial = math.log(self.desk.state.w_track / PAPER_W_TRACK)
+        self.trace = TraceWriter()
         self._actions.clear()
         self._notes.clear()
 
-    def _read(self, time_s: float) -> Controls | None:
+    def _read(self, time_s: float, estimate: BodyState) -> Controls | None:
         """The hands; a source that fails counts as nobody there, and both are said."""
         try:
+            look = getattr(self.source, "look", None)
+            if look is not None:
+                look(time_s, estimate, self.desk.state.share)
             self.controls, why = self.source.read(time_s), "nobody at the sticks"
         except Exception as fault:  # a device that goes away must not end the flight
             self.controls, why = None, f"sticks cannot be read ({type(fault).__name__}: {fault})"
@@ -197,7 +210,7 @@ class AssistedPilot:
             if first:
                 self._scan, self.motion = self.mission.begun()
         elif self._mode == "scan":
-            self._frame = None
+            self._sphere = Sphere()
         words = {"operator": "operator flies", "hold": "holding the place", "scan": "the mission flies"}
         self._say("info", words[mode], time_s)
         self._mode = mode
@@ -205,7 +218,10 @@ class AssistedPilot:
     def _move(self, state: DeskState, controls: Controls, time_s: float, estimate: BodyState) -> None:
         if self._mode != "scan":
             axes = controls.axes if self._mode == "operator" else CENTRED.axes
-            self.motion = self._steered(self._turned(self.motion, state, axes), state, axes, estimate)
+            motion = turned(self.motion, state, axes, self.target_W_m, self.aim, self.dt_s)
+            self.motion, self._sphere = steered(
+                motion, self._sphere, state, axes, self.target_W_m, self.aim, estimate, self.dt_s
+            )
             return
         before = self._scan.mission_s
         self._scan, self.motion = self.mission.step(self._scan, self.motion, self.dt_s)
@@ -215,78 +231,6 @@ class AssistedPilot:
         if self._scan.mission_s >= self.mission.route.duration_s:
             self._say("info", "the mission is flown", time_s)
             self._enter(self.desk.press("hold").mode, time_s, False)
-
-    def _turned(self, motion: Motion, state: DeskState, axes: Array) -> Motion:
-        """Attitude and tilt a step on: by the sticks, where these are held, else by the assist or level."""
-        turn, tilt = float(axes[3]), float(axes[4])
-        dt_s, joint = self.dt_s, self.aim.joint
-        angles, rates = np.array(motion.angles_rad), np.array(motion.rates_rad_s)
-        wished = Attitude(
-            angles_rad=np.array([0.0, angles[1], angles[2]]), rates_rad_s=np.zeros(3), tilt_rad=motion.tilt_rad
-        )
-        if state.watch_target:
-            wished = watching(
-                motion.place_W_m, motion.velocity_W_m_s, float(angles[2]), self.target_W_m, self.aim, dt_s
-            )
-        elif joint is not None:
-            wished = replace(wished, angles_rad=np.array([0.0, 0.0, angles[2]]))
-        raised = tilt * TILT_RAD_S * state.gain
-        if tilt != 0.0 and joint is not None:
-            wished = replace(wished, tilt_rad=joint.within(motion.tilt_rad + raised * dt_s))
-        new = turned_to(motion, wished, dt_s, self.aim)
-        by_hand = [(2, turn * FULL_RAD_S * state.share)] if turn != 0.0 or not state.watch_target else []
-        if joint is None and (tilt != 0.0 or not state.watch_target):
-            beyond = abs(angles[1]) >= STEEPEST_RAD and raised * angles[1] > 0.0
-            by_hand.append((1, 0.0 if beyond else raised))
-        for k, rate in by_hand:
-            one = turning(motion, k, rate, dt_s)
-            angles, rates = np.array(new.angles_rad), np.array(new.rates_rad_s)
-            angles[k], rates[k] = one.angles_rad[k], one.rates_rad_s[k]
-            new = replace(new, angles_rad=angles, rates_rad_s=rates)
-        return new
-
-    def _steered(self, motion: Motion, state: DeskState, axes: Array, estimate: BodyState) -> Motion:
-        """Velocity and place a step on.
-
-        The velocity is kept in the frame of the sticks, which turns, so that a held stick goes on along a circle.
-        """
-        eye, swing = motion.camera(self.aim)
-        orbits = state.orbit
-        frame = sphere_frame(eye, self.target_W_m) if orbits else level_frame(float(motion.angles_rad[2]))
-        if self._frame is None or orbits != self._orbits:
-            self._frame, self._orbits, self._range_m = frame, orbits, None
-        moved_W = motion.velocity_W_m_s + (swing if orbits else 0.0)
-        wish = FULL_M_S * state.share * axes[:3]
-        if orbits and elevation_rad(eye, self.target_W_m) > HIGHEST_RAD:
-            wish = np.array([wish[0], wish[1], max(wish[2], 0.0)])
-        now = self._frame.T @ moved_W
-        harder = BRAKING_M_S2 if np.linalg.norm(wish) < np.linalg.norm(now) else FASTER_M_S2
-        new = slewed(now, wish, self.dt_s, harder)
-        self._frame = frame
-        if orbits:
-            new = self._at_range(new, wish, float(np.linalg.norm(eye - self.target_W_m)))
-        velocity = frame @ new - (swing if orbits else 0.0)
-        place = self._led(motion.place_W_m, 0.5 * (motion.velocity_W_m_s + velocity), estimate)
-        return replace(motion, place_W_m=place, velocity_W_m_s=velocity)
-
-    def _at_range(self, velocity: Array, wish: Array, range_m: float) -> Array:
-        """The velocity on the sphere with what brings it back to its radius; forward sets another one."""
-        if wish[0] != 0.0 or self._range_m is None:
-            self._range_m = range_m if wish[0] == 0.0 and abs(velocity[0]) < RANGE_M_S else None
-        if self._range_m is None:
-            return velocity
-        closes = min(max(RANGE_PER_S * (range_m - self._range_m), -RANGE_M_S), RANGE_M_S)
-        return np.array([closes, velocity[1], velocity[2]])
-
-    def _led(self, place: Array, velocity: Array, estimate: BodyState) -> Array:
-        """The place moved on, on its leash while it moves; at rest it is held wherever the vehicle is carried."""
-        known = bool(np.isfinite(estimate.X_WB.p_m).all())
-        if not velocity.any() or not known:
-            return place + self.dt_s * velocity
-        led = moved_on(place, velocity, estimate, self.dt_s)
-        step = led - place
-        size, most = float(np.linalg.norm(step)), (PULL_M_S + float(np.linalg.norm(velocity))) * self.dt_s
-        return np.asarray(led if size <= most else place + step * (most / size))
 
     def _weigh(self, estimate: BodyState) -> None:
         share = self.dt_s / MEAN_S
@@ -344,7 +288,7 @@ def assisted_pilot(parts: Parts, source: ControlSource, desk: Desk, begin: DeskS
 def heeding(parts: Parts, wanted: Callable[[], str]) -> Controller[Any]:
     """A controller that is `wake-aware` or direct (`dp`), as is wanted at each step."""
     gentle = parts.scenario.method if parts.scenario.method not in ("dp", "manual", "ardusub") else WAYS[0]
-    made = {
+    made: dict[str, Controller[Any]] = {
         way: make_controller(method, parts.vehicle, parts.region, parts.wake, parts.control, parts.surroundings)
         for way, method in ((WAYS[0], gentle), (WAYS[1], "dp"))
     }

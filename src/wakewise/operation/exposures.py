@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -63,6 +64,20 @@ def exposure_arrays(exposures: list[ExposureRecord]) -> dict[str, Any]:
         **_outer_arrays([e.silt.outer for e in exposures]),
         **_flake_arrays([e.flakes for e in exposures]),
     }
+
+
+def packed(number: int, exposure: ExposureRecord) -> bytes:
+    """An exposure and its number as bytes, in the arrays of the flight's record."""
+    file = io.BytesIO()
+    np.savez(file, number=np.array(number), **exposure_arrays([exposure]))
+    return file.getvalue()
+
+
+def unpacked(message: bytes) -> tuple[int, ExposureRecord]:
+    """What `packed` packed."""
+    with np.load(io.BytesIO(message)) as data:
+        number = int(data["number"])
+    return number, read_exposures(io.BytesIO(message))[0]
 
 
 def _flake_arrays(clouds: list[FlakeCloud | None]) -> dict[str, Any]:

@@ -82,19 +82,23 @@ class Attitude:
 
 def turned_to(motion: Motion, wished: Attitude, dt_s: float, aim: CameraAim) -> Motion:
     """The motion with its attitude a step nearer to a wished one that moves; the tilt at its joint's rate."""
-    angles, rates = np.empty(3), np.empty(3)
     for k in range(3):
-        target = near_turn(float(wished.angles_rad[k]), float(motion.angles_rad[k]))
-        angles[k], rates[k] = eased_after(
-            float(motion.angles_rad[k]),
-            float(motion.rates_rad_s[k]),
-            target,
-            float(wished.rates_rad_s[k]),
-            dt_s,
-            TURN_RAD_S,
-            TURN_RAD_S2,
-        )
-    return tilted(replace(motion, angles_rad=angles, rates_rad_s=rates), wished.tilt_rad, dt_s, aim)
+        motion = followed(motion, k, wished, dt_s)
+    return tilted(motion, wished.tilt_rad, dt_s, aim)
+
+
+def followed(motion: Motion, k: int, wished: Attitude, dt_s: float) -> Motion:
+    """The motion with angle number k a step nearer to a wished one that moves."""
+    angle, rate = eased_after(
+        float(motion.angles_rad[k]),
+        float(motion.rates_rad_s[k]),
+        near_turn(float(wished.angles_rad[k]), float(motion.angles_rad[k])),
+        float(wished.rates_rad_s[k]),
+        dt_s,
+        TURN_RAD_S,
+        TURN_RAD_S2,
+    )
+    return _with_angle(motion, k, angle, rate)
 
 
 def tilted(motion: Motion, wished_rad: float, dt_s: float, aim: CameraAim) -> Motion:
@@ -107,10 +111,14 @@ def tilted(motion: Motion, wished_rad: float, dt_s: float, aim: CameraAim) -> Mo
 
 def turning(motion: Motion, k: int, wished_rad_s: float, dt_s: float) -> Motion:
     """The motion with angle number k turned at a wished rate, which is reached at `TURN_RAD_S2`."""
+    before = float(motion.rates_rad_s[k])
+    rate = slewed_rate(before, wished_rad_s, dt_s, TURN_RAD_S2)
+    return _with_angle(motion, k, float(motion.angles_rad[k]) + 0.5 * (before + rate) * dt_s, rate)
+
+
+def _with_angle(motion: Motion, k: int, angle_rad: float, rate_rad_s: float) -> Motion:
     angles, rates = np.array(motion.angles_rad), np.array(motion.rates_rad_s)
-    rate = slewed_rate(float(rates[k]), wished_rad_s, dt_s, TURN_RAD_S2)
-    angles[k] += 0.5 * (rate + rates[k]) * dt_s
-    rates[k] = rate
+    angles[k], rates[k] = angle_rad, rate_rad_s
     return replace(motion, angles_rad=angles, rates_rad_s=rates)
 
 

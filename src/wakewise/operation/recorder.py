@@ -7,6 +7,7 @@ timings.parquet. Column names carry units; frames and meanings are in docs/conve
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -21,6 +22,7 @@ from wakewise.geometry import Pose, quat_integrate
 from wakewise.imaging.settings import METERED_EVERY_S
 from wakewise.interfaces import BodyState, FlakeCloud, Posture, WaterTruth, Witness
 from wakewise.operation.exposures import STANCE, ExposureRecord, write_exposures
+from wakewise.operation.flight_log import FlightLog, steps_of, timings_of
 from wakewise.operation.loop import Step
 from wakewise.vehicles.tilt import TiltJoint
 
@@ -68,7 +70,7 @@ class Timetable(Protocol):
 
 @dataclass(kw_only=True, eq=False)
 class FlightRecorder:
-    """Collects a flight in memory and writes it whole at its end.
+    """Collects a flight in its log and writes it whole at its end.
 
     Parameters
     ----------
@@ -91,6 +93,8 @@ class FlightRecorder:
         How often the water is asked about; in between the last answer stands.
     exposed : callable, optional
         Called as `(number, exposure)` for each exposure when it has been recorded; number counts from 0.
+    log : FlightLog
+        Where rows and exposures go; by default they are kept in memory.
     """
 
     route: Timetable
@@ -104,17 +108,16 @@ class FlightRecorder:
     exposed: Callable[[int, ExposureRecord], None] | None = None
     joint: TiltJoint | None = None
     metered: int = 0
-    exposures: list[ExposureRecord] = field(default_factory=list)
-    _rows: list[Array] = field(default_factory=list)
-    _legs: list[str] = field(default_factory=list)
-    _fallbacks: list[str] = field(default_factory=list)
-    _exposing: list[bool] = field(default_factory=list)
+    log: FlightLog = field(default_factory=FlightLog)
     _opened: int = 0
-    _collisions: list[bool] = field(default_factory=list)
-    _solve_ms: list[float] = field(default_factory=list)
+    _recent: deque[Array] = field(init=False)
     _water: WaterTruth | None = None
     _posture: Posture | None = None
     _water_time_s: float = -np.inf
+
+    def __post_init__(self) -> None:
+        self._every = max(1, round(METERED_EVERY_S / self.dt_s))
+        self._recent = deque(maxlen=self._every * max(self.metered - 1, 0) + 1)
 
     def __call__(self, step: Step) -> None:
         """Take in one step of the loop."""
@@ -123,7 +126,7 @@ class FlightRecorder:
         if self.witness is not None and (exposing or step.time_s >= self._water_time_s + self.water_every_s - 1e-9):
             self._water, self._water_time_s = self.witness.water(), step.time_s
             self._posture = _posture_of(self.witness)
-        elif self.witness is not None and not self._rows:
+        elif self.witness is not None and not self.log.count:
             self._posture = _posture_of(self.witness)  # all rows have its columns or none has
         water = [getattr(self._water, name) if self._water is not None else np.nan for name in _WATER]
         truth = step.truth
@@ -142,67 +145,73 @@ class FlightRecorder:
             _posture_row(self._posture),
             np.degrees([truth.tilt_rad if truth else np.nan, step.tilt_rad, step.goal.tilt_rad]),
         ]
-        self._rows.append(np.concatenate(row))
-        self._legs.append(self.route.leg_name(step.time_s))
-        self._fallbacks.append(step.command.fallback or "")
-        self._exposing.append(exposing)
+        if not self.log.count:
+            self.log.names = step_columns(self.thrusters, yields=self._posture is not None)
+        numbers = np.concatenate(row)
+        tags: dict[str, bool | str] = {
+            "exposing": exposing,
+            "collision": bool(truth and truth.collision),
+            "fallback": step.command.fallback or "",
+            "leg": self.route.leg_name(step.time_s),
+        }
+        self._recent.append(numbers)
+        self.log.add(numbers, tags, 1e3 * step.solve_s)
         self._opened += exposing
-        self._collisions.append(bool(truth and truth.collision))
-        self._solve_ms.append(1e3 * step.solve_s)
         if opens_s is not None and truth is not None and self.witness is not None:
-            self.exposures.append(
-                ExposureRecord(
-                    time_s=opens_s,
-                    X_WC_true=tuple(
-                        _moved(truth.state, opens_s - step.time_s + after_s) @ self._mount(truth.tilt_rad)
-                        for after_s in np.linspace(0.0, self.exposure_s, self.instants)
-                    ),
-                    X_WC_est=_moved(step.estimate, opens_s - step.time_s + 0.5 * self.exposure_s)
-                    @ self._mount(step.tilt_rad),
-                    silt=self.witness.silt(),
-                    X_WC_before=self._before(),
-                    flakes=_flakes_before(self.witness, truth.state.X_WB @ self._mount(truth.tilt_rad)),
-                    **_stance(self._posture),
-                )
+            exposure = ExposureRecord(
+                time_s=opens_s,
+                X_WC_true=tuple(
+                    _moved(truth.state, opens_s - step.time_s + after_s) @ self._mount(truth.tilt_rad)
+                    for after_s in np.linspace(0.0, self.exposure_s, self.instants)
+                ),
+                X_WC_est=_moved(step.estimate, opens_s - step.time_s + 0.5 * self.exposure_s)
+                @ self._mount(step.tilt_rad),
+                silt=self.witness.silt(),
+                X_WC_before=self._before(),
+                flakes=_flakes_before(self.witness, truth.state.X_WB @ self._mount(truth.tilt_rad)),
+                **_stance(self._posture),
             )
+            self.log.expose(exposure)
             if self.exposed is not None:
-                self.exposed(len(self.exposures) - 1, self.exposures[-1])
+                self.exposed(self.log.opened - 1, exposure)
 
     def _mount(self, tilt_rad: float) -> Pose:
         return self.X_BC if self.joint is None else self.joint.mount(self.X_BC, tilt_rad)
 
     def _before(self) -> tuple[Pose, ...]:
         """True camera poses until now, the last of them now; the first of the flight stand for those before it."""
-        every = max(1, round(METERED_EVERY_S / self.dt_s))
-        rows = [self._rows[max(0, len(self._rows) - 1 - every * k)] for k in reversed(range(self.metered))]
+        last = len(self._recent) - 1
+        rows = [self._recent[max(0, last - self._every * k)] for k in reversed(range(self.metered))]
         # The last three numbers of a row are the camera's tilt, true, measured and wished.
         return tuple(Pose(row[1:4], row[4:8]) @ self._mount(math.radians(float(row[-3]))) for row in rows)
 
     @property
     def duration_s(self) -> float:
         """How long the flight has taken so far."""
-        return len(self._rows) * self.dt_s
+        return self.log.count * self.dt_s
+
+    @property
+    def exposures(self) -> list[ExposureRecord]:
+        """What was exposed, where it is kept in memory."""
+        return self.log.exposures
 
     def frame(self) -> pl.DataFrame:
-        """The steps as a table."""
-        table = np.array(self._rows).reshape(len(self._rows), -1)
-        names = step_columns(self.thrusters, yields=self._posture is not None)
-        columns = {name: table[:, i] for i, name in enumerate(names)}
-        return pl.DataFrame(columns).with_columns(
-            exposing=pl.Series(self._exposing, dtype=pl.Boolean),
-            collision=pl.Series(self._collisions, dtype=pl.Boolean),
-            fallback=pl.Series(self._fallbacks, dtype=pl.String),
-            leg=pl.Series(self._legs, dtype=pl.String),
-        )
+        """The steps as a table, of a flight that is kept in memory."""
+        return steps_of(self.log.frame().lazy()).collect()
 
     def write(self, folder: Path) -> None:
         """Write exposures.npz and timings.parquet, then steps.parquet, whose presence says that the flight is whole."""
-        if self.exposures:
-            write_exposures(folder / "exposures.npz", self.exposures, self.exposure_s)
-        with whole_file(folder / "timings.parquet") as path:
-            pl.DataFrame({"solve_ms": self._solve_ms}).write_parquet(path)
-        with whole_file(folder / "steps.parquet") as path:
-            self.frame().write_parquet(path)
+        write_record(folder, self.log.frame().lazy(), self.exposures, self.exposure_s)
+
+
+def write_record(folder: Path, table: pl.LazyFrame, exposures: list[ExposureRecord], exposure_s: float) -> None:
+    """Write a flight's exposures.npz and timings.parquet, then steps.parquet, which says that the flight is whole."""
+    if exposures:
+        write_exposures(folder / "exposures.npz", exposures, exposure_s)
+    with whole_file(folder / "timings.parquet") as path:
+        timings_of(table).write_parquet(path)
+    with whole_file(folder / "steps.parquet") as path:
+        steps_of(table).sink_parquet(path)
 
 
 def state_vector(state: BodyState) -> Array:

@@ -58,7 +58,7 @@ class Mission:
         return len(self.route.exposures_s) > 0
 
     def begun(self) -> tuple[Scan, Motion]:
-        """At the beginning of the mission, its clock running."""
+        """At the mission's beginning, its clock running."""
         scan = Scan(phase="flying", pace=1.0)
         return scan, self._on_route(
             scan, Motion.at(self.route.body(0.0, self.aim), self.route.tilt(0.0, self.aim)[0]), 0.0
@@ -72,11 +72,13 @@ class Mission:
             if not still:
                 return scan, motion
             return replace(scan, phase="returning", back=self._way_back(scan, motion), back_s=0.0), motion
-        if scan.phase == "returning" and scan.back is not None:
+        leg = scan.back
+        if scan.phase == "returning" and leg is not None:
             scan = replace(scan, back_s=scan.back_s + dt_s)
-            place, rate = _on_leg(scan.back, scan.back_s)
+            fraction, per_s = leg.progress(scan.back_s)
+            place, rate = (1.0 - fraction) * leg.start + fraction * leg.end, per_s * (leg.end - leg.start)
             motion, there = self._led(motion, place, rate, dt_s)
-            if scan.back_s < scan.back.duration_s or not there:
+            if scan.back_s < leg.duration_s or not there:
                 return scan, motion
             return replace(scan, phase="flying", pace=0.0, back=None), motion
         pace = min(scan.pace + dt_s / PACE_S, 1.0)
@@ -129,8 +131,3 @@ def stopped(motion: Motion, dt_s: float, braking_m_s2: float) -> Motion:
     for k in range(3):
         motion = turning(motion, k, 0.0, dt_s)
     return motion
-
-
-def _on_leg(leg: Leg, time_s: float) -> tuple[Array, Array]:
-    fraction, rate = leg.progress(time_s)
-    return (1.0 - fraction) * leg.start + fraction * leg.end, rate * (leg.end - leg.start)

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 import platform
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
-import polars as pl
 
 from wakewise.errors import InputError
 from wakewise.files import write_text
@@ -96,18 +92,3 @@ def write_views(parts: Parts, folder: Path, views: Iterable[tuple[str, float, Po
 def write_truth(parts: Parts, folder: Path) -> None:
     """Write the target as it truly is (truth.ply)."""
     write_mesh(folder / "truth.ply", parts.target.mesh)
-
-
-def write_views_flown(parts: Parts, folder: Path, steps: pl.DataFrame) -> None:
-    """Write planned.csv of a flight by hand: where the camera was wished to be at each photograph that was taken."""
-    joint, X_BC = parts.vehicle.tilt, parts.vehicle.X_BC
-
-    def views() -> Iterator[tuple[str, float, Pose]]:
-        for number, row in enumerate(steps.filter(pl.col("exposing")).iter_rows(named=True)):
-            X_WB = Pose(
-                np.array([row[f"goal_{axis}_m"] for axis in "xyz"]), np.array([row[f"goal_q{axis}"] for axis in "wxyz"])
-            )
-            mount = X_BC if joint is None else joint.mount(X_BC, math.radians(row["goal_tilt_deg"]))
-            yield parts.route.photo(number), row["time_s"], X_WB @ mount
-
-    write_views(parts, folder, views())
