@@ -64,6 +64,7 @@ class StandIn:
     token: str | None = None
     picture_hz: float = 12.0
     width: int = 640
+    quiet: bool = False
     received: list[tuple[float, str, dict[str, Any]]] = field(default_factory=list)
     clients: dict[str, Client] = field(default_factory=dict)
     desk: dict[str, Any] = field(default_factory=dict)
@@ -246,15 +247,15 @@ class StandIn:
     async def _states(self) -> None:
         while True:
             await asyncio.sleep(0.1)
-            if self.clients:
+            if self.clients and not self.quiet:
                 await self._all(json.dumps(self.state()))
 
     async def _pictures(self) -> None:
         number = 0
         while True:
             await asyncio.sleep(1.0 / self.picture_hz)
-            idle = [c for c in self.clients.values() if c.seen == c.sent]
-            if idle:
+            idle = [c for c in self.clients.values() if c.seen >= c.sent]
+            if idle and not self.quiet:
                 number += 1
                 data = struct.pack("<II", number, int(1e3 * self.time_s)) + picture(self.time_s, self.width, 3 * self.width // 4)
                 for client in idle:
