@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-import platform
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -19,25 +15,22 @@ import polars as pl
 from wakewise.errors import InputError, StageError
 from wakewise.evaluation import SWAY_FIGURES, Crop, evaluate_surface, flight_figures
 from wakewise.extras import need
-from wakewise.files import write_json, write_text
+from wakewise.files import write_json
 from wakewise.geometry import matrix_from_quat
 from wakewise.missions import SETTLING
 from wakewise.operation import (
     Darkroom,
     Parts,
     Scenario,
-    differences,
     fly_trial,
-    photo_name,
     photograph_flight,
     read_exposures,
-    read_scenario,
-    write_scenario,
 )
 from wakewise.operation.flying import FLIGHT_JOBS
+from wakewise.operation.trial_folder import as_flown, claim, write_plan
 from wakewise.processes import alone
 from wakewise.reconstruction import read_cloud, read_lens, reconstruct
-from wakewise.targets import Mesh, write_mesh
+from wakewise.targets import Mesh
 from wakewise.trials.metrics import Figures, Gathering, comparison
 from wakewise.trials.size import SIZE_FIGURES, size_figures
 from wakewise.trials.stages import Ledger, Quiet, Watch, of_the_computer
@@ -174,55 +167,6 @@ def compare_methods(
     )
     write_json(folder / "comparison.json", result)
     return result
-
-
-def as_flown(parts: Parts) -> Scenario:
-    """The scenario that a trial leaves behind: what was given in Python in place of its own parts is named in it."""
-    if not parts.given:
-        return parts.scenario
-    scenario, given = parts.scenario, parts.given
-    told: dict[str, Any] = {"method": parts.method, "replaced": parts.replaced}
-    told |= {name: given[name].name for name in ("vehicle", "world") if name in given}
-    if "target" in given:
-        told["target"] = scenario.target.model_copy(update={"kind": given["target"].name})
-    return scenario.model_copy(update=told)
-
-
-def claim(folder: Path, scenario: Scenario) -> None:
-    """Write scenario.yaml, or check that the one in the folder is the same trial.
-
-    Raises
-    ------
-    InputError
-        If the folder holds another trial, or is a file.
-    """
-    path = folder / "scenario.yaml"
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"--out {folder}: is a file, must be a folder or not exist")
-    if path.exists():
-        changed = differences(read_scenario(path), scenario)
-        if changed:
-            raise InputError(
-                f"--out {folder}: holds another trial ({'; '.join(changed[:3])}); give another --out or remove it"
-            )
-        return
-    packages = ("wakewise", "numpy", "numba", "pycolmap", "opencv-python-headless", "embreex")
-    versions = {"python": platform.python_version()} | {name: version(name) for name in packages}
-    write_scenario(path, scenario, versions)
-
-
-def write_plan(parts: Parts, folder: Path) -> None:
-    """Write the truth (truth.ply) and where the photographs are to be taken from (planned.csv)."""
-    write_mesh(folder / "truth.ply", parts.target.mesh)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("name", "time_s", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"))
-    route = parts.route
-    for name, time_s, X_WC in zip(route.exposure_names, route.exposures_s, route.X_WC_planned, strict=True):
-        writer.writerow(
-            (photo_name(name, parts.scenario), f"{time_s:.6f}", *(f"{value:.9f}" for value in (*X_WC.p_m, *X_WC.q)))
-        )
-    write_text(folder / "planned.csv", text.getvalue())
 
 
 def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None]) -> None:
