@@ -115,7 +115,7 @@ class Route:
 
     def camera(self, time_s: float) -> tuple[Pose, Array, Array]:
         """Wished camera pose X_WC, its velocity and its angular velocity in W (shape (3,) each)."""
-        place, rate = self._on_sphere(time_s)
+        place, rate = self.on_sphere(time_s)
         v_W, omega_W = camera_twist(*place, *rate)
         return camera_pose(self.centre_W_m, *place), v_W, omega_W
 
@@ -123,7 +123,7 @@ class Route:
         """Wished angle of the camera's joint and its rate; zeros where it is not aimed with."""
         if isinstance(aim, Pose):
             return 0.0, 0.0
-        (_, elevation, _), (_, elevation_rate, _) = self._on_sphere(time_s)
+        (_, elevation, _), (_, elevation_rate, _) = self.on_sphere(time_s)
         return aim.tilt(-float(elevation), -float(elevation_rate))
 
     def body(self, time_s: float, aim: CameraAim | Pose) -> BodyState:
@@ -140,7 +140,7 @@ class Route:
         v_B = R_BW @ v_WC - v_BC - np.cross(omega_B, X_BC.p_m)
         return BodyState(X_WB=X_WB, nu_B=np.concatenate([v_B, omega_B]))
 
-    def _on_sphere(self, time_s: float) -> tuple[Array, Array]:
+    def on_sphere(self, time_s: float) -> tuple[Array, Array]:
         """Azimuth, elevation and range of the camera, and their rates, shape (3,) each."""
         leg = self.legs[i := self.leg_at(time_s)]
         fraction, rate = leg.progress(time_s - float(self.starts_s[i]))
