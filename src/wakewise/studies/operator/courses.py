@@ -11,9 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from wakewise.arrays import Array
+from wakewise.control.intent import FULL_M_S
 from wakewise.geometry import Pose, quat_from_euler
 from wakewise.missions import Leg, Route
 from wakewise.missions.route import rest_to_rest
+from wakewise.pilot import Controls
 from wakewise.studies.gentle.courses import SETTLE_S, joined, resting, top_above_centre_m
 from wakewise.targets import Target
 
@@ -52,6 +54,18 @@ class Course:
                 return np.array(velocity)
             left_s -= seconds
         return np.zeros(3)
+
+
+@dataclass(frozen=True, eq=False)
+class CourseHands:
+    """A `ControlSource` that flies a course; `share` is what full stick asks for, of the fastest."""
+
+    course: Course
+    share: float
+
+    def read(self, time_s: float) -> Controls:
+        """The sticks of that time."""
+        return Controls(axes=np.array([*self.course.asked_m_s(time_s) / (FULL_M_S * self.share), 0.0, 0.0]))
 
 
 COURSES = {

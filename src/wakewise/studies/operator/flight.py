@@ -9,18 +9,21 @@ from typing import Any
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.control.intent import PAPER_W_TRACK, obeying
+from wakewise.control.intent import FULL_M_S, PAPER_W_TRACK
 from wakewise.evaluation import flight_figures
 from wakewise.interfaces import BodyState, Witness
-from wakewise.missions import SETTLING
+from wakewise.missions import SETTLING, RoutePilot
 from wakewise.operation import Parts, Scenario, fly
+from wakewise.operation.assisted import AssistedPilot, assisted_pilot
+from wakewise.operation.assists import level_frame
+from wakewise.operation.desk import Desk, DeskState
+from wakewise.operation.hands import PersonsHands
 from wakewise.operation.loop import Step
-from wakewise.operation.pilots import human_pilot
+from wakewise.pilot import ControlSource
 from wakewise.studies.gentle.courses import SETTLE_S
 from wakewise.studies.gentle.paper import WATER_EVERY_S
-from wakewise.studies.operator.courses import COURSES, SQUARE, look_route, operator_route, start_pose
+from wakewise.studies.operator.courses import COURSES, SQUARE, CourseHands, look_route, operator_route, start_pose
 from wakewise.studies.operator.heard import Overheard
-from wakewise.studies.operator.steered import Steered
 from wakewise.studies.operator.waters import water_of
 from wakewise.wake import WakeView, disturbance
 
@@ -33,6 +36,7 @@ DEVIATIONS = (
     "velocity_deviation_pct",
     "velocity_deviation_planned_pct",
     "velocity_deviation_behind_plan_pct",
+    "velocity_deviation_from_sticks_pct",
     "velocity_error_rms_mm_s",
     "velocity_asked_rms_mm_s",
 )
@@ -87,26 +91,28 @@ def course_of(trial: OperatorTrial) -> str:
 
 
 def parts_of(trial: OperatorTrial) -> Parts:
-    """Parts of the flight; its controller is `Overheard`."""
+    """Parts of the flight: the assisted pilot under script or person, and the method itself, `Overheard`."""
     water = water_of(trial.world, trial.seed)
     parts = Scenario.preset("quick", method=trial.method, **water.fields).parts()
-    weights = obeying(parts.scenario.control.plan, trial.w_track)
-    fields = {f"control.plan.{name}": getattr(weights, name) for name in ("w_track", "w_path", "w_twist")}
     course, target = COURSES[course_of(trial)], parts.found_target
     standoff_m = parts.scenario.mission.standoff_m
+    dt_s, hands = 1.0 / parts.control.rate_hz, None
     if trial.pilot == "human":
-        parts = parts.replace(route=look_route(target.centre_W_m, water.azimuth_rad, standoff_m), **fields)
-        parts = parts.replace(pilot=human_pilot(parts))
+        parts = parts.replace(route=look_route(target.centre_W_m, water.azimuth_rad, standoff_m))
+        hands = PersonsHands(
+            wish=RoutePilot(route=parts.route, aim=parts.aim),
+            X_BC=parts.vehicle.X_BC,
+            target_W_m=target.centre_W_m,
+            dt_s=dt_s,
+            seed=parts.control.person or 0,
+        )
     else:
         X_WB = start_pose(course, target, water.azimuth_rad, standoff_m, parts.vehicle.X_BC)
-        pilot = Steered(
-            course=course,
-            start=X_WB,
-            watch_W_m=target.centre_W_m if course.watches else None,
-            dt_s=1.0 / parts.control.rate_hz,
-        )
         route = operator_route(target.centre_W_m, course.duration_s)
-        parts = parts.replace(pilot=pilot, start=BodyState(X_WB=X_WB), route=route, **fields)
+        parts = parts.replace(start=BodyState(X_WB=X_WB), route=route)
+    begin = DeskState(mode="operator", w_track=trial.w_track, watch_target=course.watches)
+    source: ControlSource = hands or CourseHands(course, begin.share)
+    parts = parts.replace(pilot=assisted_pilot(parts, source, Desk(begin), begin))
     return parts.replace(controller=Overheard(parts.controller))
 
 
@@ -114,10 +120,11 @@ def fly_trial(trial: OperatorTrial) -> dict[str, float | None]:
     """Figures of one flight."""
     began = time.process_time()
     parts = parts_of(trial)
-    heard = parts.controller
+    heard, pilot = parts.controller, parts.pilot
     assert isinstance(heard, Overheard)
+    assert isinstance(pilot, AssistedPilot)
     view = WakeView.of(parts.vehicle, parts.region, parts.wake)
-    rows: list[tuple[Array, Array, Array]] = []
+    rows: list[tuple[Array, ...]] = []
     D: list[float] = []
     solve_ms: list[float] = []
     every = round(DISTURBANCE_EVERY_S * parts.control.rate_hz)
@@ -127,7 +134,8 @@ def fly_trial(trial: OperatorTrial) -> dict[str, float | None]:
             return
         state = step.truth.state
         asked = heard.asked_W_m_s
-        rows.append((asked, state.X_WB.R @ state.nu_B[:3], asked if heard.planned_W_m_s is None else heard.planned_W_m_s))
+        planned = asked if heard.planned_W_m_s is None else heard.planned_W_m_s
+        rows.append((asked, state.X_WB.R @ state.nu_B[:3], planned, by_sticks(pilot)))
         solve_ms.append(1e3 * step.solve_s)
         if len(rows) % every == 1:
             D.append(disturbance(view.gram(state.X_WB), step.truth.thrusts_N))
@@ -142,10 +150,20 @@ def fly_trial(trial: OperatorTrial) -> dict[str, float | None]:
     return {key: figures.get(key) for key in FIGURES}
 
 
-def deviations(asked_W_m_s: Array, true_W_m_s: Array, planned_W_m_s: Array) -> dict[str, float | None]:
+def by_sticks(pilot: AssistedPilot) -> Array:
+    """Velocity in W that the sticks point at now, before it is reached at a vehicle's pace, shape (3,)."""
+    if pilot.controls is None:
+        return np.zeros(3)
+    full_m_s = FULL_M_S * pilot.desk.state.share
+    return level_frame(float(pilot.motion.angles_rad[2])) @ (full_m_s * pilot.controls.axes[:3])
+
+
+def deviations(
+    asked_W_m_s: Array, true_W_m_s: Array, planned_W_m_s: Array, sticks_W_m_s: Array | None = None
+) -> dict[str, float | None]:
     """Rms of differences over the rms of what was asked, in percent; shape (steps, 3) each, in W.
 
-    None where nothing was asked.
+    `asked` is the command, slewed; `sticks` what the sticks point at. None where nothing was asked.
     """
 
     def rms(values: Array) -> float:
@@ -156,7 +174,10 @@ def deviations(asked_W_m_s: Array, true_W_m_s: Array, planned_W_m_s: Array) -> d
     def percent(off: Array) -> float | None:
         return 100.0 * rms(off) / size if size > 0.0 else None
 
+    pointed = asked_W_m_s if sticks_W_m_s is None else sticks_W_m_s
+    whole = rms(pointed)
     return {
+        "velocity_deviation_from_sticks_pct": 100.0 * rms(true_W_m_s - pointed) / whole if whole > 0.0 else None,
         "velocity_deviation_pct": percent(true_W_m_s - asked_W_m_s),
         "velocity_deviation_planned_pct": percent(planned_W_m_s - asked_W_m_s),
         "velocity_deviation_behind_plan_pct": percent(true_W_m_s - planned_W_m_s),
