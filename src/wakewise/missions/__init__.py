@@ -3,28 +3,39 @@
 Start reading in `route.py` (legs, shutter, the pilot that follows them) and `orbit.py` (viewpoints on layered
 hemispheres), `order.py` (which of them is the first); `aim.py` is what points the camera there (pitch, tilt joint or
 both), `clearance.py` refuses what would touch and tilts that the joint cannot follow, `settings.py` is what a user may
-say.
+say. `coverage.py` says what of the target photographs have seen well (`patches.py`, `sight.py`) and where to go next
+(`reach.py`).
 """
 
 from wakewise.missions.aim import CameraAim, aim_of
 from wakewise.missions.clearance import TankBounds, check_clearance, check_tilt
+from wakewise.missions.coverage import Coverage
 from wakewise.missions.orbit import Orbit, layered_orbits
+from wakewise.missions.patches import Patches, patches_of
+from wakewise.missions.reach import Views, reachable_views
 from wakewise.missions.route import SETTLING, Leg, Route, RoutePilot, open_route, plan_route
 from wakewise.missions.settings import MissionSettings
+from wakewise.missions.sight import Need
 
 __all__ = [
     "SETTLING",
     "CameraAim",
+    "Coverage",
     "Leg",
     "MissionSettings",
+    "Need",
     "Orbit",
+    "Patches",
     "Route",
     "RoutePilot",
     "TankBounds",
+    "Views",
     "aim_of",
     "check_clearance",
     "check_tilt",
     "layered_orbits",
     "open_route",
+    "patches_of",
     "plan_route",
+    "reachable_views",
 ]

@@ -37,6 +37,23 @@ def box_distance(points_B_m: Array, size_m: Array) -> Array:
     return np.linalg.norm(np.maximum(outside, 0.0), axis=-1) + np.minimum(np.max(outside, axis=-1), 0.0)
 
 
+def gaps_of(X_WB: Pose, size_m: Array, bounds: TankBounds, target_W_m: Array) -> dict[str, float]:
+    """How far a hull at a pose is, in metres, from the floor, the water surface, a wall and the target, by name.
+
+    Parameters are those of `check_clearance`; of the target some 4000 points are looked at.
+    """
+    near = target_W_m[:: max(1, len(target_W_m) // 4000)]
+    hull_W = X_WB.apply(hull_corners(size_m))
+    return {
+        "the floor": float(bounds.high_W_m[2] - hull_W[:, 2].max()),
+        "the water surface": float(hull_W[:, 2].min() - bounds.low_W_m[2]),
+        "a wall": min(
+            float((hull_W[:, :2] - bounds.low_W_m[:2]).min()), float((bounds.high_W_m[:2] - hull_W[:, :2]).min())
+        ),
+        "the target": float(box_distance(X_WB.inverse().apply(near), size_m).min()),
+    }
+
+
 def check_clearance(
     route: Route, aim: CameraAim | Pose, size_m: Array, bounds: TankBounds, target_W_m: Array, clearance_m: float
 ) -> float:
@@ -60,20 +77,9 @@ def check_clearance(
     InputError
         Naming the field of the mission to change, the leg, what it would touch and by how much.
     """
-    corners = hull_corners(size_m)
-    near = target_W_m[:: max(1, len(target_W_m) // 4000)]
     least = np.inf
     for time_s in np.arange(route.starts_s[0], route.duration_s, 0.25):
-        X_WB = route.body(float(time_s), aim).X_WB
-        hull_W = X_WB.apply(corners)
-        gaps = {
-            "the floor": bounds.high_W_m[2] - hull_W[:, 2].max(),
-            "the water surface": hull_W[:, 2].min() - bounds.low_W_m[2],
-            "a wall": min(
-                float((hull_W[:, :2] - bounds.low_W_m[:2]).min()), float((bounds.high_W_m[:2] - hull_W[:, :2]).min())
-            ),
-            "the target": float(box_distance(X_WB.inverse().apply(near), size_m).min()),
-        }
+        gaps = gaps_of(route.body(float(time_s), aim).X_WB, size_m, bounds, target_W_m)
         what, gap = min(gaps.items(), key=lambda item: item[1])
         if gap < clearance_m:
             leg = route.legs[route.leg_at(float(time_s))].name

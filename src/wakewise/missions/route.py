@@ -109,6 +109,16 @@ class Route:
         """What the vehicle is doing: the name of the leg under way, or `SETTLING` before the first."""
         return SETTLING if time_s < self.starts_s[0] else self.legs[self.leg_at(time_s)].name
 
+    def shutter_s(self, number: int, time_s: float, dt_s: float) -> float | None:
+        """When photograph `number`, counted from 0, is taken, if before the step from `time_s` is over; else None."""
+        if number >= len(self.exposures_s) or self.exposures_s[number] >= time_s + dt_s:
+            return None
+        return float(self.exposures_s[number])
+
+    def photo(self, number: int) -> str:
+        """Name of photograph `number`: the planned one's, or by its number where more are taken than were planned."""
+        return self.exposure_names[number] if number < len(self.exposure_names) else f"{number:03d}.png"
+
     def leg_at(self, time_s: float) -> int:
         """Index of the leg under way; before the first leg begins it is the first, held at its start."""
         return int(np.clip(np.searchsorted(self.starts_s, time_s, side="right") - 1, 0, len(self.legs) - 1))
