@@ -22,8 +22,8 @@ GOOD: list[dict[str, Any]] = [
     {"type": "seen", "frame": 7},
 ]
 JUNK: list[Any] = [
-    None, True, False, 0, -1, 1e308, -1e308, 10**400, -(10**400), 2**53 + 1, "", "x" * 5000, "\x00", "NaN", [], {}, [[]],
-    [1, 2], {"a": 1}, [None] * 5, ["1"] * 5, [True] * 5, [1e400] * 5, float("nan"), float("inf"), "\u202e\ud800",
+    None, True, False, 0, -1, 1e308, -1e308, 10**400, -(10**400), 2**53 + 1, "", "x" * 5000, "\x00", "NaN", [], {},
+    [[]], [1, 2], {"a": 1}, [None] * 5, ["1"] * 5, [True] * 5, [1e400] * 5, float("nan"), float("inf"), "\u202e\ud800",
 ]  # fmt: skip
 
 
