@@ -7,7 +7,7 @@ killed: each part is whole or not there.
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -24,6 +24,10 @@ TAGS = {"exposing": pl.Boolean, "collision": pl.Boolean, "fallback": pl.String, 
 TIMINGS = ("solve_ms", "behind_ms", "answer_ms")
 
 
+def _nothing(part: int) -> None:
+    """Do nothing about a part."""
+
+
 @dataclass(kw_only=True, eq=False)
 class FlightLog:
     """What was recorded, in the order of time.
@@ -38,6 +42,8 @@ class FlightLog:
         How many rows a part has at most; one that holds a photograph ends with it.
     names : list of str
         Of the numbers of a row, given with the first one.
+    beside : callable
+        Called with the number of a part when it is written or dropped.
 
     Attributes
     ----------
@@ -53,6 +59,7 @@ class FlightLog:
     keep: bool = True
     chunk_rows: int = 500
     names: list[str] = field(default_factory=list)
+    beside: Callable[[int], None] = _nothing
     exposures: list[ExposureRecord] = field(default_factory=list)
     count: int = 0
     opened: int = 0
@@ -96,7 +103,8 @@ class FlightLog:
         if self.folder is not None and self.rows:
             with whole_file(self.folder / f"steps-{self._parts:06d}.parquet") as path:
                 self.frame().write_parquet(path)
-            self._parts += 1
+        self.beside(self._parts)
+        self._parts += 1
         self.rows.clear()
         for tag in self.tags.values():
             tag.clear()
@@ -132,6 +140,17 @@ def has_parts(folder: Path) -> bool:
 def parts_table(folder: Path) -> pl.LazyFrame:
     """The rows of all parts in a trial's folder."""
     return pl.scan_parquet(sorted((folder / PARTS).glob("steps-*.parquet")))
+
+
+def hands_part(folder: Path, part: int) -> Path:
+    """Where a part's record of hands lies."""
+    return folder / PARTS / f"controls-{part:06d}.parquet"
+
+
+def parts_hands(folder: Path) -> pl.DataFrame | None:
+    """What the hands did in all parts in a trial's folder; None where nobody's were kept."""
+    found = sorted((folder / PARTS).glob("controls-*.parquet"))
+    return pl.concat([pl.read_parquet(path) for path in found]) if found else None
 
 
 def parts_exposures(folder: Path, count: int) -> Iterator[ExposureRecord]:

@@ -12,13 +12,14 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from wakewise.errors import InputError
 from wakewise.interfaces import ScalarGrid, Witness
 from wakewise.operation.exposures import ExposureRecord
-from wakewise.operation.flight_log import PARTS, FlightLog, has_parts
+from wakewise.operation.flight_log import PARTS, FlightLog, hands_part, has_parts
 from wakewise.operation.flying import FLIGHT_JOBS, WATER_EVERY_S, blamed, loop_of, recorder_of
 from wakewise.operation.live_folder import gather
 from wakewise.operation.loop import Step
@@ -26,6 +27,7 @@ from wakewise.operation.pace import Pace
 from wakewise.operation.parts import Parts
 from wakewise.operation.shutter import Shutter
 from wakewise.operation.trial_folder import claim, flown_by_hand, write_truth
+from wakewise.pilot.trace import TraceWriter
 from wakewise.processes import alone
 from wakewise.warming import warm
 
@@ -47,6 +49,11 @@ class LiveFlight:
     watch : callable, optional
         Called as `(step, witness)` at each step in the flying thread, after the record: it must not take long.
 
+    water_every_s : float
+        How often the water at the target is measured.
+    shutter : Shutter, optional
+        Says when photographs are taken and when the flight is over; by default when it is asked.
+
     Raises
     ------
     InputError
@@ -61,6 +68,7 @@ class LiveFlight:
         paced: bool = True,
         watch: Callable[[Step, Witness | None], None] | None = None,
         water_every_s: float = WATER_EVERY_S,
+        shutter: Shutter | None = None,
     ) -> None:
         if folder is not None and (folder / "steps.parquet").exists():
             raise InputError(f"{folder}: holds a flight already, give another folder")
@@ -70,7 +78,7 @@ class LiveFlight:
         self._watch, self._water_every_s = watch, water_every_s
         self._told_to_stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="flight")
-        self._shutter = Shutter(parts)
+        self._shutter = Shutter(parts) if shutter is None else shutter
         self._exposures: list[ExposureRecord] = []
         self.pace = Pace(self._told_to_stop.wait, paced)
         self.preparing: str | None = "not begun"
@@ -133,7 +141,9 @@ class LiveFlight:
             write_truth(parts, folder)
         self._prepare(0, 1, "fills the water")
         plant, witness = parts.world.begin()
-        log = FlightLog(folder=None if folder is None else folder / PARTS, keep=folder is not None)
+        log = FlightLog(
+            folder=None if folder is None else folder / PARTS, keep=folder is not None, beside=self._keep_hands
+        )
         recorder = recorder_of(
             parts, witness, self._shutter, water_every_s=self._water_every_s, exposed=self._exposed, log=log
         )
@@ -158,6 +168,15 @@ class LiveFlight:
             log.flush()
             if folder is not None:
                 gather(parts, folder)
+
+    def _keep_hands(self, part: int) -> None:
+        """Put away what the hands did until now, of a pilot who has any."""
+        pilot: Any = self.parts.pilot
+        if not isinstance(getattr(pilot, "trace", None), TraceWriter):
+            return
+        if self.folder is not None and pilot.trace.frame().height:
+            pilot.trace.write(hands_part(self.folder, part))
+        pilot.trace = TraceWriter()
 
     def _is_over(self) -> bool:
         """Whether somebody said stop, or the program has ended round its flight."""

@@ -10,10 +10,12 @@ import numpy as np
 import polars as pl
 
 from wakewise.extras import has
+from wakewise.files import whole_file
 from wakewise.geometry import Pose
-from wakewise.operation.flight_log import drop_parts, has_parts, parts_exposures, parts_table, steps_of
+from wakewise.operation.flight_log import drop_parts, has_parts, parts_exposures, parts_hands, parts_table, steps_of
 from wakewise.operation.recorder import write_record
 from wakewise.operation.trial_folder import write_views
+from wakewise.pilot.trace import TRACE_FILE
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
@@ -34,6 +36,10 @@ def gather(parts: Parts, folder: Path) -> bool:
     seen = table.filter("exposing").select(_SEEN).collect()
     exposures = list(parts_exposures(folder, seen.height))
     write_views(parts, folder, [(parts.route.photo(k), *_view(parts, seen, k)) for k in range(seen.height)])
+    hands = parts_hands(folder)
+    if hands is not None:
+        with whole_file(folder / TRACE_FILE) as path:
+            hands.write_parquet(path)
     if has("logs"):
         from wakewise.operation.telemetry import write_mcap
 

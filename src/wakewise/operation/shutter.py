@@ -37,12 +37,16 @@ class Shutter:
         """What the pilot says that it does."""
         return str(getattr(self._parts.pilot, "leg", BY_HAND))
 
-    def shutter_s(self, number: int, time_s: float, dt_s: float) -> float | None:  # noqa: ARG002
-        """Now, if a photograph was asked for and the last one is long enough ago."""
+    def heed(self) -> None:
+        """Take in what hands asked for since."""
         for what in getattr(self._parts.pilot, "taken", tuple)():
             if what == "capture":
                 self._asked.set()
             self.over |= what == "stop"
+
+    def shutter_s(self, number: int, time_s: float, dt_s: float) -> float | None:  # noqa: ARG002
+        """Now, if a photograph was asked for and the last one is long enough ago."""
+        self.heed()
         if not self._asked.is_set() or time_s < self._last_s + BETWEEN_S - 1e-9:
             return None
         self._asked.clear()

@@ -26,7 +26,9 @@ from wakewise.operation import (
     photograph_flight,
     read_exposures,
 )
+from wakewise.operation.flight_log import has_parts
 from wakewise.operation.flying import FLIGHT_JOBS
+from wakewise.operation.live_folder import gather
 from wakewise.operation.trial_folder import as_flown, claim, write_plan
 from wakewise.processes import alone
 from wakewise.reconstruction import read_cloud, read_lens, reconstruct
@@ -101,7 +103,8 @@ def run_trial(
     if not is_warm(JOBS):
         with watch.stage("compile") as progress:
             warm(JOBS, progress)
-    _ = parts.preflight
+    if not _is_flown(folder):
+        _ = parts.pilot, parts.preflight
     claim(folder, scenario)
     with alone(folder), SurfaceMaker(folder, scenario.reconstruction, parts.target.bed_z_m) as surface:
         result = _figures(parts, scenario, folder, watch, surface.ready if meanwhile is not None else lambda: None)
@@ -123,9 +126,10 @@ def _figures(parts: Parts, scenario: Scenario, folder: Path, watch: Watch, model
             work(progress)
 
     _forget_what_was_not_measured(folder)
-    stage("plan", "planned.csv", lambda _: write_plan(parts, folder))
+    if not has_parts(folder):  # a flight by hand has no plan
+        stage("plan", "planned.csv", lambda _: write_plan(parts, folder))
     with Darkroom(parts, folder) as darkroom:
-        stage("fly", "steps.parquet", lambda progress: fly_trial(parts, folder, progress, darkroom.take))
+        stage("fly", "steps.parquet", lambda progress: _fly(parts, folder, darkroom, progress))
         stage("photograph", "images.csv", lambda progress: _photograph(parts, folder, darkroom, progress))
     stage("reconstruct", "model.json", lambda progress: reconstruct_trial(parts, folder, progress))
     modelled()
@@ -140,8 +144,21 @@ def _figures(parts: Parts, scenario: Scenario, folder: Path, watch: Watch, model
     return result
 
 
+def _is_flown(folder: Path) -> bool:
+    """Whether a folder holds a flight, if only its parts."""
+    return (folder / "steps.parquet").exists() or has_parts(folder)
+
+
+def _fly(parts: Parts, folder: Path, darkroom: Darkroom, progress: Callable[..., None]) -> None:
+    """Fly, or put together what a flight by hand left that was cut off."""
+    if not gather(parts, folder):
+        fly_trial(parts, folder, progress, darkroom.take)
+
+
 def _photograph(parts: Parts, folder: Path, darkroom: Darkroom, progress: Callable[..., None]) -> None:
     """Wait for the photographs that were begun during the flight, and render the others."""
+    if not (folder / "exposures.npz").exists():
+        raise StageError(f"{folder}: no photograph was taken in its flight, so there is nothing to make a model of")
     progress(0, 1, "photographs begun during the flight")
     darkroom.finish()
     photograph_flight(parts, folder, progress)
