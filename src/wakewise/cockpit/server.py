@@ -10,13 +10,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import http
-import json
 import logging
 import secrets
 import threading
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from websockets.asyncio.server import Server as Listening
 from websockets.asyncio.server import ServerConnection, serve
@@ -24,7 +21,7 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from wakewise.cockpit.client import Client, Picture
+from wakewise.cockpit.client import Client
 from wakewise.cockpit.files import Files
 from wakewise.cockpit.gate import Caller, Gate, is_loopback, page_headers
 from wakewise.cockpit.messages import (
@@ -40,7 +37,8 @@ from wakewise.cockpit.messages import (
     Sticks,
     read_message,
 )
-from wakewise.cockpit.seat import DEVICE, Holding, Seat
+from wakewise.cockpit.seat import DEVICE, Holding
+from wakewise.cockpit.show import Note, Show, as_json
 from wakewise.errors import InputError
 
 PROTOCOL = 1
@@ -51,53 +49,6 @@ _REFUSED, _TOO_MUCH = 4401, 1008
 _QUIET = logging.getLogger("wakewise.cockpit")
 _QUIET.addHandler(logging.NullHandler())
 _QUIET.propagate = False
-
-
-@dataclass(frozen=True, kw_only=True)
-class Note:
-    """A line for everybody: what has just changed."""
-
-    text: str
-    level: str = "info"
-    time_s: float = 0.0
-
-    def message(self) -> str:
-        """As it goes over the wire."""
-        return _json({"type": "note", "level": self.level, "text": self.text, "time_s": round(self.time_s, 2)})
-
-
-class Show(Protocol):
-    """What is shown, and what may be changed; called from the server's thread, and never for long."""
-
-    @property
-    def seat(self) -> Seat:
-        """The helm, and where the flight reads its sticks."""
-        ...
-
-    @property
-    def edition(self) -> int:
-        """Grows when `welcome` has something new to say, which all are then told."""
-        ...
-
-    def welcome(self) -> dict[str, Any]:
-        """What a client needs once: vehicle, target, desk."""
-        ...
-
-    def state(self) -> dict[str, Any] | None:
-        """What is so now; None before there is anything."""
-        ...
-
-    def notes(self) -> Sequence[Note]:
-        """What has happened since the last call."""
-        ...
-
-    def set_desk(self, changes: dict[str, Any]) -> None:
-        """Change settings of the desk; raises InputError where a value is out of range."""
-        ...
-
-    def picture(self) -> Picture | None:
-        """What the camera sees now; called in another thread, where it may wait for the picture for a while."""
-        ...
 
 
 class Server:
@@ -275,7 +226,7 @@ class Server:
         self._tell_helm("", always=client)
 
     def _welcome(self, client: Client) -> str:
-        return _json({"type": "welcome", "id": client.id, "protocol": PROTOCOL, **self.show.welcome()})
+        return as_json({"type": "welcome", "id": client.id, "protocol": PROTOCOL, **self.show.welcome()})
 
     def _heed(self, client: Client, message: Message | Amiss) -> None:
         """Do what a client asks for, as far as it may."""
@@ -326,7 +277,7 @@ class Server:
         for client in list(self.clients.values()):
             if client.greeted and (changed or client is always):
                 yours = client.id == holding.holder
-                client.tell(_json(told | {"yours": yours, "lease": holding.lease if yours else None}))
+                client.tell(as_json(told | {"yours": yours, "lease": holding.lease if yours else None}))
 
     def _named(self, holder: str | None) -> str | None:
         client = self.clients.get(holder or "")
@@ -350,7 +301,7 @@ class Server:
             if state is not None:
                 holding = self.show.seat.holding
                 more = {"type": "state", "helm": self._named(holding.holder), "spectators": self.spectators}
-                text = _json(state | more)
+                text = as_json(state | more)
                 for client in self._greeted():
                     client.state(text)
             due_s = max(due_s + STATE_EVERY_S, self._loop.time())
@@ -407,7 +358,3 @@ def _response(
 ) -> Response:
     headers = Headers({"Content-Type": kind, "Content-Length": str(len(body)), "Connection": "close", **(more or {})})
     return Response(status.value, status.phrase, headers, body)
-
-
-def _json(told: dict[str, Any]) -> str:
-    return json.dumps(told, allow_nan=False, separators=(",", ":"))
