@@ -10,22 +10,21 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from wakewise.cockpit.client import Picture
 from wakewise.cockpit.frames import LiveCamera, View
 from wakewise.cockpit.gauges import Gauges
+from wakewise.cockpit.guide import LiveGuide
 from wakewise.cockpit.lookout import Lookout
 from wakewise.cockpit.seat import Seat
-from wakewise.cockpit.server import Note
+from wakewise.cockpit.show import Note, Picture
 from wakewise.cockpit.state import Instruments, described, number, rounded, told_scenario
 from wakewise.errors import StageError, WakewiseError
-from wakewise.geometry import Pose
 from wakewise.operation import Parts, Scenario
 from wakewise.operation.assisted import AssistedPilot, assisted
 from wakewise.operation.desk import MODES, RANGES, WAYS, Desk, regime
@@ -34,18 +33,6 @@ from wakewise.pilot.controls import CENTRED, ControlSource
 
 TENDED_S = 0.05
 _MOST_NOTES = 200
-
-
-class Guide(Protocol):
-    """Says which parts of the target photographs have seen, and where to go next."""
-
-    def saw(self, X_WC: Pose) -> str | None:
-        """Take in a photograph by where it was taken from; in words what there is to say of it."""
-        ...
-
-    def told(self, X_WC: Pose) -> dict[str, Any]:
-        """Share, scores of patches, and the next view from here."""
-        ...
 
 
 class Session:
@@ -62,8 +49,8 @@ class Session:
         Sticks at this computer.
     pictures : bool
         Whether the camera's picture is drawn.
-    guide : callable, optional
-        Makes the coverage guide of a flight's parts.
+    guided : bool
+        Whether a coverage guide follows the photographs.
     """
 
     def __init__(
@@ -74,11 +61,11 @@ class Session:
         paced: bool = True,
         device: ControlSource | None = None,
         pictures: bool = True,
-        guide: Callable[[Parts], Guide] | None = None,
+        guided: bool = True,
     ) -> None:
         self._parts = scenario if isinstance(scenario, Parts) else scenario.parts()
         self.seat, self.desk = Seat(device=device), Desk()
-        self.folder, self._paced, self._make_guide = folder, paced, guide
+        self.folder, self._paced, self._guided = folder, paced, guided
         self.flown: list[Path] = []
         self.flights = 0
         self.fault: BaseException | None = None
@@ -88,7 +75,7 @@ class Session:
         self._gauges: Gauges | None = None
         self._lookout: Lookout | None = None
         self._instruments: Instruments | None = None
-        self._guide: Guide | None = None
+        self._guide: LiveGuide | None = None
         self._described: dict[str, Any] = {}
         self._preparing: str | None = "making the parts of the flight"
         self._edition = 0
@@ -120,6 +107,11 @@ class Session:
         return self._preparing
 
     @property
+    def running(self) -> bool:
+        """Whether the session goes on, with a flight or between two."""
+        return self._thread.is_alive()
+
+    @property
     def flying(self) -> bool:
         """Whether the vehicle flies."""
         return self._preparing is None
@@ -148,18 +140,19 @@ class Session:
     def state(self) -> dict[str, Any] | None:
         """How the flight stands; None before the first step."""
         lookout, instruments, live, pilot = self._lookout, self._instruments, self._live, self._pilot
-        if lookout is None or instruments is None or live is None or pilot is None:
+        if lookout is None or instruments is None or live is None or pilot is None or not self.flying:
             return None
         lookout.look()
         now = lookout.now
         if now is None:
             return None
-        controls = pilot.controls or CENTRED
+        controls, step = pilot.controls or CENTRED, now.step
+        X_WC = step.estimate.X_WB @ live.parts.vehicle.X_BC_at(step.tilt_rad)
         return instruments.read(now) | {
             "mode": self.desk.state.mode,
             "desk": self._desk(),
             "controls": rounded(controls.axes, 3),
-            "coverage": self._guide.told(now.X_WC) if self._guide is not None else None,
+            "coverage": self._guide.told(X_WC) if self._guide is not None else None,
             "photos": len(live.exposures),
             "loop": {
                 "behind_ms": number(1e3 * live.behind_s, 2),
@@ -219,6 +212,8 @@ class Session:
         if live.latest is not None:
             self._say(f"first light {time.monotonic() - self._began_s:.1f} s after the start")
             self._say_preparing(None)
+            if self._guided:  # after the first light, which it would keep waiting for a second
+                self._guide = LiveGuide(self._parts)
         while live.running and not self._over.wait(TENDED_S):
             self._follow(live)
         live.stop()
@@ -228,7 +223,7 @@ class Session:
 
     def _prepare(self) -> LiveFlight:
         self._say_preparing("making the parts of the flight")
-        parts = self._parts if not self.flights else self._parts.replace()
+        parts = self._parts
         self.flights += 1
         if self._gauges is None:
             self._gauges = Gauges.of(parts)
@@ -245,8 +240,7 @@ class Session:
             self.seat.flown,
             lambda: pilot.velocity_W_m_s,
         )
-        self._guide = self._make_guide(parts) if self._make_guide is not None else None
-        self._photos = 0
+        self._guide, self._photos = None, 0
         live = LiveFlight(flown, folder=self._free_folder(), paced=self._paced, watch=lookout)
         self._pilot, self._lookout, self._live = pilot, lookout, live
         self._instruments = Instruments(self._gauges, lookout)
@@ -315,4 +309,3 @@ class Session:
     def _desk(self) -> dict[str, Any]:
         state = self.desk.state
         return asdict(state) | {"regime": regime(state.w_track)}
-
