@@ -122,6 +122,11 @@ class Session:
         return self._live
 
     @property
+    def lookout(self) -> Lookout | None:
+        """What that flight's thread takes down."""
+        return self._lookout
+
+    @property
     def edition(self) -> int:
         """Grows when `welcome` has something new to say."""
         return self._edition
@@ -212,8 +217,6 @@ class Session:
         if live.latest is not None:
             self._say(f"first light {time.monotonic() - self._began_s:.1f} s after the start")
             self._say_preparing(None)
-            if self._guided:  # after the first light, which it would keep waiting for a second
-                self._guide = LiveGuide(self._parts)
         while live.running and not self._over.wait(TENDED_S):
             self._follow(live)
         live.stop()
@@ -240,7 +243,10 @@ class Session:
             self.seat.flown,
             lambda: pilot.velocity_W_m_s,
         )
-        self._guide, self._photos = None, 0
+        self._photos = 0
+        if self._guided:
+            self._say_preparing("looking for views of the target")
+            self._guide = LiveGuide(parts)
         live = LiveFlight(flown, folder=self._free_folder(), paced=self._paced, watch=lookout)
         self._pilot, self._lookout, self._live = pilot, lookout, live
         self._instruments = Instruments(self._gauges, lookout)
