@@ -122,10 +122,12 @@ def measure(
 
 def _python(code: str, *arguments: str) -> subprocess.Popen[str]:
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
-    return subprocess.Popen([sys.executable, "-c", code, *arguments], stdout=subprocess.PIPE, text=True, env=environment)
+    return subprocess.Popen(
+        [sys.executable, "-c", code, *arguments], stdout=subprocess.PIPE, text=True, env=environment
+    )
 
 
-_PAGE = '''
+_PAGE = """
 import asyncio, json, sys, time
 from websockets.asyncio.client import connect
 
@@ -166,4 +168,4 @@ async def main():
 
 asyncio.run(main())
 print(json.dumps({name: told[name] for name in ("pictures", "states", "seconds")}))
-'''
+"""
