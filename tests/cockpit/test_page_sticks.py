@@ -193,9 +193,7 @@ def test_capture_and_the_desk_go_with_the_lease(standin: StandIn, fly: Any) -> N
     page.click("[data-assist=orbit]")
     page.press("BracketRight")
     until(lambda: standin.desk["orbit"] and standin.desk["w_track"] > 5, "the desk")
-    page.js(
-        "(() => { const d = document.getElementById('w-track'); d.value = 0; d.dispatchEvent(new Event('input')); })()"
-    )
+    page.js("(() => { const d = document.getElementById('w-track'); d.value = 0; d.dispatchEvent(new Event('input')); })()")
     until(lambda: standin.desk["w_track"] == 0.5, "the gentlest")
     page.until("document.getElementById('regime').innerText === 'delicate'")
     assert [m["what"] for m in standin.of("press")] == ["operator", "capture", "capture"]
