@@ -62,6 +62,7 @@ class Browser:
         page.call("Runtime.enable")
         page.size(width, height, phone=phone)
         page.colours(dark)
+        page.front()
         page.go(url)
         return page
 
@@ -165,6 +166,13 @@ class Page:
     def size(self, width: int, height: int, *, phone: bool = False, scale: float = 0.0) -> None:
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=scale, mobile=phone)
         self.call("Emulation.setTouchEmulationEnabled", enabled=phone, maxTouchPoints=5 if phone else 1)
+
+    def front(self) -> None:
+        """Bring it before all others, which are then hidden and without focus, as in any browser."""
+        self.call("Page.bringToFront")
+
+    def always_front(self) -> None:
+        """As if on a screen of its own, whatever else is open."""
         self.call("Emulation.setFocusEmulationEnabled", enabled=True)
 
     def colours(self, dark: bool) -> None:
@@ -188,3 +196,8 @@ class Page:
 
     def close(self) -> None:
         self._browser.call("Target.closeTarget", targetId=self.target)
+
+    def alive(self) -> bool:
+        """Whether the tab is still there."""
+        targets = self._browser.call("Target.getTargets")["targetInfos"]
+        return any(one["targetId"] == self.target for one in targets)

@@ -17,10 +17,10 @@ from typing import Any
 import cv2
 import numpy as np
 
-from wakewise.cockpit.client import Picture
 from wakewise.cockpit.files import Files
 from wakewise.cockpit.seat import Seat
-from wakewise.cockpit.server import Note, Server
+from wakewise.cockpit.server import Server
+from wakewise.cockpit.show import Note, Picture
 from wakewise.errors import InputError
 
 _THRUSTERS = 8

@@ -24,8 +24,10 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 PAGE = files("wakewise.cockpit") / "page"
-POLICY = "default-src 'self'; frame-src 'self' http://127.0.0.1:*"
+POLICY = "default-src 'self'; frame-src http://127.0.0.1:*; base-uri 'none'; form-action 'none'"
 LAPSE_S = 1.0
+AROUND = b"<input id=outside><iframe id=f width=480 height=400 src='/?widget=1'></iframe>"
+"""Another ground station, with the page as a widget."""
 CORNERS = [(x, y) for x in ("front", "rear") for y in ("right", "left")]
 THRUSTERS = [{"name": f"{x} {y} {kind}", "position_B_m": [0.15, 0.1, 0.0], "axis_B": [1, 0, 0], "limit_N": [-40.0, 50.0]}
              for kind in ("horizontal", "vertical") for x, y in CORNERS]  # fmt: skip
@@ -61,6 +63,8 @@ class StandIn:
     tank: bool = True
     token: str | None = None
     picture_hz: float = 12.0
+    width: int = 640
+    quiet: bool = False
     received: list[tuple[float, str, dict[str, Any]]] = field(default_factory=list)
     clients: dict[str, Client] = field(default_factory=dict)
     desk: dict[str, Any] = field(default_factory=dict)
@@ -122,7 +126,7 @@ class StandIn:
     async def _serve(self) -> None:
         self._stop = asyncio.Event()
         self.started_s = time.monotonic()
-        async with serve(self._talk, "127.0.0.1", 0, process_request=self._static, compression=None) as server:
+        async with serve(self._talk, "127.0.0.1", 0, process_request=self._static, compression=None, close_timeout=0.3) as server:
             self.port = next(iter(server.sockets)).getsockname()[1]
             ticking = [asyncio.create_task(self._states()), asyncio.create_task(self._pictures())]
             self._ready.set()
@@ -135,6 +139,8 @@ class StandIn:
         path = request.path.split("?")[0]
         if path == "/ws":
             return None
+        if path == "/around":
+            return Response(200, "OK", Headers({"Content-Type": "text/html"}), AROUND)
         entry = PAGE / ("index.html" if path == "/" else path.removeprefix("/page/"))
         if "/" in path.removeprefix("/page/").strip("/") or not entry.is_file():
             return connection.respond(404, "no such file\n")
@@ -142,6 +148,10 @@ class StandIn:
         body = entry.read_bytes()
         headers = Headers({"Content-Type": kind, "Content-Length": str(len(body)), "Content-Security-Policy": POLICY})
         return Response(200, "OK", headers, body)
+
+    def sticks_since(self, since_s: float) -> list[list[float]]:
+        """Axes that came since, oldest first."""
+        return [message["axes"] for message in self.of("sticks", since_s)]
 
     async def _talk(self, socket: ServerConnection) -> None:
         self._ids += 1
@@ -156,7 +166,7 @@ class StandIn:
                         return
                     client.name = message["name"]
                     self.clients[client.id] = client
-                    await self._send(client, self._welcome())
+                    await self._send(client, self._welcome() | {"id": client.id})
                     await self._tell_helm()
                 else:
                     await self._take(client, message)
@@ -179,7 +189,11 @@ class StandIn:
                 self.asked_by = client.id
                 await self._tell_helm()
         elif kind == "consent" and self.holder == client.id:
-            await self._lend(message["to"] if message["yes"] else self.holder, "handed over" if message["yes"] else "kept")
+            if message["yes"]:
+                await self._lend(message["to"], "the helm was handed over")
+            else:
+                self.asked_by = None
+                await self._tell_helm("the holder keeps the helm")
         elif kind == "seen":
             client.seen = message["frame"]
         elif message.get("lease") != self.lease or self.lease is None:
@@ -217,7 +231,7 @@ class StandIn:
             mine = client.id == self.holder
             await self._send(client, {
                 "type": "helm", "yours": mine, "lease": self.lease if mine else None, "holder": name, "why": why,
-                "asked_by": {"id": asked.id, "name": asked.name} if asked else None,
+                "asked_by": {"id": asked.id, "name": asked.name} if asked else None, "flying": name is not None,
             })  # fmt: skip
 
     async def _all(self, data: str | bytes) -> None:
@@ -233,17 +247,17 @@ class StandIn:
     async def _states(self) -> None:
         while True:
             await asyncio.sleep(0.1)
-            if self.clients:
+            if self.clients and not self.quiet:
                 await self._all(json.dumps(self.state()))
 
     async def _pictures(self) -> None:
         number = 0
         while True:
             await asyncio.sleep(1.0 / self.picture_hz)
-            idle = [c for c in self.clients.values() if c.seen == c.sent]
-            if idle:
+            idle = [c for c in self.clients.values() if c.seen >= c.sent]
+            if idle and not self.quiet:
                 number += 1
-                data = struct.pack("<II", number, int(1e3 * self.time_s)) + picture(self.time_s)
+                data = struct.pack("<II", number, int(1e3 * self.time_s)) + picture(self.time_s, self.width, 3 * self.width // 4)
                 for client in idle:
                     client.sent = number
                     await self._send(client, data)

@@ -3,29 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-import struct
 from collections import deque
 from dataclasses import dataclass, field
 
 from websockets.asyncio.server import ServerConnection
 
+from wakewise.cockpit.show import Picture
+
 _MOST_WAITING = 64
 """Notes that wait for a client at most; of more the oldest are lost to it."""
 RATE_HZ, BURST = 120.0, 240.0
 """Messages that a client may send: sticks come at 25 Hz, pictures are acknowledged at some 15 Hz."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Picture:
-    """What the camera sees: a JPEG, its number, and the time of the flight that it shows."""
-
-    number: int
-    time_s: float
-    jpeg: bytes
-
-    def message(self) -> bytes:
-        """As it goes over the wire: number and flight's time in ms, little-endian, then the JPEG."""
-        return struct.pack("<II", self.number % 2**32, max(0, round(1e3 * self.time_s)) % 2**32) + self.jpeg
 
 
 @dataclass(kw_only=True, eq=False)

@@ -1,7 +1,7 @@
 """The live picture: what the camera sees now, small, by the renderer of the photographs, in a process of its own.
 
-Of a photograph's chain it has scene, light, water, silt, exposure and noise; left out are motion blur, flakes, and how a
-soft target bends. One ray a pixel. Rendering takes the interpreter's lock for longer than a control step may wait, so
+Of a photograph's chain it has scene, light, water, silt, exposure and noise; left out are motion blur, flakes, and how
+a soft target bends. One ray a pixel. Rendering takes the interpreter's lock for longer than a control step may wait, so
 it is done in another process, which yields to the loop where both want a core.
 """
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 WIDTH_PX = 480
 QUALITY = 75
 NICER = 5
-"""How much the process yields to others (nice)."""
+"""How much the process yields to others (nice), once its scene is ready."""
 _METERED = 8
 
 
@@ -70,7 +70,8 @@ class LiveCamera:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
-            env=os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path), "NUMBA_NUM_THREADS": "1"},
+            env=os.environ
+            | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path), "NUMBA_NUM_THREADS": "1"},
         )
         threading.Thread(target=self._listen, args=(self._process.stdout,), name="pictures", daemon=True).start()
         self._send(pickle.dumps(self._begin))
@@ -197,6 +198,8 @@ def serve(pipe: IO[bytes], answers: IO[bytes]) -> None:
         return
     easel = Easel(*pickle.loads(first))
     _write(answers, b"ready")
+    with suppress(OSError):
+        os.nice(NICER)
     while (message := _read(pipe)) is not None:
         image = easel.draw(pickle.loads(message))
         _write(answers, cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes())
@@ -205,8 +208,6 @@ def serve(pipe: IO[bytes], answers: IO[bytes]) -> None:
 if __name__ == "__main__":
     with suppress(ValueError):
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started this ends it
-    with suppress(OSError):
-        os.nice(NICER)
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # whatever else is printed is no answer
     serve(sys.stdin.buffer, answers)

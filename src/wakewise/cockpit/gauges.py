@@ -62,10 +62,7 @@ class Gauges:
         """D of thrusts, shape (n,), and D of the least thrusts that make the same wrench, in (m/s)^2."""
         layout = self.watch.layout
         direct_N = least_thrusts(layout, layout.B @ thrusts_N).thrusts_N
-        one, other = (
-            disturbance_of(self.watch.gram(estimate, thrusts), thrusts)
-            for thrusts in (thrusts_N, direct_N)
-        )
+        one, other = (disturbance_of(self.watch.gram(estimate, thrusts), thrusts) for thrusts in (thrusts_N, direct_N))
         return one, other
 
     def predicted_m_s(self, estimate: BodyState, thrusts_N: Array) -> Array:

@@ -6,6 +6,7 @@ down here, in the server's.
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,6 +22,8 @@ from wakewise.vehicles import Vehicle
 WINDOW_S = 10.0
 """Deviation and savings are told over the last ten seconds."""
 SAMPLED_S = 0.1
+LOOKS_S = 2.0
+"""How long a look lasts."""
 TRUE_EVERY_S, SILT_EVERY_S = 0.5, 1.0
 MEAN_OF = 10
 """Steps over which commanded thrusts are averaged for the gauges: small ones are sent as pulses."""
@@ -59,7 +62,7 @@ class Lookout:
     given : callable
         Called when the step's thrusts are on their way.
     asked : callable
-        Velocity that a person asks for in W, shape (3,); None where nobody does, and the goal's own counts.
+        Velocity that is asked for in W, shape (3,).
     """
 
     def __init__(
@@ -68,7 +71,7 @@ class Lookout:
         points_W_m: Array,
         dt_s: float,
         given: Callable[[], None],
-        asked: Callable[[], Array | None],
+        asked: Callable[[], Array],
     ) -> None:
         self._vehicle, self._points_W_m, self._dt_s = vehicle, points_W_m, dt_s
         self._given, self._asked = given, asked
@@ -81,7 +84,16 @@ class Lookout:
         self._true_s = self._silt_s = self._sampled_s = -np.inf
         self._followed: deque[tuple[Array, Array]] = deque(maxlen=round(WINDOW_S / SAMPLED_S))
         self.now: Moment | None = None
-        self.someone_looks = False
+        self._looked_s = -np.inf
+
+    def look(self) -> None:
+        """Somebody looks: for a while the true water is asked, too."""
+        self._looked_s = time.monotonic()
+
+    @property
+    def looked_at(self) -> bool:
+        """Whether somebody has looked of late."""
+        return time.monotonic() - self._looked_s < LOOKS_S
 
     def __call__(self, step: Step, witness: Witness | None) -> None:
         """Take down a step."""
@@ -93,13 +105,12 @@ class Lookout:
         state = step.truth.state if step.truth is not None else step.estimate
         power_W = step.truth.power_W if step.truth is not None else float("nan")
         self._energy_J += power_W * self._dt_s
-        asked = self._asked()
-        asked_W = step.goal.X_WB.R @ step.goal.nu_B[:3] if asked is None else asked
+        asked_W = self._asked()
         velocity_W = state.X_WB.R @ state.nu_B[:3]
         if now_s >= self._sampled_s + SAMPLED_S - 1e-9:
             self._sampled_s = now_s
             self._followed.append((asked_W, velocity_W))
-        if self.someone_looks and witness is not None:
+        if witness is not None and self.looked_at:
             self._ask(now_s, witness)
         tilt_rad = step.truth.tilt_rad if step.truth is not None else step.tilt_rad
         self.now = Moment(

@@ -8,6 +8,7 @@ of the sticks are the exception to strictness: numbers of any size, and what is 
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -164,7 +165,7 @@ def _seen(told: dict[str, Any]) -> Seen:
     return Seen(frame=_whole(told, "frame"))
 
 
-_READERS = {
+_READERS: dict[str, Callable[[dict[str, Any]], Message]] = {
     "hello": _hello,
     "helm": _helm,
     "consent": _consent,

@@ -10,13 +10,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import http
-import json
 import logging
 import secrets
+import socket
 import threading
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from websockets.asyncio.server import Server as Listening
 from websockets.asyncio.server import ServerConnection, serve
@@ -24,7 +22,8 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from wakewise.cockpit.client import Client, Picture
+from wakewise.cockpit.client import Client
+from wakewise.cockpit.extras import extras_files
 from wakewise.cockpit.files import Files
 from wakewise.cockpit.gate import Caller, Gate, is_loopback, page_headers
 from wakewise.cockpit.messages import (
@@ -40,64 +39,21 @@ from wakewise.cockpit.messages import (
     Sticks,
     read_message,
 )
-from wakewise.cockpit.seat import DEVICE, Holding, Seat
+from wakewise.cockpit.seat import DEVICE, Holding
+from wakewise.cockpit.show import Note, Show, as_json
 from wakewise.errors import InputError
 
 PROTOCOL = 1
 STATE_EVERY_S, PICTURE_EVERY_S = 0.1, 1.0 / 15.0
 MOST_CLIENTS = 16
-_HELLO_WITHIN_S, _STUCK_S, _MOST_AMISS, _MOST_THROTTLED = 5.0, 10.0, 50, 40
+STUCK_S = 10.0
+"""A client that takes nothing for so long is let go."""
+_HELLO_WITHIN_S, _MOST_AMISS, _MOST_THROTTLED = 5.0, 50, 40
 _REFUSED, _TOO_MUCH = 4401, 1008
+_SYSTEM_KEEPS = 1 << 17  # bytes
 _QUIET = logging.getLogger("wakewise.cockpit")
 _QUIET.addHandler(logging.NullHandler())
 _QUIET.propagate = False
-
-
-@dataclass(frozen=True, kw_only=True)
-class Note:
-    """A line for everybody: what has just changed."""
-
-    text: str
-    level: str = "info"
-    time_s: float = 0.0
-
-    def message(self) -> str:
-        """As it goes over the wire."""
-        return _json({"type": "note", "level": self.level, "text": self.text, "time_s": round(self.time_s, 2)})
-
-
-class Show(Protocol):
-    """What is shown, and what may be changed; called from the server's thread, and never for long."""
-
-    @property
-    def seat(self) -> Seat:
-        """The helm, and where the flight reads its sticks."""
-        ...
-
-    @property
-    def edition(self) -> int:
-        """Grows when `welcome` has something new to say, which all are then told."""
-        ...
-
-    def welcome(self) -> dict[str, Any]:
-        """What a client needs once: vehicle, target, desk."""
-        ...
-
-    def state(self) -> dict[str, Any] | None:
-        """What is so now; None before there is anything."""
-        ...
-
-    def notes(self) -> Sequence[Note]:
-        """What has happened since the last call."""
-        ...
-
-    def set_desk(self, changes: dict[str, Any]) -> None:
-        """Change settings of the desk; raises InputError where a value is out of range."""
-        ...
-
-    def picture(self) -> Picture | None:
-        """What the camera sees now; called in another thread, where it may wait for the picture for a while."""
-        ...
 
 
 class Server:
@@ -122,7 +78,7 @@ class Server:
         self.show, self.host, self.port = show, host, port
         self.token = token or secrets.token_urlsafe(16)
         self.clients: dict[str, Client] = {}
-        self._files = files or Files()
+        self._files = files or Files(more=extras_files())
         self._gate = Gate(port=port, token=self.token)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._listening: Listening | None = None
@@ -137,7 +93,7 @@ class Server:
     @property
     def address(self) -> str:
         """Where the page is, for this computer's browser, or with the token where it is asked for."""
-        if is_loopback(self.host) or self.host == "localhost":
+        if is_loopback(self.host):
             host = f"[{self.host}]" if ":" in self.host else self.host
             return f"http://{host}:{self.port}/"
         return f"http://{self.host}:{self.port}/#token={self.token}"
@@ -231,6 +187,7 @@ class Server:
             _caller(connection, connection.request)
         )
         self.clients[client.id] = client
+        _keep_little(connection)
         sending = asyncio.create_task(client.send_all(self._loop))
         try:
             async with asyncio.timeout(_HELLO_WITHIN_S):
@@ -275,7 +232,7 @@ class Server:
         self._tell_helm("", always=client)
 
     def _welcome(self, client: Client) -> str:
-        return _json({"type": "welcome", "id": client.id, "protocol": PROTOCOL, **self.show.welcome()})
+        return as_json({"type": "welcome", "id": client.id, "protocol": PROTOCOL, **self.show.welcome()})
 
     def _heed(self, client: Client, message: Message | Amiss) -> None:
         """Do what a client asks for, as far as it may."""
@@ -313,8 +270,11 @@ class Server:
     def _tell_helm(self, why: str, always: Client | None = None) -> None:
         """Tell everybody of a change at the helm, and `always` this one how it stands."""
         holding = self.show.seat.holding
-        changed = holding != self._told
+        changed, before = holding != self._told, self._told
         self._told = holding
+        if before is not None and holding.holder != before.holder:
+            name = self._named(holding.holder)
+            self._to_all(Note(text="nobody has the helm" if name is None else f"{name} has the helm").message())
         asking = self.clients.get(holding.asked_by or "")
         told = {
             "type": "helm",
@@ -326,7 +286,7 @@ class Server:
         for client in list(self.clients.values()):
             if client.greeted and (changed or client is always):
                 yours = client.id == holding.holder
-                client.tell(_json(told | {"yours": yours, "lease": holding.lease if yours else None}))
+                client.tell(as_json(told | {"yours": yours, "lease": holding.lease if yours else None}))
 
     def _named(self, holder: str | None) -> str | None:
         client = self.clients.get(holder or "")
@@ -335,26 +295,36 @@ class Server:
     async def _beat(self) -> None:
         """Ten times a second: who has the helm, what happened, what is so."""
         assert self._loop is not None
-        due_s = self._loop.time()
+        due_s, amiss = self._loop.time(), ""
         while True:
-            self._look_after_helm()
-            for note in self.show.notes():
-                for client in self._greeted():
-                    client.tell(note.message())
-            if self.show.edition != self._edition:
-                self._edition = self.show.edition
-                for client in self._greeted():
-                    client.tell(self._welcome(client))
-            self._let_go_of_stuck()
-            state = self.show.state() if self._greeted() else None
-            if state is not None:
-                holding = self.show.seat.holding
-                more = {"type": "state", "helm": self._named(holding.holder), "spectators": self.spectators}
-                text = _json(state | more)
-                for client in self._greeted():
-                    client.state(text)
+            try:
+                self._tell_all()
+            except Exception as fault:  # what is shown may be at fault, the helm must be looked after all the same
+                if (said := f"{type(fault).__name__}: {fault}") != amiss:
+                    self._to_all(Note(text=f"the page cannot be told how it stands ({said})", level="error").message())
+                amiss = said
             due_s = max(due_s + STATE_EVERY_S, self._loop.time())
             await asyncio.sleep(due_s - self._loop.time())
+
+    def _tell_all(self) -> None:
+        self._look_after_helm()
+        self._let_go_of_stuck()
+        for note in self.show.notes():
+            self._to_all(note.message())
+        if self.show.edition != self._edition:
+            self._edition = self.show.edition
+            for client in self._greeted():
+                client.tell(self._welcome(client))
+        state = self.show.state() if self._greeted() else None
+        if state is not None:
+            holder = self._named(self.show.seat.holding.holder)
+            text = as_json(state | {"type": "state", "helm": holder, "spectators": self.spectators})
+            for client in self._greeted():
+                client.state(text)
+
+    def _to_all(self, message: str) -> None:
+        for client in self._greeted():
+            client.tell(message)
 
     async def _look(self) -> None:
         """Pictures, for as long as somebody looks."""
@@ -362,10 +332,10 @@ class Server:
         while True:
             due_s = self._loop.time() + PICTURE_EVERY_S
             if any(client.looks for client in self._greeted()):
-                picture = await asyncio.to_thread(self.show.picture)
-                if picture is not None:
-                    for client in self._greeted():
-                        if client.looks:
+                with contextlib.suppress(Exception):  # a picture that fails is one less
+                    picture = await asyncio.to_thread(self.show.picture)
+                    for client in self._greeted() if picture is not None else ():
+                        if client.looks and picture is not None:
                             client.picture(picture)
             await asyncio.sleep(max(due_s - self._loop.time(), 0.005))
 
@@ -380,11 +350,17 @@ class Server:
         assert self._loop is not None
         for client in list(self.clients.values()):
             since_s = client.sending_since_s
-            if since_s is not None and self._loop.time() - since_s > _STUCK_S:
+            if since_s is not None and self._loop.time() - since_s > STUCK_S:
                 client.connection.transport.abort()
 
     def _greeted(self) -> list[Client]:
         return [client for client in self.clients.values() if client.greeted]
+
+
+def _keep_little(connection: ServerConnection) -> None:
+    """Have the system keep little for a client: what waits there is old when it arrives."""
+    with contextlib.suppress(OSError):
+        connection.transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SYSTEM_KEEPS)
 
 
 def _caller(connection: ServerConnection, request: Request) -> Caller:
@@ -407,7 +383,3 @@ def _response(
 ) -> Response:
     headers = Headers({"Content-Type": kind, "Content-Length": str(len(body)), "Connection": "close", **(more or {})})
     return Response(status.value, status.phrase, headers, body)
-
-
-def _json(told: dict[str, Any]) -> str:
-    return json.dumps(told, allow_nan=False, separators=(",", ":"))

@@ -43,9 +43,9 @@ def watching(
     angles, tilt = _watching(place_W_m, yaw_rad, target_W_m, aim)
     if not velocity_W_m_s.any():
         return Attitude(angles_rad=angles, rates_rad_s=np.zeros(3), tilt_rad=tilt)
-    before, _ = _watching(place_W_m - dt_s * velocity_W_m_s, yaw_rad, target_W_m, aim)
+    before, tilt_before = _watching(place_W_m - dt_s * velocity_W_m_s, yaw_rad, target_W_m, aim)
     rates = (np.remainder(angles - before + math.pi, 2.0 * math.pi) - math.pi) / dt_s
-    return Attitude(angles_rad=angles, rates_rad_s=rates, tilt_rad=tilt)
+    return Attitude(angles_rad=angles, rates_rad_s=rates, tilt_rad=tilt, tilt_rad_s=(tilt - tilt_before) / dt_s)
 
 
 def _watching(place_W_m: Array, yaw_rad: float, target_W_m: Array, aim: CameraAim) -> tuple[Array, float]:

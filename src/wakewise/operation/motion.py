@@ -20,6 +20,8 @@ from wakewise.missions import CameraAim
 TURN_RAD_S, TURN_RAD_S2 = 0.6, 0.8
 """Fastest turn of an assist against what it follows, and the fastest change of a turn; estimates: at half a metre from
 the target the one is 0.3 m/s to the side."""
+TILT_RAD_S2 = 2.0
+"""Fastest change of a tilt's rate: a joint of 45 deg/s is up to it in 0.4 s."""
 STEEPEST_RAD = math.radians(75.0)
 """Steepest pitch that sticks and assists ask of a body."""
 
@@ -73,18 +75,19 @@ class Motion:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Attitude:
-    """Wished roll, pitch and yaw, shape (3,), how fast they change, and the wished tilt of the camera."""
+    """Wished roll, pitch and yaw, shape (3,), and tilt of the camera, and how fast they change."""
 
     angles_rad: Array
     rates_rad_s: Array
     tilt_rad: float = 0.0
+    tilt_rad_s: float = 0.0
 
 
 def turned_to(motion: Motion, wished: Attitude, dt_s: float, aim: CameraAim) -> Motion:
     """The motion with its attitude a step nearer to a wished one that moves; the tilt at its joint's rate."""
     for k in range(3):
         motion = followed(motion, k, wished, dt_s)
-    return tilted(motion, wished.tilt_rad, dt_s, aim)
+    return tilted(motion, wished, dt_s, aim)
 
 
 def followed(motion: Motion, k: int, wished: Attitude, dt_s: float) -> Motion:
@@ -101,12 +104,25 @@ def followed(motion: Motion, k: int, wished: Attitude, dt_s: float) -> Motion:
     return _with_angle(motion, k, angle, rate)
 
 
-def tilted(motion: Motion, wished_rad: float, dt_s: float, aim: CameraAim) -> Motion:
-    """The motion with its camera's joint a step nearer to a wished angle."""
+def tilted(motion: Motion, wished: Attitude, dt_s: float, aim: CameraAim) -> Motion:
+    """The motion with its camera's joint a step nearer to a wished tilt that moves."""
     if aim.joint is None:
-        return replace(motion, tilt_rad=0.0, tilt_rad_s=0.0)
-    tilt = aim.joint.towards(motion.tilt_rad, wished_rad, dt_s)
-    return replace(motion, tilt_rad=tilt, tilt_rad_s=(tilt - motion.tilt_rad) / dt_s)
+        return motion
+    tilt, rate = eased_after(
+        motion.tilt_rad, motion.tilt_rad_s, wished.tilt_rad, wished.tilt_rad_s, dt_s, aim.joint.rate_rad_s, TILT_RAD_S2
+    )
+    return replace(motion, tilt_rad=aim.joint.within(tilt), tilt_rad_s=rate)
+
+
+def tilting(motion: Motion, wished_rad_s: float, dt_s: float, aim: CameraAim) -> Motion:
+    """The motion with its camera's joint turned at a wished rate, as far as its stops."""
+    if aim.joint is None:
+        return motion
+    most = aim.joint.rate_rad_s
+    rate = slewed_rate(motion.tilt_rad_s, min(max(wished_rad_s, -most), most), dt_s, TILT_RAD_S2)
+    asked = motion.tilt_rad + 0.5 * (motion.tilt_rad_s + rate) * dt_s
+    tilt = aim.joint.within(asked)
+    return replace(motion, tilt_rad=tilt, tilt_rad_s=rate if tilt == asked else 0.0)
 
 
 def turning(motion: Motion, k: int, wished_rad_s: float, dt_s: float) -> Motion:

@@ -21,7 +21,7 @@ from wakewise.geometry import Pose, euler_from_quat, quat_conjugate, quat_multip
 from wakewise.missions import CameraAim, Leg, Route
 from wakewise.missions.orbit import camera_pose, camera_twist
 from wakewise.missions.route import rest_to_rest
-from wakewise.operation.motion import Attitude, Motion, rates_of, turned_to, turning
+from wakewise.operation.motion import Attitude, Motion, rates_of, tilting, turned_to, turning
 
 PACE_S = 1.0
 """Time in which the mission's clock comes up to the world's: at its acceleration a mission of 0.1 m/s takes two."""
@@ -67,7 +67,7 @@ class Mission:
     def step(self, scan: Scan, motion: Motion, dt_s: float) -> tuple[Scan, Motion]:
         """A step on, from wherever the motion is."""
         if scan.phase == "stopping":
-            motion = stopped(motion, dt_s, self.braking_m_s2)
+            motion = stopped(motion, dt_s, self.braking_m_s2, self.aim)
             still = np.abs(motion.velocity_W_m_s).max() < REST_M_S and np.abs(motion.rates_rad_s).max() < REST_RAD_S
             if not still:
                 return scan, motion
@@ -100,7 +100,7 @@ class Mission:
         angles = euler_from_quat(q_WB)
         _, turned_B = self.aim.carried(tilt, tilt_rate)
         omega_B = Pose(X_WC.p_m, q_WB).R.T @ omega_W - turned_B
-        wished = Attitude(angles_rad=angles, rates_rad_s=rates_of(angles, omega_B), tilt_rad=tilt)
+        wished = Attitude(angles_rad=angles, rates_rad_s=rates_of(angles, omega_B), tilt_rad=tilt, tilt_rad_s=tilt_rate)
         if dt_s > 0.0:
             motion = turned_to(motion, wished, dt_s, self.aim)
         else:
@@ -123,11 +123,11 @@ class Mission:
         return rest_to_rest("back to the mission", start, end, self.speed_m_s, self.acceleration_m_s2)
 
 
-def stopped(motion: Motion, dt_s: float, braking_m_s2: float) -> Motion:
+def stopped(motion: Motion, dt_s: float, braking_m_s2: float, aim: CameraAim) -> Motion:
     """The motion a step nearer to rest, which it comes to ahead of where it is."""
     velocity = slewed(motion.velocity_W_m_s, np.zeros(3), dt_s, braking_m_s2)
     place = motion.place_W_m + 0.5 * dt_s * (motion.velocity_W_m_s + velocity)
-    motion = replace(motion, place_W_m=place, velocity_W_m_s=velocity, tilt_rad_s=0.0)
+    motion = tilting(replace(motion, place_W_m=place, velocity_W_m_s=velocity), 0.0, dt_s, aim)
     for k in range(3):
         motion = turning(motion, k, 0.0, dt_s)
     return motion

@@ -18,7 +18,8 @@ from wakewise.interfaces import BodyState
 from wakewise.missions import CameraAim
 from wakewise.operation.assists import elevation_rad, level_frame, sphere_frame, watching
 from wakewise.operation.desk import DeskState
-from wakewise.operation.motion import STEEPEST_RAD, Attitude, Motion, followed, tilted, turning
+from wakewise.operation.keep_off import KeepOff
+from wakewise.operation.motion import STEEPEST_RAD, Attitude, Motion, followed, tilted, tilting, turning
 
 FASTER_M_S2, BRAKING_M_S2 = 0.15, 0.2
 """How fast a commanded velocity grows and falls; from 0.3 m/s to rest it takes 1.5 s and 0.23 m."""
@@ -26,6 +27,10 @@ PULL_M_S = 0.5
 """Fastest that the leash pulls the commanded place towards a vehicle that is held up or far off."""
 RANGE_PER_S, RANGE_M_S = 1.0, 0.05
 """How an orbit keeps its range: speed per distance, and at most."""
+SLOW_M_S = 0.01
+"""Speed towards the centre below which a range is kept."""
+HARDEST_M_S2 = 0.6
+"""Largest change of a commanded velocity, whatever bends its way: 0.4 m/s on a circle of a quarter of a metre."""
 TILT_RAD_S = math.radians(40.0)
 """What the tilt stick asks for at gain 1."""
 
@@ -34,12 +39,14 @@ TILT_RAD_S = math.radians(40.0)
 class Sphere:
     """The frame of the sticks, shape (3, 3), as it was a step ago, and the orbit's radius where one is kept.
 
-    `frame` is None where nobody steered before, and `orbits` tells whether it is that of an orbit.
+    `frame` is None where nobody steered before, and `orbits` tells whether it is that of an orbit. `blocked_by` is
+    what is in the way, None if nothing.
     """
 
     frame: Array | None = None
     orbits: bool = False
     range_m: float | None = None
+    blocked_by: str | None = None
 
 
 def turned(motion: Motion, state: DeskState, axes: Array, target_W_m: Array, aim: CameraAim, dt_s: float) -> Motion:
@@ -64,11 +71,11 @@ def turned(motion: Motion, state: DeskState, axes: Array, target_W_m: Array, aim
     by_hand = turn != 0.0 or not state.watch_target
     new = turning(new, 2, turn * FULL_RAD_S * state.share, dt_s) if by_hand else followed(new, 2, wished, dt_s)
     if rise == 0.0 and state.watch_target:
-        return tilted(followed(new, 1, wished, dt_s), wished.tilt_rad, dt_s, aim)
+        return tilted(followed(new, 1, wished, dt_s), wished, dt_s, aim)
     rate = rise * TILT_RAD_S * state.gain
     if aim.joint is not None:
         level = replace(wished, angles_rad=np.zeros(3), rates_rad_s=np.zeros(3))
-        return tilted(followed(new, 1, level, dt_s), motion.tilt_rad + rate * dt_s, dt_s, aim)
+        return tilting(followed(new, 1, level, dt_s), rate, dt_s, aim)
     pitch = float(motion.angles_rad[1])
     return turning(new, 1, 0.0 if abs(pitch) >= STEEPEST_RAD and rate * pitch > 0.0 else rate, dt_s)
 
@@ -82,6 +89,7 @@ def steered(
     aim: CameraAim,
     estimate: BodyState,
     dt_s: float,
+    keep_off: KeepOff | None = None,
 ) -> tuple[Motion, Sphere]:
     """The motion with velocity and place a step on, and what the sticks go by at the next.
 
@@ -97,24 +105,29 @@ def steered(
         wish[2] = max(wish[2], 0.0)
     before = frame if sphere.frame is None else sphere.frame
     now = before.T @ (motion.velocity_W_m_s + swing)
-    harder = BRAKING_M_S2 if np.linalg.norm(wish) < np.linalg.norm(now) else FASTER_M_S2
-    new, range_m = slewed(now, wish, dt_s, harder), None
+    range_m = None
     if state.orbit:
-        new, range_m = _at_range(new, wish, sphere.range_m, float(np.linalg.norm(eye - target_W_m)))
-    velocity = frame @ new - swing
+        wish[0], range_m = _at_range(wish[0], now[0], sphere.range_m, float(np.linalg.norm(eye - target_W_m)))
+    harder = BRAKING_M_S2 if np.linalg.norm(wish) < np.linalg.norm(now) else FASTER_M_S2
+    velocity = frame @ slewed(now, wish, dt_s, harder) - swing
+    blocked_by = None
+    if keep_off is not None:
+        velocity, _ = keep_off.allowed(motion.X_WB, velocity, motion.omega_B_rad_s)
+        if wish.any():  # what is asked for, not what is left of it by now, is what something is in the way of
+            _, blocked_by = keep_off.allowed(motion.X_WB, frame @ wish - swing, motion.omega_B_rad_s)
+    # Near the zenith the frame turns faster than a velocity may.
+    velocity = slewed(motion.velocity_W_m_s, velocity, dt_s, HARDEST_M_S2)
     place = led(motion.place_W_m, 0.5 * (motion.velocity_W_m_s + velocity), estimate, dt_s)
     moved = replace(motion, place_W_m=place, velocity_W_m_s=velocity)
-    return moved, Sphere(frame=frame, orbits=state.orbit, range_m=range_m)
+    return moved, Sphere(frame=frame, orbits=state.orbit, range_m=range_m, blocked_by=blocked_by)
 
 
-def _at_range(velocity: Array, wish: Array, kept_m: float | None, range_m: float) -> tuple[Array, float | None]:
-    """The velocity on the sphere with what brings it back to its radius, and that; forward sets another one."""
-    if wish[0] != 0.0 or kept_m is None:
-        kept_m = range_m if wish[0] == 0.0 and abs(velocity[0]) < RANGE_M_S else None
-    if kept_m is None:
-        return velocity, None
-    closes = min(max(RANGE_PER_S * (range_m - kept_m), -RANGE_M_S), RANGE_M_S)
-    return np.array([closes, velocity[1], velocity[2]]), kept_m
+def _at_range(wish: float, now: float, kept_m: float | None, range_m: float) -> tuple[float, float | None]:
+    """Wished speed towards the centre and the radius that is kept: the stick's, and none, while it is held."""
+    if wish != 0.0 or (kept_m is None and abs(now) > SLOW_M_S):
+        return wish, None
+    kept_m = range_m if kept_m is None else kept_m
+    return min(max(RANGE_PER_S * (range_m - kept_m), -RANGE_M_S), RANGE_M_S), kept_m
 
 
 def led(place_W_m: Array, velocity_W_m_s: Array, estimate: BodyState, dt_s: float) -> Array:

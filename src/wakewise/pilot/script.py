@@ -10,7 +10,7 @@ As YAML, each entry with `at_s` and any of the axes (those not named are centred
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -66,7 +66,7 @@ class Script:
         return None if held is None else Controls(axes=held.axes, pressed=tuple(pressed))
 
 
-def script_of(entries: Sequence[Mapping[str, Any]], what: str = "script") -> Script:
+def script_of(entries: Any, what: str = "script") -> Script:
     """Script of entries as in the file (see the top); `what` names them in messages.
 
     Raises
@@ -74,7 +74,7 @@ def script_of(entries: Sequence[Mapping[str, Any]], what: str = "script") -> Scr
     InputError
         Naming the entry, what was found and what is allowed.
     """
-    if not isinstance(entries, Sequence) or isinstance(entries, str) or not entries:
+    if not isinstance(entries, list | tuple) or not entries:
         raise InputError(f"{what}: must be a list of entries, such as - {{at_s: 2, right: 0.6}}")
     if len(entries) > LONGEST:
         raise InputError(f"{what}: {len(entries)} entries, at most {LONGEST} are allowed")

@@ -21,6 +21,8 @@ export function banner({ link, said, helm, sending, mode, preparing }) {
     label = "Give back";
     if (sending) [tone, first, second] = [mode === "operator" ? "live" : "mine", "You have the helm", MODES[mode] ?? ""];
     else [tone, first, second] = ["warn", "Sticks at zero", "this window is not in front: click here to fly on"];
+  } else if (helm.holder && helm.quiet) {
+    [first, second, label] = [`${helm.holder} has left the sticks`, "the vehicle holds, the helm is free", "Take the helm"];
   } else if (helm.holder) {
     [first, second, label] = [`${helm.holder} has the helm`, helm.waiting ? "asked: waiting for an answer" : "you are watching", helm.waiting ? "" : "Ask for the helm"];
   } else [first, second, label] = ["Nobody has the helm", mode === "scan" ? "the mission flies" : "the vehicle holds", "Take the helm"];

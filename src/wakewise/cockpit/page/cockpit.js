@@ -88,7 +88,10 @@ function changeHelm() {
 
 const takers = {
   welcome(message) {
+    helm.id = message.id ?? null;
     now.preparing = words(message.preparing);
+    // While something is made there is no state to hear.
+    link.expectant = !now.preparing;
     const scenario = message.scenario ?? {};
     const world = [scenario.world, message.vehicle?.name].map((one) => words(one, 40)).filter(Boolean).join(" · ");
     $("scenario").textContent = words(scenario.name, 40) || world || "cockpit";
@@ -97,6 +100,7 @@ const takers = {
     target.place(message.target);
     desk.place(message.desk);
     offerScene(message.scene_url);
+    show();
   },
   helm(message) {
     const mine = helm.mine;
@@ -105,7 +109,6 @@ const takers = {
   },
   state(message) {
     now.mode = words(message.mode, 20) || words(message.desk?.mode, 20) || "hold";
-    now.preparing = "";
     document.body.dataset.mode = now.mode;
     notes.at(message.time_s);
     $("time").textContent = clock(message.time_s);

@@ -11,6 +11,8 @@ export class Helm extends EventTarget {
   askedBy = null;
   why = "";
   waiting = false;
+  quiet = false;
+  id = null;
   #link;
   #holdUntil_ms = 0;
 
@@ -28,10 +30,7 @@ export class Helm extends EventTarget {
   /** Ask for it. Taken at once where it is free; else its holder is asked. */
   ask() {
     if (this.mine) return;
-    if (this.#link.send({ type: "helm", want: true, force: false })) {
-      this.waiting = true;
-      this.#tell();
-    }
+    this.#link.send({ type: "helm", want: true, force: false });
   }
 
   giveBack() {
@@ -68,7 +67,9 @@ export class Helm extends EventTarget {
       holder: words(message.holder, 40) || null,
       askedBy: lease && asked && typeof asked === "object" ? { id: asked.id, name: words(asked.name, 40) || "Somebody" } : null,
       why: words(message.why),
-      waiting: this.waiting && lease === null && Boolean(message.holder),
+      waiting: lease === null && asked != null && this.id !== null && asked.id === this.id,
+      // Whoever has it sends nothing: it may be taken.
+      quiet: message.flying === false,
     });
     if (lease && performance.now() < this.#holdUntil_ms) {
       this.#holdUntil_ms = 0;
@@ -76,8 +77,8 @@ export class Helm extends EventTarget {
     }
   }
 
-  #set({ lease = null, holder = null, askedBy = null, why = "", waiting = false }) {
-    Object.assign(this, { lease, holder, askedBy, why, waiting });
+  #set({ lease = null, holder = null, askedBy = null, why = "", waiting = false, quiet = false }) {
+    Object.assign(this, { lease, holder, askedBy, why, waiting, quiet });
     this.#tell();
   }
 

@@ -3,7 +3,7 @@
 const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 8000;
 const SILENT_MS = 1500;
-const DEAD_MS = 10000;
+const DEAD_MS = 12000;
 const REFUSED = 4401;
 
 /** Events: "up", "down" (detail.wait_ms), "silent", "heard", "refused" (detail.why), "message" (object), "picture" (ArrayBuffer). */
@@ -14,6 +14,8 @@ export class Link extends EventTarget {
   #heard_ms = 0;
   #silent = false;
   #ended = false;
+  /** Whether news are due all the time, so that silence means something. */
+  expectant = false;
   #hello;
 
   /** `hello` gives the first message anew for each connection. */
@@ -38,6 +40,7 @@ export class Link extends EventTarget {
     this.#socket = socket;
     socket.onopen = () => {
       this.#heard_ms = performance.now();
+      this.expectant = false;
       this.send(this.#hello());
       this.#tell("up");
     };
@@ -104,7 +107,7 @@ export class Link extends EventTarget {
   }
 
   #listen() {
-    if (!this.open) return;
+    if (!this.open || !this.expectant) return;
     const since_ms = performance.now() - this.#heard_ms;
     if (since_ms > DEAD_MS) this.close();
     else if (since_ms > SILENT_MS && !this.#silent) {
