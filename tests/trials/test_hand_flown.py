@@ -58,3 +58,19 @@ def test_hands_are_not_flown_from_a_scenario(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="pilot: operator, flies by hand"):
         run_trial(SCENARIO.replace(pilot="operator"), tmp_path / "none")
     assert not (tmp_path / "none").exists()
+
+
+@pytest.mark.slow
+def test_a_scenario_may_name_hands_and_their_record_flies_again(tmp_path: Path) -> None:
+    """A script by `pilot: operator`, then its flight's record: the same steps and exposures, to the byte."""
+    script = tmp_path / "hands.yaml"
+    script.write_text(
+        "- {at_s: 0, pressed: [operator], down: -0.5}\n- {at_s: 0.3, pressed: [capture]}\n"
+        "- {at_s: 0.5, pressed: [stop]}\n",
+        encoding="utf-8",
+    )
+    for folder, hands in (("a", script), ("b", tmp_path / "a" / "controls.parquet")):
+        run_trial(SCENARIO.replace(pilot="operator", controls=str(hands)), tmp_path / folder)
+    for name in ("steps.parquet", "exposures.npz", "planned.csv", "images.csv"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
+    assert pl.read_csv(tmp_path / "a/planned.csv").height == 1

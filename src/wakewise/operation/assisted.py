@@ -80,6 +80,9 @@ class AssistedPilot:
         Of the estimated velocity from the one asked for, rms over the last seconds; None while none is asked for.
     trace : TraceWriter
         Hands and desk of the whole flight, to be written beside its record.
+    state : DeskState
+        What was set at the last step: the controller goes by it, so that a change from another thread in the middle of
+        a step counts for the next one, and the record of a flight gives the same flight.
     motion : Motion
     """
 
@@ -92,6 +95,7 @@ class AssistedPilot:
     keep_off: KeepOff | None = None
     controls: Controls | None = None
     trace: TraceWriter = field(default_factory=TraceWriter)
+    state: DeskState = field(init=False)
     motion: Motion = field(init=False)
     _scan: Scan = field(init=False)
     _mode: str = "hold"
@@ -105,6 +109,7 @@ class AssistedPilot:
     _notes: deque[Note] = field(default_factory=lambda: deque(maxlen=KEPT))
 
     def __post_init__(self) -> None:
+        self.state = self.desk.state
         self.motion, self._scan = Motion.at(self.mission.route.body(0.0, self.aim)), Scan()
 
     @property
@@ -151,7 +156,7 @@ class AssistedPilot:
                 self._actions.append(action)
             else:
                 self.desk.press(action)
-        state = self._set(time_s)
+        state = self.state = self._set(time_s)
         self.trace.take(time_s, controls, vars(state))
         self._enter(state.mode, time_s, first)
         if not first:
@@ -276,7 +281,7 @@ def assisted(parts: Parts, source: ControlSource, desk: Desk, begin: DeskState |
     """
     pilot = assisted_pilot(parts, source, desk, begin)
     flown = parts.replace(pilot=pilot)
-    return flown.replace(controller=heeding(flown, lambda: desk.state.method))
+    return flown.replace(controller=heeding(flown, lambda: pilot.state.method))
 
 
 def assisted_pilot(parts: Parts, source: ControlSource, desk: Desk, begin: DeskState | None = None) -> AssistedPilot:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wakewise.errors import InputError
 from wakewise.interfaces import Pilot
 from wakewise.missions import RoutePilot
 from wakewise.operation.helm import HumanPilot
+from wakewise.pilot.sources import hands_from
 from wakewise.plugins import find
 
 if TYPE_CHECKING:
@@ -31,9 +33,20 @@ def human_pilot(parts: Parts) -> HumanPilot:
     )
 
 
-def operator_pilot(parts: Parts) -> Pilot:  # noqa: ARG001
-    """`operator`: a person's hands, which a scenario's file cannot hold."""
-    raise InputError("pilot: operator, flies by hand: take `wakewise cockpit`, or a recorded flight's controls")
+def operator_pilot(parts: Parts) -> Pilot:
+    """`operator`: hands at the desk's sticks, as a file tells of them.
+
+    Raises
+    ------
+    InputError
+        If the scenario names no such file: a person's own hands no scenario can hold.
+    """
+    from wakewise.operation.assisted import assisted_pilot
+    from wakewise.operation.desk import Desk
+
+    if parts.scenario.controls is None:
+        raise InputError("pilot: operator, flies by hand: take `wakewise cockpit`, or name a record in controls")
+    return assisted_pilot(parts, hands_from(Path(parts.scenario.controls)), Desk())
 
 
 def assisted_person(parts: Parts) -> Pilot:

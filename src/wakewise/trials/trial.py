@@ -29,7 +29,8 @@ from wakewise.operation import (
 from wakewise.operation.flight_log import has_parts
 from wakewise.operation.flying import FLIGHT_JOBS
 from wakewise.operation.live_folder import gather
-from wakewise.operation.trial_folder import as_flown, claim, write_plan
+from wakewise.operation.replay import fly_hands
+from wakewise.operation.trial_folder import BY_HAND, as_flown, claim, write_plan
 from wakewise.processes import alone
 from wakewise.reconstruction import read_cloud, read_lens, reconstruct
 from wakewise.targets import Mesh
@@ -154,7 +155,11 @@ def _is_flown(folder: Path) -> bool:
 
 def _fly(parts: Parts, folder: Path, darkroom: Darkroom, progress: Callable[..., None]) -> None:
     """Fly, or put together what a flight by hand left that was cut off."""
-    if not gather(parts, folder):
+    if gather(parts, folder):
+        return
+    if parts.scenario.pilot == BY_HAND and "pilot" not in parts.given:
+        fly_hands(parts, folder)
+    else:
         fly_trial(parts, folder, progress, darkroom.take)
 
 
