@@ -7,6 +7,7 @@ sharp each photograph is. The truth enters only where the two are compared, patc
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,11 +23,14 @@ from wakewise.geometry import Pose
 from wakewise.missions import Coverage, patches_of
 from wakewise.missions.coverage import HALF
 from wakewise.missions.patches import NORMAL_SHARE, REACH_M
+from wakewise.missions.sight import Lens
 from wakewise.operation import Parts, read_scenario
 from wakewise.reconstruction import read_cloud
+from wakewise.targets import Target
 
 COVERAGE_FIGURES = ("coverage_predicted_pct", "coverage_agreement_pct", "coverage_trivial_pct")
 FROM_MODEL = COVERAGE_FIGURES[1:]
+Shot = tuple[Pose, float | None]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,25 +69,31 @@ class Agreement:
         return 100.0 * max(share, 1.0 - share)
 
 
-def coverage_of(parts: Parts, photos: pl.DataFrame, spent_ms: list[float] | None = None) -> Coverage:
+def shots_of(photos: pl.DataFrame) -> list[Shot]:
+    """Estimated camera pose and sharpness of each row of images.csv."""
+    places = photos.select("est_x_m", "est_y_m", "est_z_m").to_numpy()
+    turns = photos.select("est_qw", "est_qx", "est_qy", "est_qz").to_numpy()
+    return [(Pose(p, q), sharp) for p, q, sharp in zip(places, turns, photos["sharpness"].to_list(), strict=True)]
+
+
+def coverage_of(target: Target, lens: Lens, shots: Iterable[Shot], spent_ms: list[float] | None = None) -> Coverage:
     """The guide after a flight's photographs, in their order.
 
     Parameters
     ----------
-    parts : Parts
-    photos : DataFrame
-        Rows of images.csv; only estimated poses and sharpness are read.
+    target : Target
+        As it was found, which is what the crew believes.
+    lens : Lens
+        The camera.
+    shots : iterable
+        Estimated X_WC of each photograph and its sharpness, None where that is not known.
     spent_ms : list, optional
         Takes the thread CPU time of each photograph, in ms.
     """
-    target, camera = parts.found_target, parts.camera
     coverage = Coverage.begin(patches_of(target.mesh, target.bed_z_m))
-    for row in photos.iter_rows(named=True):
-        X_WC = Pose(
-            np.array([row[f"est_{axis}_m"] for axis in "xyz"]), np.array([row[f"est_q{axis}"] for axis in "wxyz"])
-        )
+    for X_WC, sharpness in shots:
         began = time.thread_time()
-        coverage = coverage.seen(X_WC, camera, row["sharpness"])
+        coverage = coverage.seen(X_WC, lens, sharpness)
         _ = coverage.share, coverage.score
         if spent_ms is not None:
             spent_ms.append(1e3 * (time.thread_time() - began))
@@ -123,7 +133,7 @@ def agreement_with(coverage: Coverage, parts: Parts, cloud_W_m: Array) -> Agreem
 
 def coverage_figures(parts: Parts, photos: pl.DataFrame, cloud_W_m: Array | None) -> dict[str, float]:
     """`coverage_predicted_pct`, and where there is a model, in the truth's frame, how far the two agree."""
-    coverage = coverage_of(parts, photos)
+    coverage = coverage_of(parts.found_target, parts.camera, shots_of(photos))
     if cloud_W_m is None:
         return {"coverage_predicted_pct": 100.0 * coverage.share}
     both = agreement_with(coverage, parts, cloud_W_m)
@@ -151,7 +161,7 @@ def measure_coverage(folder: Path) -> dict[str, Any]:
     parts = read_scenario(folder / "scenario.yaml").parts()
     photos = pl.read_csv(folder / "images.csv")
     spent_ms: list[float] = []
-    coverage = coverage_of(parts, photos, spent_ms)
+    coverage = coverage_of(parts.found_target, parts.camera, shots_of(photos), spent_ms)
     crop = Crop(bed_z_m=parts.target.bed_z_m)
     compared = compare_surface(read_cloud(folder / "dense.ply").points_m, parts.target.mesh, crop=crop)
     both = agreement_with(coverage, parts, compared.points_W_m)
