@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import math
 import mimetypes
 import struct
@@ -26,6 +27,8 @@ from websockets.http11 import Request, Response
 PAGE = files("wakewise.cockpit") / "page"
 POLICY = "default-src 'self'; frame-src http://127.0.0.1:*; base-uri 'none'; form-action 'none'"
 LAPSE_S = 1.0
+QUIET = logging.getLogger("standin")
+QUIET.disabled = True
 AROUND = b"<input id=outside><iframe id=f width=480 height=400 src='/?widget=1'></iframe>"
 """Another ground station, with the page as a widget."""
 CORNERS = [(x, y) for x in ("front", "rear") for y in ("right", "left")]
@@ -126,7 +129,7 @@ class StandIn:
     async def _serve(self) -> None:
         self._stop = asyncio.Event()
         self.started_s = time.monotonic()
-        async with serve(self._talk, "127.0.0.1", 0, process_request=self._static, compression=None, close_timeout=0.3) as server:
+        async with serve(self._talk, "127.0.0.1", 0, process_request=self._static, compression=None, close_timeout=0.3, logger=QUIET) as server:
             self.port = next(iter(server.sockets)).getsockname()[1]
             ticking = [asyncio.create_task(self._states()), asyncio.create_task(self._pictures())]
             self._ready.set()
