@@ -9,7 +9,10 @@ from wakewise.cockpit.extras import cockpit_extras, extras_files, register_servi
 from wakewise.cockpit.files import Files
 
 # Required and optional keys of each object, as Cockpit's "External Integrations" lists them.
-EXTRAS = ({"targetSystem": str, "targetCockpitApiVersion": str, "widgets": list, "actions": list}, {"joystickSuggestions": list})
+EXTRAS = (
+    {"targetSystem": str, "targetCockpitApiVersion": str, "widgets": list, "actions": list},
+    {"joystickSuggestions": list},
+)
 WIDGET = (
     {"name": str, "iframeUrl": str},
     {"iconUrl": str, "iframeIcon": str, "collapsibleContainerName": str, "version": str, "startCollapsed": bool,

@@ -8,13 +8,20 @@ from typing import Any
 import pytest
 from standin import PAGE, StandIn
 
-SIZES = {"desk": (1280, 800, False), "upright": (390, 844, True), "sideways": (844, 390, True), "tablet": (900, 1100, True)}
+SIZES = {
+    "desk": (1280, 800, False),
+    "upright": (390, 844, True),
+    "sideways": (844, 390, True),
+    "tablet": (900, 1100, True),
+}
 AT_MIDDLE = """(() => {
   const b = document.getElementById('stop').getBoundingClientRect();
-  return document.elementFromPoint(b.x + b.width / 2, b.y + b.height / 2)?.closest('#stop') !== null
-    && b.left >= 0 && b.top >= 0 && b.right <= innerWidth && b.bottom <= innerHeight && b.width > 60 && b.height > 34; })()"""
+  return Boolean(document.elementFromPoint(b.x + b.width / 2, b.y + b.height / 2)?.closest('#stop'))
+    && b.left >= 0 && b.top >= 0 && b.right <= innerWidth && b.bottom <= innerHeight
+    && b.width > 60 && b.height > 34; })()"""
 NAMELESS = """[...document.querySelectorAll('button, input, canvas, svg[role], iframe')].filter((e) => !(e.hidden ||
-  e.getAttribute('aria-hidden') || e.innerText?.trim() || e.getAttribute('aria-label') || e.title || e.labels?.length)).map((e) => e.outerHTML)"""
+  e.getAttribute('aria-hidden') || e.textContent?.trim() || e.getAttribute('aria-label') || e.title
+  || e.labels?.length)).map((e) => e.outerHTML)"""
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -56,8 +63,8 @@ def test_words_stand_out(theme: str) -> None:
     inks = dict(re.findall(r"--([\w-]+): (#[0-9a-f]{6})", css[start : css.index("}", start)]))
     for ink, ground in (
         ("ink", "paper"), ("ink", "card"), ("ink", "soft"), ("muted", "paper"), ("muted", "card"), ("accent", "card"),
-        ("on-accent", "accent"), ("good", "card"), ("bad", "card"), ("bad", "bad-soft"), ("warn", "card"), ("ink", "good-soft"),
-        ("muted", "good-soft"), ("muted", "warn-soft"), ("muted", "bad-soft"),
+        ("on-accent", "accent"), ("good", "card"), ("bad", "card"), ("bad", "bad-soft"), ("warn", "card"),
+        ("ink", "good-soft"), ("muted", "good-soft"), ("muted", "warn-soft"), ("muted", "bad-soft"),
     ):  # fmt: skip
         assert contrast(inks[ink], inks[ground]) >= 4.5, (ink, ground, contrast(inks[ink], inks[ground]))
     assert contrast("#ffffff", inks["stop"]) >= 4.5
@@ -65,8 +72,14 @@ def test_words_stand_out(theme: str) -> None:
 
 def contrast(one: str, other: str) -> float:
     """Ratio of relative luminances, 1 to 21."""
-    light = sorted(sum(k * linear(int(c[i : i + 2], 16) / 255) for k, i in ((0.2126, 1), (0.7152, 3), (0.0722, 5))) for c in (one, other))
-    return (light[1] + 0.05) / (light[0] + 0.05)
+    low, high = sorted(luminance(colour) for colour in (one, other))
+    return (high + 0.05) / (low + 0.05)
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance, 0 to 1, of "#rrggbb" (WCAG 2.2)."""
+    red, green, blue = (linear(int(colour[i : i + 2], 16) / 255) for i in (1, 3, 5))
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
 
 
 def linear(channel: float) -> float:

@@ -88,7 +88,9 @@ def test_pictures_flow_and_captures_count(rehearsal: Rehearsal, page: Page) -> N
     assert "capture" in page.text("#notes")
 
 
-def test_a_second_helm_needs_consent_and_a_reload_gives_up(rehearsal: Rehearsal, page: Page, server: Server, browser: Browser) -> None:
+def test_a_second_helm_needs_consent_and_a_reload_gives_up(
+    rehearsal: Rehearsal, page: Page, server: Server, browser: Browser
+) -> None:
     """Handed over by who flies; who loads the page again only watches."""
     page.always_front()
     ben = browser.open(server.address + "?name=Ben")

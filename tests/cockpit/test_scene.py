@@ -35,7 +35,9 @@ def test_a_share_request_opens_no_connection(scene: Scene, monkeypatch: pytest.M
     outside: list[object] = []
     monkeypatch.setattr("viser._viser.ViserTunnel", lambda *a: outside.append(a))
     original = type(scene._server).request_share_url
-    monkeypatch.setattr(type(scene._server), "request_share_url", lambda self, *a: asked.append("share") or original(self, *a))
+    monkeypatch.setattr(
+        type(scene._server), "request_share_url", lambda self, *a: asked.append("share") or original(self, *a)
+    )
     url = scene.url.replace("http", "ws")
     with connect(url, subprotocols=[f"viser-v{viser.__version__}"], max_size=None, proxy=None) as client:
         dialled = socket.socket.connect

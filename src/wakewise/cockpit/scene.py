@@ -141,10 +141,10 @@ class Scene:
 
 
 def _closed_server() -> Any:
-    """viser's server on this computer's own address, which opens no tunnel whoever asks."""
+    """Viser's server on this computer's own address, which opens no tunnel whoever asks."""
     import viser
 
-    class ClosedServer(viser.ViserServer):
+    class ClosedServer(viser.ViserServer):  # type: ignore[misc]
         """Its handlers look both methods up when a request comes, so these are what is called."""
 
         def request_share_url(self, verbose: bool = True) -> str | None:  # noqa: ARG002
