@@ -25,7 +25,7 @@ def flown(flight: LiveFlight) -> None:
 
 
 def test_the_same_hands_give_the_same_flight_to_the_byte(tmp_path: Path) -> None:
-    """Sticks, buttons, the desk and photographs that others asked for: all is where it was, in every row and exposure."""
+    """Sticks, buttons, the desk, photographs that others asked for: all is where it was, in each row and exposure."""
     hands = script_of(
         [
             {"at_s": 0.1, "pressed": ["operator", "precise"], "right": 0.5},

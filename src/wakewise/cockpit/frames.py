@@ -1,7 +1,7 @@
 """The live picture: what the camera sees now, small, by the renderer of the photographs, in a process of its own.
 
-Of a photograph's chain it has scene, light, water, silt, exposure and noise; left out are motion blur, flakes, and how a
-soft target bends. One ray a pixel. Rendering takes the interpreter's lock for longer than a control step may wait, so
+Of a photograph's chain it has scene, light, water, silt, exposure and noise; left out are motion blur, flakes, and how
+a soft target bends. One ray a pixel. Rendering takes the interpreter's lock for longer than a control step may wait, so
 it is done in another process, which yields to the loop where both want a core.
 """
 

@@ -109,7 +109,6 @@ class Seat:
             if not helm.held(now_s):
                 return Controls(axes=np.zeros(5), pressed=pressed) if pressed else None
             hands = helm.hands
-            # Before its first sticks a lease has none whose way could be timed.
             if hands.seq >= 0 and (helm.lease or "", hands.seq) != self._flown:
                 self._flown, self._unflown_s = (helm.lease or "", hands.seq), hands.came_s
             return Controls(axes=helm.axes(now_s), pressed=pressed)

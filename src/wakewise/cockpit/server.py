@@ -12,6 +12,7 @@ import contextlib
 import http
 import logging
 import secrets
+import socket
 import threading
 from typing import Any
 
@@ -44,8 +45,11 @@ from wakewise.errors import InputError
 PROTOCOL = 1
 STATE_EVERY_S, PICTURE_EVERY_S = 0.1, 1.0 / 15.0
 MOST_CLIENTS = 16
-_HELLO_WITHIN_S, _STUCK_S, _MOST_AMISS, _MOST_THROTTLED = 5.0, 10.0, 50, 40
+STUCK_S = 10.0
+"""A client that takes nothing for so long is let go."""
+_HELLO_WITHIN_S, _MOST_AMISS, _MOST_THROTTLED = 5.0, 50, 40
 _REFUSED, _TOO_MUCH = 4401, 1008
+_SYSTEM_KEEPS = 1 << 17  # bytes
 _QUIET = logging.getLogger("wakewise.cockpit")
 _QUIET.addHandler(logging.NullHandler())
 _QUIET.propagate = False
@@ -182,6 +186,7 @@ class Server:
             _caller(connection, connection.request)
         )
         self.clients[client.id] = client
+        _keep_little(connection)
         sending = asyncio.create_task(client.send_all(self._loop))
         try:
             async with asyncio.timeout(_HELLO_WITHIN_S):
@@ -286,26 +291,36 @@ class Server:
     async def _beat(self) -> None:
         """Ten times a second: who has the helm, what happened, what is so."""
         assert self._loop is not None
-        due_s = self._loop.time()
+        due_s, amiss = self._loop.time(), ""
         while True:
-            self._look_after_helm()
-            for note in self.show.notes():
-                for client in self._greeted():
-                    client.tell(note.message())
-            if self.show.edition != self._edition:
-                self._edition = self.show.edition
-                for client in self._greeted():
-                    client.tell(self._welcome(client))
-            self._let_go_of_stuck()
-            state = self.show.state() if self._greeted() else None
-            if state is not None:
-                holding = self.show.seat.holding
-                more = {"type": "state", "helm": self._named(holding.holder), "spectators": self.spectators}
-                text = as_json(state | more)
-                for client in self._greeted():
-                    client.state(text)
+            try:
+                self._tell_all()
+            except Exception as fault:  # what is shown may be at fault, the helm must be looked after all the same
+                if (said := f"{type(fault).__name__}: {fault}") != amiss:
+                    self._to_all(Note(text=f"the page cannot be told how it stands ({said})", level="error").message())
+                amiss = said
             due_s = max(due_s + STATE_EVERY_S, self._loop.time())
             await asyncio.sleep(due_s - self._loop.time())
+
+    def _tell_all(self) -> None:
+        self._look_after_helm()
+        self._let_go_of_stuck()
+        for note in self.show.notes():
+            self._to_all(note.message())
+        if self.show.edition != self._edition:
+            self._edition = self.show.edition
+            for client in self._greeted():
+                client.tell(self._welcome(client))
+        state = self.show.state() if self._greeted() else None
+        if state is not None:
+            holder = self._named(self.show.seat.holding.holder)
+            text = as_json(state | {"type": "state", "helm": holder, "spectators": self.spectators})
+            for client in self._greeted():
+                client.state(text)
+
+    def _to_all(self, message: str) -> None:
+        for client in self._greeted():
+            client.tell(message)
 
     async def _look(self) -> None:
         """Pictures, for as long as somebody looks."""
@@ -313,10 +328,10 @@ class Server:
         while True:
             due_s = self._loop.time() + PICTURE_EVERY_S
             if any(client.looks for client in self._greeted()):
-                picture = await asyncio.to_thread(self.show.picture)
-                if picture is not None:
-                    for client in self._greeted():
-                        if client.looks:
+                with contextlib.suppress(Exception):  # a picture that fails is one less
+                    picture = await asyncio.to_thread(self.show.picture)
+                    for client in self._greeted() if picture is not None else ():
+                        if client.looks and picture is not None:
                             client.picture(picture)
             await asyncio.sleep(max(due_s - self._loop.time(), 0.005))
 
@@ -331,11 +346,17 @@ class Server:
         assert self._loop is not None
         for client in list(self.clients.values()):
             since_s = client.sending_since_s
-            if since_s is not None and self._loop.time() - since_s > _STUCK_S:
+            if since_s is not None and self._loop.time() - since_s > STUCK_S:
                 client.connection.transport.abort()
 
     def _greeted(self) -> list[Client]:
         return [client for client in self.clients.values() if client.greeted]
+
+
+def _keep_little(connection: ServerConnection) -> None:
+    """Have the system keep little for a client: what waits there is old when it arrives."""
+    with contextlib.suppress(OSError):
+        connection.transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SYSTEM_KEEPS)
 
 
 def _caller(connection: ServerConnection, request: Request) -> Caller:
