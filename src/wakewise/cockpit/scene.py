@@ -92,13 +92,13 @@ class Scene:
         # Environment maps would be fetched from the network.
         scene.configure_environment_map(None)
         scene.add_light_ambient("/light", intensity=1.2)
-        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
         panel = getattr(server.gui, "main_panel", None)  # not in viser 1.0
         if panel is not None:
             panel.minimize()
         centre, reach_m = self._points_W_m.mean(axis=0), float(np.ptp(self._points_W_m, axis=0).max())
         server.initial_camera.look_at = tuple(centre)
-        server.initial_camera.position = tuple(centre + (2.2 * reach_m + 0.8) * np.array([-0.75, -0.45, -0.5]))
+        server.initial_camera.position = tuple(centre + (2.2 * reach_m + 2.0) * np.array([-0.75, -0.45, -0.5]))
         server.initial_camera.up = (0.0, 0.0, -1.0)
         hull = scene.add_frame("/vehicle", show_axes=False)
         scene.add_box("/vehicle/hull", color=HULL_RGB, dimensions=tuple(0.8 * vehicle.size_m), opacity=0.55)

@@ -33,7 +33,7 @@ const desk = new Desk(helm);
 const thrusts = new Thrusts($("thrusts"));
 const target = new Target($("target"), $("scale"));
 const coverage = new Coverage({ canvas: $("patches"), share: $("share"), next: $("next") });
-const disturbances = new Plot($("plot-disturbance"), [{ ink: "--s1" }, { ink: "--s2", dashed: true }], { unit: "D, mm²/s²", least: 10, decades: 4 });
+const disturbances = new Plot($("plot-disturbance"), [{ ink: "--s1" }, { ink: "--s2", dashed: true }], { unit: "D, mm²/s²", least: 1000, decades: 4 });
 const deviations = new Plot($("plot-deviation"), [{ ink: "--s1" }], { unit: "% of the command", least: 10, most: 100 });
 new Camera({ canvas: $("camera"), empty: $("no-picture"), late: $("late"), link });
 
