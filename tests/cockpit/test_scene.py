@@ -80,8 +80,9 @@ def test_a_moment_moves_vehicle_thrusts_and_colours(scene: Scene) -> None:
 
 def test_colours_rise_with_the_wash() -> None:
     """Ends are the ends of the scale; what is not known is drawn as still."""
-    colours = speed_colours(np.array([0.0, np.nan, 0.004, 9.0]))
-    assert colours.tolist() == SPEED_RGB[[0, 0, 1, 3]].tolist()
+    sand_m_s = 1e-3 * (101.0**0.3 - 1.0)
+    colours = speed_colours(np.array([0.0, np.nan, sand_m_s, 0.1, 9.0]))
+    assert colours.tolist() == SPEED_RGB[[0, 0, 1, 3, 3]].tolist()
 
 
 def test_without_viser_there_is_no_scene(monkeypatch: pytest.MonkeyPatch) -> None:
