@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from wakewise.errors import InputError, StageError
+from wakewise.errors import EnvironmentFailure, InputError, StageError
 from wakewise.evaluation import SWAY_FIGURES, Crop, evaluate_surface, flight_figures
 from wakewise.extras import need
 from wakewise.files import write_json, write_text
@@ -105,6 +105,7 @@ def run_trial(
     watch = watch or Quiet()
     parts = flight if isinstance(flight, Parts) else flight.parts()
     scenario = as_flown(parts)
+    check_place(folder, scenario)
     if not is_warm(JOBS):
         with watch.stage("compile") as progress:
             warm(JOBS, progress)
@@ -188,15 +189,20 @@ def as_flown(parts: Parts) -> Scenario:
     return scenario.model_copy(update=told)
 
 
-def claim(folder: Path, scenario: Scenario) -> None:
-    """Write scenario.yaml, or check that the one in the folder is the same trial.
+def check_place(folder: Path, scenario: Scenario) -> None:
+    """Refuse a folder in which the trial cannot be, before seconds are spent on whether it can be flown.
 
     Raises
     ------
     InputError
         If the folder holds another trial, or is a file.
+    EnvironmentFailure
+        If it would lie below a file.
     """
     path = folder / "scenario.yaml"
+    above = next((place for place in folder.parents if place.exists()), None)
+    if above is not None and not above.is_dir():
+        raise EnvironmentFailure(f"{above}: Not a directory")
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--out {folder}: is a file, must be a folder or not exist")
     if path.exists():
@@ -205,6 +211,13 @@ def claim(folder: Path, scenario: Scenario) -> None:
             raise InputError(
                 f"--out {folder}: holds another trial ({'; '.join(changed[:3])}); give another --out or remove it"
             )
+
+
+def claim(folder: Path, scenario: Scenario) -> None:
+    """Write scenario.yaml, or check that the one in the folder is the same trial; raises as `check_place`."""
+    check_place(folder, scenario)
+    path = folder / "scenario.yaml"
+    if path.exists():
         return
     packages = ("wakewise", "numpy", "numba", "pycolmap", "opencv-python-headless", "embreex")
     versions = {"python": platform.python_version()} | {name: version(name) for name in packages}
