@@ -29,7 +29,7 @@ from wakewise.operation import (
 from wakewise.operation.flight_log import has_parts
 from wakewise.operation.flying import FLIGHT_JOBS
 from wakewise.operation.live_folder import gather
-from wakewise.operation.trial_folder import as_flown, claim, write_plan
+from wakewise.operation.trial_folder import as_flown, check_place, claim, write_plan
 from wakewise.processes import alone
 from wakewise.reconstruction import read_cloud, read_lens, reconstruct
 from wakewise.targets import Mesh
@@ -104,6 +104,7 @@ def run_trial(
     watch = watch or Quiet()
     parts = flight if isinstance(flight, Parts) else flight.parts()
     scenario = as_flown(parts)
+    check_place(folder, scenario)
     if not is_warm(JOBS):
         with watch.stage("compile") as progress:
             warm(JOBS, progress)
