@@ -24,7 +24,7 @@ class Pad:
     def __init__(self) -> None:
         self.held: Controls | None = CENTRED
 
-    def read(self, time_s: float) -> Controls | None:  # noqa: ARG002
+    def read(self, time_s: float) -> Controls | None:
         return self.held
 
 

@@ -86,7 +86,7 @@ def test_a_state_has_all_that_the_wire_promises(flown: tuple[Session, Hands, Pat
 
 def test_in_the_papers_water_the_prediction_is_the_truth(flown: tuple[Session, Hands, Path]) -> None:
     """There the water is the planner's own law at the survey's place, so that both washes are of one size."""
-    session, hands, _ = flown
+    _, hands, _ = flown
     hands.until(lambda: len(hands.state.get("true_m_s") or ()) > 0)
     hands.until(lambda: hands.state["time_s"] > 2.0)
     state = hands.state

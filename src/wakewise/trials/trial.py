@@ -13,7 +13,7 @@ import numpy as np
 import polars as pl
 
 from wakewise.errors import InputError, StageError
-from wakewise.evaluation import SWAY_FIGURES, Crop, evaluate_surface, flight_figures
+from wakewise.evaluation import SWAY_FIGURES, Crop, compare_surface, evaluate_surface, flight_figures
 from wakewise.extras import need
 from wakewise.files import write_json
 from wakewise.geometry import matrix_from_quat
@@ -30,10 +30,11 @@ from wakewise.operation.flight_log import has_parts
 from wakewise.operation.flying import FLIGHT_JOBS
 from wakewise.operation.live_folder import gather
 from wakewise.operation.replay import fly_hands
-from wakewise.operation.trial_folder import BY_HAND, as_flown, claim, write_plan
+from wakewise.operation.trial_folder import BY_HAND, as_flown, check_place, claim, write_plan
 from wakewise.processes import alone
 from wakewise.reconstruction import read_cloud, read_lens, reconstruct
 from wakewise.targets import Mesh
+from wakewise.trials.coverage import FROM_MODEL, coverage_figures
 from wakewise.trials.metrics import Figures, Gathering, comparison
 from wakewise.trials.size import SIZE_FIGURES, size_figures
 from wakewise.trials.stages import Ledger, Quiet, Watch, of_the_computer
@@ -104,6 +105,7 @@ def run_trial(
     watch = watch or Quiet()
     parts = flight if isinstance(flight, Parts) else flight.parts()
     scenario = as_flown(parts)
+    check_place(folder, scenario)
     if not is_warm(JOBS):
         with watch.stage("compile") as progress:
             warm(JOBS, progress)
@@ -259,13 +261,14 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
     gathering.add({key: summary.get(key) for key in _MODEL_FIGURES})
     if failure is None:
         try:
-            score = evaluate_surface(
+            compared = compare_surface(
                 read_cloud(folder / "dense.ply").points_m,
                 parts.target.mesh,
                 crop=Crop(bed_z_m=parts.target.bed_z_m),
                 camera_centres_W_m=photos.select("true_x_m", "true_y_m", "true_z_m").to_numpy(),
             )
-            gathering.add({key: getattr(score, key) for key in (*_SURFACE_FIGURES, "success")})
+            gathering.add(coverage_figures(parts, photos, compared.points_W_m))
+            gathering.add({key: getattr(compared.score, key) for key in (*_SURFACE_FIGURES, "success")})
             gathering.add({"rmse_mean_shape_mm": _rmse_mean_shape_mm(parts, folder)})
             gathering.add(_size(parts, folder, photos))
         except StageError as fault:
@@ -275,8 +278,8 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
     elif failure is not None:
         gathering.missing(("rmse_mean_shape_mm",), f"no model: {failure}")
     if failure is not None:
-        gathering.add({"success": False})
-        gathering.missing((*_SURFACE_FIGURES, *_MODEL_FIGURES, *SIZE_FIGURES), f"no model: {failure}")
+        gathering.add({"success": False} | coverage_figures(parts, photos, None))
+        gathering.missing((*_SURFACE_FIGURES, *FROM_MODEL, *_MODEL_FIGURES, *SIZE_FIGURES), f"no model: {failure}")
     return {"figures": gathering.figures, "reasons": gathering.reasons}
 
 
