@@ -14,6 +14,7 @@ import logging
 import secrets
 import socket
 import threading
+from dataclasses import replace
 from typing import Any
 
 from websockets.asyncio.server import Server as Listening
@@ -166,17 +167,19 @@ class Server:
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request for a file, let a socket open, or refuse either."""
         caller = _caller(connection, request)
-        refused = self._gate.refusal(caller)
+        file = self._files.at(request.path)
+        shared = file is not None and file.shared
+        refused = self._gate.refusal(replace(caller, origin=None) if shared else caller)
         if refused is not None:
             return _response(http.HTTPStatus.FORBIDDEN, f"refused: {refused}\n".encode())
         if request.path.partition("?")[0] == "/ws":
             if len(self.clients) >= MOST_CLIENTS:
                 return _response(http.HTTPStatus.SERVICE_UNAVAILABLE, b"too many pages are open\n")
             return None
-        file = self._files.at(request.path)
         if file is None:
             return _response(http.HTTPStatus.NOT_FOUND, b"there is nothing here\n")
-        return _response(http.HTTPStatus.OK, file.body, file.kind, page_headers(caller.host or ""))
+        more = page_headers(caller.host or "") | ({"Access-Control-Allow-Origin": "*"} if shared else {})
+        return _response(http.HTTPStatus.OK, file.body, file.kind, more)
 
     async def _meet(self, connection: ServerConnection) -> None:
         """One client, from its first word to its last."""

@@ -146,20 +146,20 @@ class Coverage:
     @cached_property
     def score(self) -> Array:
         """How far each patch has come, 0 (never shown) to 1 (all of it seen well), shape (patches,)."""
-        return self.patches.mean(np.maximum(self.level / WELL, self._covered))
+        return self.patches.mean(np.maximum(self.level / WELL, self.covered))
 
     @cached_property
     def well(self) -> BoolArray:
         """Which patches are seen well, over more than half of their area; shape (patches,)."""
-        return np.asarray(self.patches.mean(self._covered) > HALF)
+        return np.asarray(self.patches.mean(self.covered) > HALF)
 
     @property
     def share(self) -> float:
         """Share of the surface that is seen well, 0 to 1: the completeness that the model is expected to have."""
-        return float(self._covered.mean())
+        return float(self.covered.mean())
 
     @cached_property
-    def _covered(self) -> BoolArray:
+    def covered(self) -> BoolArray:
         """Samples that are seen well or lie so near to one that is that the model will reach them, shape (n,)."""
         return self.patches.spread(self.level == WELL)
 

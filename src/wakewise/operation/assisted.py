@@ -18,6 +18,7 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.control import make_controller, vehicle_layout
+from wakewise.control.firmness import allowed_stray
 from wakewise.control.intent import PAPER_W_TRACK
 from wakewise.control.switching import Switched
 from wakewise.interfaces import BodyState, Controller, Goal
@@ -160,7 +161,8 @@ class AssistedPilot:
         wished = math.log(state.w_track / PAPER_W_TRACK)
         most = math.inf if first else DIAL_PER_S * self.dt_s
         self._dial += min(max(wished - self._dial, -most), most)
-        return self.motion.goal(obedience=math.exp(self._dial))
+        obedience = math.exp(self._dial)
+        return self.motion.goal(obedience=obedience, stray=allowed_stray(PAPER_W_TRACK * obedience))
 
     @property
     def leg(self) -> str:
