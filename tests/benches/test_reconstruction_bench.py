@@ -16,8 +16,13 @@ SMALL = {
     "imaging.fov_deg": 50,
     "imaging.samples": 1,
     "reconstruction.mesh_depth": 6,
+    "reconstruction.dense_px": 160,
+    "reconstruction.dense_zoom": 1.0,
+    "reconstruction.stereo_paths": 3,
+    "reconstruction.stereo_partners": 2,
     "target.points": 60,
 }
+"""The least that both ways make a model of; how good it is, other tests ask."""
 
 
 @pytest.mark.slow

@@ -81,7 +81,7 @@ def test_photos_that_are_none_are_refused(content: dict[str, bytes], words: list
 def test_a_folder_that_holds_another_trial_is_left_alone(capsys: Capsys) -> None:
     """Running another scenario into the same folder is refused, with the field that differs."""
     from wakewise.operation import load_scenario
-    from wakewise.trials.trial import claim
+    from wakewise.operation.trial_folder import claim
 
     claim(Path("result"), load_scenario("quick", None, {}))
     before = Path("result/scenario.yaml").read_bytes()

@@ -123,7 +123,7 @@ def test_a_part_given_in_python_is_named_in_the_record(installed: Path, tmp_path
     import reef_parts
 
     from wakewise.control import ControlTask
-    from wakewise.trials.trial import as_flown
+    from wakewise.operation.trial_folder import as_flown
 
     parts = ww.Scenario.preset("quick").parts()
     task = ControlTask(vehicle=parts.vehicle, region=parts.region, wake=parts.wake, settings=parts.control)

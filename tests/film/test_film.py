@@ -31,7 +31,7 @@ from wakewise.geometry import Pose, look_at
 from wakewise.imaging import PinholeCamera
 from wakewise.interfaces import ScalarGrid
 from wakewise.operation import load_scenario, write_scenario
-from wakewise.operation.recorder import ExposureRecord, write_exposures
+from wakewise.operation.exposures import ExposureRecord, write_exposures
 from wakewise.reports.vehicle.hull import corner_normals, hull_of
 from wakewise.vehicles import load_vehicle, vehicle_names
 from wakewise.water import Water

@@ -13,8 +13,8 @@ from wakewise.geometry import Pose, quat_from_rotvec
 from wakewise.interfaces import ScalarGrid
 from wakewise.operation import Darkroom, load_scenario, photograph_flight
 from wakewise.operation.darkroom import MOST_WAITING, packed, unpacked
+from wakewise.operation.exposures import ExposureRecord, read_exposures, write_exposures
 from wakewise.operation.photography import fingerprint, take_photograph
-from wakewise.operation.recorder import ExposureRecord, read_exposures, write_exposures
 from wakewise.tank.flakes import Flakes
 from wakewise.water import SteadyCurrent
 

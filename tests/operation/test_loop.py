@@ -12,6 +12,7 @@ from wakewise.interfaces import BodyState, Command, Goal, Measurement, ScalarGri
 from wakewise.missions import MissionSettings, RoutePilot, plan_route
 from wakewise.missions.orbit import R_FC
 from wakewise.operation import FlightRecorder, read_exposures, step_columns
+from wakewise.operation.flight_log import TAGS, FlightLog
 from wakewise.operation.loop import run_loop
 
 ROUTE = plan_route(
@@ -187,7 +188,7 @@ def test_the_estimator_is_told_what_was_flown() -> None:
         thrusters=2,
         dt_s=DT_S,
         witness=None,
-        _exposing=NeverRead(),
+        log=FlightLog(tags={name: NeverRead() for name in TAGS}),
     )
     run_loop(
         pilot=RoutePilot(route=ROUTE, aim=X_BC),

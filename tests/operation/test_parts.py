@@ -7,7 +7,7 @@ import wakewise as ww
 from wakewise.errors import InputError
 from wakewise.operation import PARTS, read_scenario, write_scenario
 from wakewise.operation import parts as module
-from wakewise.trials.trial import as_flown
+from wakewise.operation.trial_folder import as_flown
 
 QUICK = ww.Scenario.preset("quick", **{"target.points": 60})
 

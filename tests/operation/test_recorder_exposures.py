@@ -7,8 +7,8 @@ from wakewise.geometry import Pose
 from wakewise.imaging.settings import LONGEST_S
 from wakewise.interfaces import ScalarGrid
 from wakewise.operation import Scenario, fly, load_scenario
+from wakewise.operation.exposures import ExposureRecord, exposure_arrays, read_exposures, write_exposures
 from wakewise.operation.photography import fingerprint, take_photograph
-from wakewise.operation.recorder import ExposureRecord, exposure_arrays, read_exposures, write_exposures
 
 SILT = ScalarGrid(origin_W_m=np.zeros(3), spacing_m=0.1, values=np.zeros((2, 2, 2)))
 

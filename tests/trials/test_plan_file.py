@@ -5,7 +5,7 @@ import csv
 import pytest
 
 from wakewise.operation import load_scenario
-from wakewise.trials.trial import write_plan
+from wakewise.operation.trial_folder import write_plan
 
 
 @pytest.mark.parametrize(("photo_format", "suffix"), [("png", ".png"), ("jpeg", ".jpg")])

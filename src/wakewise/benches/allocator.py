@@ -15,7 +15,7 @@ from wakewise.allocation import Layout, Weights, compile_layout, gentle_allocati
 from wakewise.allocation.allocate import COUPLING_LIMIT
 from wakewise.allocation.search import box_range, cost, coupling, split_allocation
 from wakewise.arrays import Array
-from wakewise.benches.cases import REGION, TARGET, VEHICLE, cases
+from wakewise.benches.cases import VEHICLE, bench_region, bench_target, cases
 from wakewise.compiled import njit
 from wakewise.geometry import Pose, look_at, quat_from_matrix
 from wakewise.trials.timing import BenchOptions, timed_us
@@ -37,7 +37,7 @@ Problem = tuple[Array, Array]
 def run(options: BenchOptions) -> dict[str, Any]:
     """Search, Gram matrix and whole call in thread CPU; exactness over 1,000 problems; savings; chatter; peers."""
     layout = compile_layout(VEHICLE.allocation_matrix, VEHICLE.thrust_lower_N, VEHICLE.thrust_upper_N)
-    views = {name: WakeView.of(VEHICLE, REGION, wake_model(name)) for name in ("paper", "jet")}
+    views = {name: WakeView.of(VEHICLE, bench_region(), wake_model(name)) for name in ("paper", "jet")}
     effort, disturbance_first = (
         Weights(disturbance=1.0 / views["paper"].total_weight, effort=effort) for effort in (1e-3, 1e-6)
     )
@@ -45,14 +45,16 @@ def run(options: BenchOptions) -> dict[str, Any]:
     problems = [(views["paper" if k % 4 < 2 else "jet"].gram(X_WB), wrench) for k, (X_WB, wrench) in enumerate(drawn)]
     exact = _against_grid(layout, problems, (effort, disturbance_first), options)
     poses = [X_WB for X_WB, _ in drawn[:8]]
-    floor = WakeView.of(VEHICLE, REGION, wake_model(WakeSettings(model="jet", floor=True), TARGET.bed_z_m))
+    floor = WakeView.of(
+        VEHICLE, bench_region(), wake_model(WakeSettings(model="jet", floor=True), bench_target().bed_z_m)
+    )
     gram_us = {
         name: float(np.median([timed_us(partial(view.gram, X_WB), 200)["median_us"] for X_WB in poses]))
         for name, view in views.items()
     }
     return (
         _speed(layout, problems[:40], effort)
-        | {"gram_us": max(gram_us.values()), "gram_us_by_model": gram_us, "gram_points": len(REGION.points_W_m)}
+        | {"gram_us": max(gram_us.values()), "gram_us_by_model": gram_us, "gram_points": len(bench_region().points_W_m)}
         | exact
         | _potential(layout, views["paper"], effort)
         | {
@@ -167,7 +169,7 @@ def _potential(layout: Layout, view: WakeView, weights: Weights) -> dict[str, An
         for _ in range(_POTENTIAL):
             azimuth, reach = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(0.45, 0.7)
             side = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-            eye = TARGET.centre_W_m - reach * (np.cos(below) * side + np.sin(below) * np.array([0.0, 0.0, 1.0]))
+            eye = bench_target().centre_W_m - reach * (np.cos(below) * side + np.sin(below) * np.array([0.0, 0.0, 1.0]))
             level = quat_from_matrix(look_at(eye, eye + side))
             G, wrench = view.gram(Pose(eye, level)), rng.normal(size=6) * [6.0, 6.0, 4.0, 0.3, 0.5, 0.5]
             before = float(least_thrusts(layout, wrench, G).disturbance or 0.0)
@@ -204,8 +206,8 @@ def _chatter(layout: Layout, views: dict[str, WakeView], weights: Weights) -> di
         course = []
         for k in range(steps):
             angle = 2.0 * np.pi * k / steps
-            eye = TARGET.centre_W_m + np.array([0.5 * np.cos(angle), 0.5 * np.sin(angle), -0.35])
-            X_WB = Pose(eye, quat_from_matrix(look_at(eye, TARGET.centre_W_m)))
+            eye = bench_target().centre_W_m + np.array([0.5 * np.cos(angle), 0.5 * np.sin(angle), -0.35])
+            X_WB = Pose(eye, quat_from_matrix(look_at(eye, bench_target().centre_W_m)))
             # Correlated over half a second, as the wrenches of a tracker are; it sinks by 1 N.
             wrench = 0.8 * wrench + 0.6 * rng.normal(size=6) * [1.0, 1.0, 1.0, 0.05, 0.05, 0.08]
             course.append((view.gram(X_WB), wrench - np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.benches.cases import REGION, TARGET, VEHICLE, cases
+from wakewise.benches.cases import VEHICLE, bench_region, bench_target, cases
 from wakewise.benches.sampling_study import sampling_errors
 from wakewise.geometry import Pose
 from wakewise.interfaces import WakeModel
@@ -35,9 +35,9 @@ PAPER_US = 1000.0
 def run(options: BenchOptions) -> dict[str, Any]:
     """Times of every model at several poses, from Python, checks included; the slowest model is the headline."""
     poses = [X_WB for X_WB, _ in cases(4)]
-    region = (REGION.points_W_m, REGION.weights)
+    region = (bench_region().points_W_m, bench_region().weights)
     models = {name: wake_model(name) for name in OWN_MODELS}
-    models["jet+floor"] = wake_model(WakeSettings(model="jet", floor=True), TARGET.bed_z_m)
+    models["jet+floor"] = wake_model(WakeSettings(model="jet", floor=True), bench_target().bed_z_m)
     rows = {}
     for done, (name, model) in enumerate(models.items()):
         options.progress(done, len(models) + 1, name)
@@ -47,7 +47,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
     options.progress(len(models), len(models) + 1, "300 points against 100,000")
     sampling = sampling_errors()
     return {
-        "points": len(REGION.points_W_m),
+        "points": len(bench_region().points_W_m),
         "thrusters": len(VEHICLE.thrusters),
         "gram_us": max(row["gram_us"] for row in free),
         "gram_with_derivatives_us": max(row["gram_with_derivatives_us"] for row in free),
@@ -94,7 +94,7 @@ def _growth(X_WB: Pose) -> dict[str, float]:
     rng = np.random.default_rng(0)
     growth = {}
     for count in COUNTS:
-        rows = rng.integers(0, len(REGION.points_W_m), count)
-        call = partial(gram, wake_model("paper"), REGION.points_W_m[rows], REGION.weights[rows], *world)
+        rows = rng.integers(0, len(bench_region().points_W_m), count)
+        call = partial(gram, wake_model("paper"), bench_region().points_W_m[rows], bench_region().weights[rows], *world)
         growth[str(count)] = timed_us(call, 300)["median_us"]
     return growth

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.benches.cases import REGION, TARGET, VEHICLE
+from wakewise.benches.cases import VEHICLE, bench_region, bench_target
 from wakewise.control import ControlSettings, make_controller
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Goal
@@ -32,8 +32,8 @@ CURRENT_M_S = np.array([0.05, 0.02, 0.0])
 def flown_step(method: str, goal_at: Callable[[float], Goal], weight_N: float) -> dict[str, Any]:
     """Times of a method's control steps in ms: median, 99th percentile, and that of the slowest tenth's median."""
     settings = ControlSettings()
-    wake = wake_model(settings.wake, TARGET.bed_z_m)
-    controller = make_controller(method, VEHICLE, REGION, wake, settings)
+    wake = wake_model(settings.wake, bench_target().bed_z_m)
+    controller = make_controller(method, VEHICLE, bench_region(), wake, settings)
     plant = np.array(compile_body(VEHICLE).packed)
     plant[12:19] *= 1.15
     goal = goal_at(0.0)

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from wakewise.benches.cases import TARGET
+from wakewise.benches.cases import bench_target
 from wakewise.geometry import Pose, quat_from_rotvec
 from wakewise.imaging import (
     FlatPort,
@@ -46,8 +46,8 @@ PEAK_THRESHOLDS = (0.02, 0.0067)
 
 def run(options: BenchOptions) -> dict[str, Any]:
     """Photographs of the quick preset with everything on, silt too, and in clear water, moving as a flight does."""
-    scene, settings = Scene.build(TARGET, 0), ImagingSettings()
-    planned = plan_route(TARGET.centre_W_m, MissionSettings()).X_WC_planned
+    scene, settings = Scene.build(bench_target(), 0), ImagingSettings()
+    planned = plan_route(bench_target().centre_W_m, MissionSettings()).X_WC_planned
     views = [planned[k * len(planned) // FRAMES] for k in range(FRAMES)]
     rng = np.random.default_rng(0)
     silt = cloud()
@@ -123,7 +123,7 @@ def parts(scene: Scene, settings: ImagingSettings, views: list[Pose], silt: Scal
 def surface_figures(scene: Scene, views: list[Pose]) -> dict[str, float]:
     """How far points of the depth map lie from the plane of the coral's nearest face, mm, 1920 px wide."""
     camera, lights = ImagingSettings(width=1920, height=1440).camera(), ImagingSettings().lights()
-    mesh = TARGET.mesh
+    mesh = bench_target().mesh
     corners = mesh.triangles_m
     normals = mesh.area_vectors_m2 / mesh.face_areas_m2[:, None]
     tree = cKDTree(corners.mean(axis=1))

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.benches.cases import REGION, TARGET, VEHICLE
+from wakewise.benches.cases import VEHICLE, bench_region, bench_target
 from wakewise.benches.flown_step import METHODS, flown_step
 from wakewise.benches.paper_planner import PaperPlanner
 from wakewise.benches.planner_load import deadline_misses
@@ -67,19 +67,20 @@ def plan_model(iterations: int, second_start_every: int = 10, tolerance: float =
     """What the planner of this bench believes."""
     terms = PlanTerms(second_start_every=second_start_every, tolerance=tolerance)
     around = Surroundings(
-        planes=np.array([[0.0, 0.0, -1.0, -TARGET.bed_z_m]]), spheres=np.array([[*TARGET.centre_W_m, TARGET.radius_m]])
+        planes=np.array([[0.0, 0.0, -1.0, -bench_target().bed_z_m]]),
+        spheres=np.array([[*bench_target().centre_W_m, bench_target().radius_m]]),
     )
     wake = wake_model(WakeSettings(model="paper-calibrated", edge_width_deg=3.0, floor=False))
-    return compile_plan(VEHICLE, REGION, wake, PlanSettings(iterations=iterations), around, terms)
+    return compile_plan(VEHICLE, bench_region(), wake, PlanSettings(iterations=iterations), around, terms)
 
 
 def goal_at(time_s: float) -> Goal:
     """Place on the orbit, looking at its axis."""
     rate = SPEED_M_S / RADIUS_M
     angle = rate * time_s
-    top_z = float(REGION.points_W_m[REGION.distance_m == 0.0, 2].min())
+    top_z = float(bench_region().points_W_m[bench_region().distance_m == 0.0, 2].min())
     place = np.array([RADIUS_M * np.cos(angle), RADIUS_M * np.sin(angle), 0.0])
-    place[:2] += TARGET.centre_W_m[:2]
+    place[:2] += bench_target().centre_W_m[:2]
     place[2] = top_z - ABOVE_M
     twist = np.array([0.0, -SPEED_M_S, 0.0, 0.0, 0.0, rate])
     return Goal(X_WB=Pose(place, quat_from_euler(0.0, 0.0, angle + np.pi)), nu_B=twist)

@@ -17,7 +17,7 @@ BENCHES = {
     "gentle": "what each method does to the target's water where users have the trouble, and what each lever is worth",
     "planner": "the planner against the paper's recipe and IPOPT",
     "reconstruction": "models of three corals from clear photographs: accuracy, completeness, time and memory",
-    "operator": "an operator's velocity obeyed, against the water's disturbance, by w_track",
+    "operator": "an operator's velocity obeyed and the target's water spared, by w_track, where users have the trouble",
     "imaging": "one photograph: speed by part, memory, geometry, flat port, features",
     "lattice": "the lattice-Boltzmann solver: cell updates per core beside a plain loop, distance from the twin",
     "tank": "the world of a trial against the clock",
@@ -27,7 +27,7 @@ BENCHES = {
 
 _STUDIES = {
     "gentle": "wakewise.studies.gentle.bench",
-    "operator": "wakewise.studies.operator",
+    "operator": "wakewise.studies.operator.bench",
     "worlds": "wakewise.studies.worlds.bench",
 }
 

@@ -19,7 +19,7 @@ Data = Annotated[
 Seeds = Annotated[
     int | None,
     typer.Option(
-        help="gentle, worlds: flights per method, seeds 1 to this; 3 and 10 if not given.",
+        help="gentle, operator, worlds: flights per method, seeds 1 to this; 3, 3 and 10 if not given.",
         min=1,
         max=1000,
         show_default=False,
@@ -28,7 +28,18 @@ Seeds = Annotated[
 Methods = Annotated[
     str, typer.Option(help="gentle, worlds: methods, with commas between; all if not given.", show_default=False)
 ]
-Worlds = Annotated[str, typer.Option(help="worlds: which, with commas between; all if not given.", show_default=False)]
+Worlds = Annotated[
+    str,
+    typer.Option(
+        help="operator, worlds: which, with commas between; all if not given, of operator those with trouble and a calm "
+        "one.",
+        show_default=False,
+    ),
+]
+WTracks = Annotated[
+    str,
+    typer.Option(help="operator: weights, with commas between; 1,2,5,10,20 if not given.", show_default=False),
+]
 Models = Annotated[
     int, typer.Option(help="worlds: seeds for which a whole scan is made and its model judged.", min=0, max=1000)
 ]
@@ -48,18 +59,18 @@ Judge = Annotated[
     int,
     typer.Option(help="worlds: seeds flown in the lattice as well, minutes of a core each.", min=0, max=1000),
 ]
-Fresh = Annotated[bool, typer.Option("--fresh", help="gentle, worlds: fly anew what an earlier run has flown.")]
-Workers = Annotated[int, typer.Option(help="gentle, worlds: processes that fly side by side.", min=1, max=64)]
+Fresh = Annotated[bool, typer.Option("--fresh", help="gentle, operator, worlds: fly anew what an earlier run has flown.")]
+Workers = Annotated[int, typer.Option(help="gentle, operator, worlds: processes that fly side by side.", min=1, max=64)]
 Store = Annotated[
     Path | None,
-    typer.Option(help="gentle, worlds: folder that keeps flights; the user's cache if not given.", show_default=False),
+    typer.Option(help="gentle, operator, worlds: folder that keeps flights; the cache if not given.", show_default=False),
 ]
 Plot = Annotated[
     Path | None,
     typer.Option(help="gentle, operator: draw the figures into this file (.png, .svg).", show_default=False),
 ]
 
-_SEEDS = {"gentle": 3}
+_SEEDS = {"gentle": 3, "operator": 3}
 """Seeds of a bench that flies, if not given; 10 of the others."""
 
 
@@ -71,6 +82,7 @@ def bench(
     scenarios: Scenarios = "",
     levers: Levers = "",
     worlds: Worlds = "",
+    w_tracks: WTracks = "",
     models: Models = 1,
     judge: Judge = 0,
     fresh: Fresh = False,
@@ -107,6 +119,7 @@ def bench(
                 scenarios=_listed(scenarios),
                 levers=_listed(levers),
                 worlds=_listed(worlds),
+                w_tracks=_numbers("--w-tracks", w_tracks),
                 models=models,
                 judge=judge,
                 fresh=fresh,
@@ -137,6 +150,25 @@ def _listed(text: str) -> tuple[str, ...] | None:
     """Names between commas; None for none given."""
     names = tuple(part.strip() for part in text.split(",") if part.strip())
     return names or None
+
+
+def _numbers(option: str, text: str) -> tuple[float, ...] | None:
+    """Numbers between commas; None for none given.
+
+    Raises
+    ------
+    InputError
+        If one is not a number.
+    """
+    from wakewise.errors import InputError
+
+    found = []
+    for part in _listed(text) or ():
+        try:
+            found.append(float(part))
+        except ValueError:
+            raise InputError(f"{option}: '{part}' is not a number, such as 5 or 1,5,20") from None
+    return tuple(found) or None
 
 
 def _show(result: dict[str, Any], indent: str) -> None:

@@ -17,6 +17,7 @@ from wakewise.cli import (
     allocate,
     bench,
     calibrate,
+    cockpit,
     colour,
     compare,
     degrade,
@@ -43,6 +44,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 app.command("scan")(scan.scan)
+app.command("cockpit")(cockpit.cockpit)
 app.command("compare")(compare.compare)
 app.command("reconstruct")(reconstruct.reconstruct_photos)
 app.command("evaluate")(evaluate.evaluate)

@@ -37,6 +37,16 @@ Method = Annotated[
     ),
 ]
 
+Resume = Annotated[
+    Path | None,
+    typer.Option(
+        "--resume",
+        metavar="FOLDER",
+        help="Go on with what a folder holds, as its scenario.yaml says: a trial cut short, a flight by hand.",
+        show_default=False,
+    ),
+]
+
 _HEADLINES = (
     "success",
     "rmse_mm",
@@ -67,23 +77,31 @@ def scan(
     world: World = None,
     seed: Seed = None,
     sets: Sets = None,
+    resume: Resume = None,
     json: Json = False,
 ) -> None:
     """Fly layered orbits round a target, photograph it, reconstruct it, measure the model, write a report.
 
-    Stages that are done are skipped, so running the same command again continues where it stopped.
+    Stages that are done are skipped, so running the same command again continues where it stopped; --resume needs no
+    more than the folder.
     """
     from wakewise.extras import need
 
     need("wakewise scan", "photos", "reports", "logs")
     from wakewise.api import trial
-    from wakewise.operation import load_scenario
+    from wakewise.errors import InputError
+    from wakewise.operation import load_scenario, read_scenario
 
     changes = overrides(
         sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, method=method, world=world
     )
-    resolved = load_scenario(preset, scenario, changes)
-    folder = out or default_folder(resolved, resolved.method)
+    if resume is None:
+        resolved = load_scenario(preset, scenario, changes)
+        folder = out or default_folder(resolved, resolved.method)
+    else:
+        if scenario is not None or out is not None or changes:
+            raise InputError("--resume: goes on as the folder says, so give nothing beside it but --json")
+        resolved, folder = read_scenario(resume / "scenario.yaml"), resume
     result = trial(resolved, folder, Bars(), print_json if json else partial(_print_figures, resolved))
     if not json:
         _say_trim(folder)

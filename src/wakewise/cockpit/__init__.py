@@ -1,1 +1,9 @@
-"""The pilot's page: a flight in the browser, its helm, and who may hold it."""
+"""The pilot's page: a flight in the browser, its helm, and who may hold it.
+
+Start reading in `session.py` (a scenario becomes flights that are shown) and `server.py` (one port for page and socket,
+in a thread that no flight waits for; `show.py` is what it asks for). `helm.py` says who may fly and which sticks count,
+`seat.py` is where the flight reads them; `messages.py` is what a page may say, `client.py` what waits to be sent to it,
+`gate.py` who may come in, `files.py` the page's own files in `page/`. What is shown: `lookout.py` takes it down in the
+flight's thread, `gauges.py` holds flown thrusts against direct ones, `state.py` makes numbers of it, `guide.py` follows
+the photographs, `frames.py` draws the camera's picture in a process of its own.
+"""

@@ -14,6 +14,7 @@ has a grid of it, `wakewise bench operator` flies the whole one.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +27,10 @@ from wakewise.planning.problem import PlanSettings
 
 LEASH_M = 0.10
 """Farthest that the commanded place may be from the vehicle: what 0.1 m/s makes in a second."""
+FULL_M_S, FULL_RAD_S = 0.5, math.radians(90.0)
+"""What full stick asks for at gain 1; estimate: five times the pace of a mission."""
+HIGHEST_RAD = math.radians(80.0)
+"""Elevation above which an orbit does not climb: past the zenith left and right change places."""
 PAPER_W_TRACK = 5.0
 """The paper's default; the planner's default weights of tracking, all three, stand for it."""
 

@@ -10,6 +10,7 @@ import numpy as np
 from wakewise.allocation import Allocation, Layout, compile_layout
 from wakewise.allocation.allocate import disturbance_of
 from wakewise.arrays import Array, freeze
+from wakewise.control.carried import Carried
 from wakewise.control.tracker import Tracker, TrackerState
 from wakewise.control.watch import APART_S, EVERY_S, FULL, JUMP_EVERY_S, Watch
 from wakewise.interfaces import BodyState, Command, Goal
@@ -66,6 +67,14 @@ class TrackingController:
     def init(self) -> ControllerState:
         """State before the first step."""
         return ControllerState(tracker=self.tracker.init(), thrusts_N=np.zeros(len(self.view.positions_B_m)))
+
+    def carried(self, state: ControllerState) -> Carried:
+        """What another method can go on with."""
+        return Carried(tracker=state.tracker, thrusts_N=state.thrusts_N)
+
+    def resumed(self, carried: Carried) -> ControllerState:
+        """State before the first step after another method's."""
+        return ControllerState(tracker=carried.tracker, thrusts_N=carried.thrusts_N)
 
     def step(
         self, state: ControllerState, dt_s: float, estimate: BodyState, goal: Goal

@@ -22,6 +22,7 @@ import numpy as np
 
 from wakewise.allocation import Layout, Weights, compile_layout, gentle_allocation
 from wakewise.arrays import Array, freeze
+from wakewise.control import easing
 from wakewise.control.watch import FULL
 from wakewise.geometry import Pose, quat_from_rotvec
 from wakewise.interfaces import Goal
@@ -82,19 +83,8 @@ class Hinge:
 
 
 def eased(lean_rad: float, rate_rad_s: float, wished_rad: float, dt_s: float) -> tuple[float, float]:
-    """Lean and its rate a step later on the way to a wished lean at rest, within `RATE_RAD_S` and its own change.
-
-    The rate aimed at is the one from which the rest of the way just suffices to stop.
-    """
-    left = wished_rad - lean_rad
-    most = ACCELERATION_RAD_S2 * dt_s
-    if abs(left) <= most * dt_s and abs(rate_rad_s) <= most:
-        return wished_rad, 0.0
-    # Half a step's change is lost to steps being steps.
-    stops = float(np.sqrt(0.25 * most**2 + 2.0 * ACCELERATION_RAD_S2 * abs(left))) - 0.5 * most
-    aimed = min(RATE_RAD_S, stops, abs(left) / dt_s)
-    rate = rate_rad_s + float(np.clip(np.copysign(aimed, left) - rate_rad_s, -most, most))
-    return lean_rad + 0.5 * (rate_rad_s + rate) * dt_s, rate
+    """Lean and its rate a step later on the way to a wished lean at rest, within `RATE_RAD_S` and its own change."""
+    return easing.eased(lean_rad, rate_rad_s, wished_rad, dt_s, RATE_RAD_S, ACCELERATION_RAD_S2)
 
 
 Gram = Callable[[Pose, Array], Array]

@@ -22,6 +22,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from wakewise.arrays import Array, freeze
+from wakewise.control.carried import Carried
 from wakewise.control.instant import instant_allocator
 from wakewise.control.loop import HOLD_S, ControllerState, TrackingController
 from wakewise.control.settings import ControlSettings
@@ -104,6 +105,16 @@ class PlanningController:
             backup=self.backup.init(),
         )
 
+    def carried(self, state: PlanState) -> Carried:
+        """What another method can go on with."""
+        return Carried(tracker=replace(state.tracker, goal_nu=state.goal_nu), thrusts_N=state.thrusts_N)
+
+    def resumed(self, carried: Carried) -> PlanState:
+        """State before the first step after another method's: the first plan begins at its thrusts."""
+        begun, thrusts = self.init(), carried.thrusts_N
+        goal_nu = carried.tracker.goal_nu
+        return replace(begun, tracker=carried.tracker, thrusts_N=thrusts, nominal_N=thrusts, goal_nu=goal_nu)
+
     def expected(self, state: PlanState) -> Array | None:
         """State that the plan expects now, shape (13,); None where there is no plan."""
         return None if state.plan is None else _at(state.plan, state.age_s, self.model.settings.stage_s)
@@ -184,6 +195,7 @@ class PlanningController:
                 reference=reference_of(goal, settings.stages, settings.stage_s, change_B),
                 force_W_N=estimate.X_WB.R @ estimate.load_B[:3],
                 moment_B_Nm=estimate.load_B[3:],
+                obedience=goal.obedience,
             )
 
         found = self.guard.ask(make, state.plan, state.age_s)

@@ -14,12 +14,13 @@ take it as it is: it is an entry of G off the diagonal. It errs on the safe side
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from wakewise.allocation import Layout
 from wakewise.arrays import Array, IntArray
+from wakewise.control.carried import Carried, HandsOver
 from wakewise.control.settings import ControlSettings
 from wakewise.control.thrift import sharer_of, weights_of
 from wakewise.control.watch import APART_S, EVERY_S, JUMP_EVERY_S, Watch
@@ -221,6 +222,14 @@ class Respared:
     def init(self) -> SpareState:
         """State before the first step."""
         return SpareState(inner=self.inner.init(), thrusts_N=np.zeros(self.layout.B.shape[1]))
+
+    def carried(self, state: SpareState) -> Carried:
+        """What another method can go on with; asked only where the other controller hands over, too."""
+        return replace(cast(HandsOver, self.inner).carried(state.inner), thrusts_N=state.thrusts_N)
+
+    def resumed(self, carried: Carried) -> SpareState:
+        """State before the first step after another method's: shares are sought near its thrusts."""
+        return SpareState(inner=cast(HandsOver, self.inner).resumed(carried), thrusts_N=carried.thrusts_N)
 
     def step(self, state: SpareState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[SpareState, Command]:
         """Decide the thrusts for the next `dt_s` seconds."""

@@ -26,7 +26,7 @@ from wakewise.geometry import Pose
 from wakewise.imaging import PinholeCamera, SiltOptics
 from wakewise.interfaces import ScalarGrid, no_progress
 from wakewise.operation import Scenario, read_exposures, read_scenario
-from wakewise.operation.recorder import ExposureRecord
+from wakewise.operation.exposures import ExposureRecord
 from wakewise.reports import figures
 from wakewise.reports.trial import Trial, read_trial
 from wakewise.reports.vehicle.hull import hull_of

@@ -109,13 +109,23 @@ class Route:
         """What the vehicle is doing: the name of the leg under way, or `SETTLING` before the first."""
         return SETTLING if time_s < self.starts_s[0] else self.legs[self.leg_at(time_s)].name
 
+    def shutter_s(self, number: int, time_s: float, dt_s: float) -> float | None:
+        """When photograph `number`, counted from 0, is taken, if before the step from `time_s` is over; else None."""
+        if number >= len(self.exposures_s) or self.exposures_s[number] >= time_s + dt_s:
+            return None
+        return float(self.exposures_s[number])
+
+    def photo(self, number: int) -> str:
+        """Name of photograph `number`: the planned one's, or by its number where more are taken than were planned."""
+        return self.exposure_names[number] if number < len(self.exposure_names) else f"{number:03d}.png"
+
     def leg_at(self, time_s: float) -> int:
         """Index of the leg under way; before the first leg begins it is the first, held at its start."""
         return int(np.clip(np.searchsorted(self.starts_s, time_s, side="right") - 1, 0, len(self.legs) - 1))
 
     def camera(self, time_s: float) -> tuple[Pose, Array, Array]:
         """Wished camera pose X_WC, its velocity and its angular velocity in W (shape (3,) each)."""
-        place, rate = self._on_sphere(time_s)
+        place, rate = self.on_sphere(time_s)
         v_W, omega_W = camera_twist(*place, *rate)
         return camera_pose(self.centre_W_m, *place), v_W, omega_W
 
@@ -123,7 +133,7 @@ class Route:
         """Wished angle of the camera's joint and its rate; zeros where it is not aimed with."""
         if isinstance(aim, Pose):
             return 0.0, 0.0
-        (_, elevation, _), (_, elevation_rate, _) = self._on_sphere(time_s)
+        (_, elevation, _), (_, elevation_rate, _) = self.on_sphere(time_s)
         return aim.tilt(-float(elevation), -float(elevation_rate))
 
     def body(self, time_s: float, aim: CameraAim | Pose) -> BodyState:
@@ -140,7 +150,7 @@ class Route:
         v_B = R_BW @ v_WC - v_BC - np.cross(omega_B, X_BC.p_m)
         return BodyState(X_WB=X_WB, nu_B=np.concatenate([v_B, omega_B]))
 
-    def _on_sphere(self, time_s: float) -> tuple[Array, Array]:
+    def on_sphere(self, time_s: float) -> tuple[Array, Array]:
         """Azimuth, elevation and range of the camera, and their rates, shape (3,) each."""
         leg = self.legs[i := self.leg_at(time_s)]
         fraction, rate = leg.progress(time_s - float(self.starts_s[i]))

@@ -18,10 +18,12 @@ from wakewise.doors import lazy_door
 
 if TYPE_CHECKING:
     from wakewise.operation.darkroom import Darkroom
+    from wakewise.operation.exposures import read_exposures
     from wakewise.operation.flying import Flight, fly, fly_trial
+    from wakewise.operation.live import LiveFlight
     from wakewise.operation.parts import PARTS, Parts
     from wakewise.operation.photography import photo_name, photograph_flight
-    from wakewise.operation.recorder import FlightRecorder, read_exposures, step_columns
+    from wakewise.operation.recorder import FlightRecorder, step_columns
     from wakewise.operation.scenario import (
         PRESETS,
         Scenario,
@@ -38,6 +40,7 @@ __all__ = [
     "Darkroom",
     "Flight",
     "FlightRecorder",
+    "LiveFlight",
     "Parts",
     "Scenario",
     "differences",

@@ -7,7 +7,6 @@ other process has no room for, or does not come to, is left to the stage after t
 
 from __future__ import annotations
 
-import io
 import os
 import pickle
 import queue
@@ -22,9 +21,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING
 
-import numpy as np
-
-from wakewise.operation.recorder import ExposureRecord, exposure_arrays, read_exposures
+from wakewise.operation.exposures import ExposureRecord, packed, unpacked
 from wakewise.processes import sweep
 
 if TYPE_CHECKING:
@@ -133,20 +130,6 @@ class Darkroom:
 def _warn(reason: str) -> None:
     words = f"photographs: could not be rendered beside the flight ({reason}), so they are after it"
     warnings.warn(words, RuntimeWarning, stacklevel=3)
-
-
-def packed(number: int, exposure: ExposureRecord) -> bytes:
-    """An exposure and its number as they are sent, in the arrays of the flight's record."""
-    file = io.BytesIO()
-    np.savez(file, number=np.array(number), **exposure_arrays([exposure]))
-    return file.getvalue()
-
-
-def unpacked(message: bytes) -> tuple[int, ExposureRecord]:
-    """What `packed` packed."""
-    with np.load(io.BytesIO(message)) as data:
-        number = int(data["number"])
-    return number, read_exposures(io.BytesIO(message))[0]
 
 
 def _message(pipe: IO[bytes]) -> bytes | None:

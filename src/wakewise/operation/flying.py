@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +16,13 @@ from wakewise.errors import StageError, WakewiseError
 from wakewise.evaluation import flight_figures
 from wakewise.extras import has
 from wakewise.imaging.settings import METERED
-from wakewise.interfaces import Witness, no_progress
+from wakewise.interfaces import Plant, Witness, no_progress
 from wakewise.missions import SETTLING
+from wakewise.operation.exposures import ExposureRecord
 from wakewise.operation.loop import Step, run_loop
 from wakewise.operation.parts import Parts
 from wakewise.operation.preflight import check_begin
-from wakewise.operation.recorder import ExposureRecord, FlightRecorder
+from wakewise.operation.recorder import FlightRecorder, Timetable
 from wakewise.operation.scenario import Scenario
 from wakewise.warming import warm
 
@@ -133,7 +135,7 @@ def fly(
     (50, 'dp')
     """
     parts = flight if isinstance(flight, Parts) else flight.parts()
-    scenario, vehicle, route = parts.scenario, parts.vehicle, parts.route
+    route = parts.route
     warm(FLIGHT_JOBS, progress)
     if checked:
         _ = parts.preflight
@@ -141,41 +143,65 @@ def fly(
         check_begin(parts)
     progress(0, 1, "at the start")
     plant, witness = parts.world.begin()
-    dt_s, thrusters = 1.0 / scenario.control.rate_hz, len(vehicle.thrusters)
-    recorder = FlightRecorder(
-        route=route,
-        X_BC=vehicle.X_BC,
-        joint=vehicle.tilt,
-        exposure_s=scenario.imaging.window_s,
-        metered=METERED if scenario.imaging.auto_exposure else 0,
-        instants=scenario.imaging.instants,
-        thrusters=thrusters,
-        dt_s=dt_s,
-        witness=witness,
-        water_every_s=water_every_s,
-        exposed=exposed,
-    )
+    recorder = recorder_of(parts, witness, route, water_every_s=water_every_s, exposed=exposed)
 
     def record(step: Step) -> None:
         recorder(step)
         if watch is not None:
             watch(step, witness)
 
-    try:
-        run_loop(
-            pilot=parts.pilot,
-            controller=parts.flying,
-            estimator=parts.estimator,
-            plant=plant,
-            witness=witness,
-            start=parts.start,
-            thrusters=thrusters,
-            duration_s=route.duration_s if duration_s is None else duration_s,
-            dt_s=dt_s,
-            record=record,
-            tilt_rad=parts.start_tilt_rad,
-            progress=progress,
+    with blamed(parts, recorder):
+        loop_of(parts, plant, witness, record)(
+            duration_s=route.duration_s if duration_s is None else duration_s, progress=progress
         )
+    return Flight(parts, recorder)
+
+
+def recorder_of(parts: Parts, witness: Witness | None, timetable: Timetable, **more: Any) -> FlightRecorder:
+    """The recorder of a flight of these parts, `more` as for `FlightRecorder`."""
+    scenario, vehicle = parts.scenario, parts.vehicle
+    return FlightRecorder(
+        route=timetable,
+        X_BC=vehicle.X_BC,
+        joint=vehicle.tilt,
+        exposure_s=scenario.imaging.window_s,
+        metered=METERED if scenario.imaging.auto_exposure else 0,
+        instants=scenario.imaging.instants,
+        thrusters=len(vehicle.thrusters),
+        dt_s=1.0 / scenario.control.rate_hz,
+        witness=witness,
+        **more,
+    )
+
+
+def loop_of(parts: Parts, plant: Plant, witness: Witness | None, record: Callable[[Step], None]) -> Callable[..., None]:
+    """The loop of a flight of these parts; what is left to say is how long, and by which clock (see `run_loop`)."""
+    return partial(
+        run_loop,
+        pilot=parts.pilot,
+        controller=parts.flying,
+        estimator=parts.estimator,
+        plant=plant,
+        witness=witness,
+        start=parts.start,
+        thrusters=len(parts.vehicle.thrusters),
+        dt_s=1.0 / parts.scenario.control.rate_hz,
+        record=record,
+        tilt_rad=parts.start_tilt_rad,
+    )
+
+
+@contextmanager
+def blamed(parts: Parts, recorder: FlightRecorder) -> Iterator[None]:
+    """Name the parts from outside, where there are any, as what may have ended a flight.
+
+    Raises
+    ------
+    StageError
+        In place of what was raised.
+    """
+    try:
+        yield
     except (WakewiseError, MemoryError):  # for memory that ran out no part is to blame
         raise
     except Exception as fault:
@@ -186,7 +212,6 @@ def fly(
         raise StageError(
             f"fly: ended after {recorder.duration_s:.1f} s by {type(fault).__name__}: {fault}; from outside: {words}"
         ) from fault
-    return Flight(parts, recorder)
 
 
 def fly_trial(

@@ -13,13 +13,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.control.intent import moved_on
+from wakewise.control.intent import FULL_M_S, FULL_RAD_S, moved_on
 from wakewise.geometry import Pose, euler_from_quat, matrix_from_quat, quat_from_euler
 from wakewise.interfaces import BodyState, Goal, Pilot
 from wakewise.pilot import Person, PersonState, Sticks, View, begin, draw_person, steer
 
-FULL_M_S, FULL_RAD_S = 0.5, math.radians(90.0)
-"""What full stick asks for at gain 1; estimate: five times the pace of a mission."""
 ANSWER_S = 0.5
 """How much later the vehicle answers a velocity; estimate, from the trackers' bandwidth of two radians a second."""
 STICKS = Sticks(
@@ -71,7 +69,9 @@ class HumanPilot:
             self._heading_rad = float(euler_from_quat(estimate.X_WB.q)[2])
         view = View.of(estimate.X_WB, estimate.nu_B, self.X_BC)
         wish = View.of(wished.X_WB, wished.nu_B, self.X_BC)
-        self._state, asked = steer(self.person, self._state, self.dt_s, view, wish, self._watched(wished))
+        self._state, asked = steer(
+            self.person, self._state, self.dt_s, view, wish, watched(wished, self.X_BC, self.target_W_m)
+        )
         c, s = math.cos(view.heading_rad), math.sin(view.heading_rad)
         velocity_W = np.array([c * asked[0] - s * asked[1], s * asked[0] + c * asked[1], asked[2]])
         self._place_W_m = moved_on(self._place_W_m, velocity_W, estimate, self.dt_s)
@@ -84,8 +84,9 @@ class HumanPilot:
             nu_B=np.concatenate([R_BW @ velocity_W, R_BW @ turn_W]),
         )
 
-    def _watched(self, wished: Goal) -> Array:
-        """What the wished picture has in its middle, shape (3,), as far off as the target is."""
-        X_WC = wished.X_WB @ self.X_BC
-        axis_W = X_WC.R[:, 2]
-        return np.asarray(X_WC.p_m + axis_W * float((self.target_W_m - X_WC.p_m) @ axis_W))
+
+def watched(wished: Goal, X_BC: Pose, target_W_m: Array) -> Array:
+    """What the wished picture has in its middle, shape (3,), as far off as the target is."""
+    X_WC = wished.X_WB @ X_BC
+    axis_W = X_WC.R[:, 2]
+    return np.asarray(X_WC.p_m + axis_W * float((target_W_m - X_WC.p_m) @ axis_W))

@@ -136,9 +136,12 @@ class InstantWater:
 
     def speeds_m_s(self, points_W_m: Array) -> Array:
         """Speed of the jets' water, shape (n,), at points, shape (n, 3)."""
+        return np.asarray(np.linalg.norm(self.excess_velocity(points_W_m), axis=1))
+
+    def excess_velocity(self, points_W_m: Array) -> Array:
+        """Velocity of the jets' water at points, both shape (n, 3)."""
         origins, axes = self._plant.disks()
-        areas = self._plant.vehicle.disk_areas_m2
-        return np.asarray(np.linalg.norm(self._jets(points_W_m, origins, axes, self._plant.thrusts_N, areas), axis=1))
+        return self._jets(points_W_m, origins, axes, self._plant.thrusts_N, self._plant.vehicle.disk_areas_m2)
 
     def observe(self) -> Truth:
         """Vehicle, thrusters and collisions now."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -40,6 +41,19 @@ class Step:
 Recorder = Callable[[Step], None]
 
 
+def never() -> bool:
+    """Say no: what ends no loop."""
+    return False
+
+
+def at_once(time_s: float) -> None:
+    """Wait for nothing: the pace of a simulated flight."""
+
+
+def unheard(time_s: float) -> None:
+    """Take no note of when thrusts are sent."""
+
+
 def run_loop(
     *,
     pilot: Pilot,
@@ -49,24 +63,32 @@ def run_loop(
     witness: Witness | None,
     start: BodyState,
     thrusters: int,
-    duration_s: float,
+    duration_s: float | None,
     dt_s: float,
     record: Recorder,
     tilt_rad: float = 0.0,
     progress: Callable[..., None] = no_progress,
+    stop: Callable[[], bool] = never,
+    pace: Callable[[float], None] = at_once,
+    sent: Callable[[float], None] = unheard,
 ) -> None:
-    """Run the loop for `duration_s` at a fixed step.
+    """Run the loop for `duration_s` at a fixed step, without end where that is None, or until `stop` says so.
 
     At each step the estimate of now, which is all a controller may know, meets the goal of now; the resulting thrusts
     are held for `dt_s`. A controller may answer with another goal of the same camera pose (`Command.goal`): that one is
     recorded, and the camera is aimed by it. `start` is the first guess of the estimator, `tilt_rad` that of the tilt of
     the camera. Solve times are thread CPU.
+
+    Before each step `stop` is asked, then `pace` may wait until that time of the flight has come; `sent` is called
+    when a step's thrusts go to the plant. What a flight is does not hang on any of them.
     """
     control_state, filter_state = controller.init(), estimator.init(start)
     estimate, thrusts, aim = start, np.zeros(thrusters), getattr(plant, "aim", None)
-    steps = round(duration_s / dt_s)
-    for k in range(steps):
+    steps = math.inf if duration_s is None else round(duration_s / dt_s)
+    k = 0
+    while k < steps and not stop():
         now_s = k * dt_s
+        pace(now_s)
         goal = pilot.goal(now_s, estimate)
         began = time.thread_time()
         control_state, command = controller.step(control_state, dt_s, estimate, goal)
@@ -87,10 +109,12 @@ def run_loop(
         thrusts = command.thrusts_N
         if aim is not None:
             aim(goal.tilt_rad)
+        sent(now_s)
         measurements = plant.step(thrusts, dt_s)
         for measured in measurements:
             tilt_rad = tilt_rad if measured.tilt_rad is None else measured.tilt_rad
         filter_state, estimate = estimator.step(filter_state, dt_s, measurements, thrusts)
-        if k % 25 == 0:
+        if k % 25 == 0 and duration_s is not None:
             progress(k, steps, f"{now_s:.0f} of {duration_s:.0f} s flown")
-    progress(steps, steps, f"{duration_s:.0f} s flown")
+        k += 1
+    progress(k, k, f"{k * dt_s:.0f} s flown")

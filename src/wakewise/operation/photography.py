@@ -20,8 +20,8 @@ from wakewise.files import whole_file, write_text
 from wakewise.geometry import Pose
 from wakewise.imaging import Scene, SiltOptics, calibrate, photograph
 from wakewise.interfaces import no_progress
+from wakewise.operation.exposures import ExposureRecord, read_exposures
 from wakewise.operation.parts import Parts
-from wakewise.operation.recorder import ExposureRecord, read_exposures
 from wakewise.operation.scenario import Scenario
 from wakewise.operation.survey import known_calibration
 from wakewise.targets import turned_normals
@@ -52,7 +52,7 @@ def photograph_flight(parts: Parts, folder: Path, progress: Callable[..., None] 
     write_text(folder / "cameras.txt", known.cameras_txt("As the crew knows it; the true one is in camera.json"))
     rows = []
     for k, exposure in enumerate(exposures):
-        name = photo_name(parts.route.exposure_names[k], parts.scenario)
+        name = photo_name(parts.route.photo(k), parts.scenario)
         progress(k, len(exposures), name)
         seen = take_photograph(parts, folder, k, exposure)
         middle = exposure.X_WC_true[len(exposure.X_WC_true) // 2]
@@ -82,15 +82,15 @@ def take_photograph(parts: Parts, folder: Path, number: int, exposure: ExposureR
     beside it holds its sharpness, turbidity and the exposure's fingerprint: a photograph of another exposure, left by a
     flight that was cut off, is made anew. Exposures are as `read_exposures` gives them.
     """
-    scenario, names = parts.scenario, parts.route.exposure_names
-    image = folder / "images" / photo_name(names[number], scenario)
+    scenario = parts.scenario
+    image = folder / "images" / photo_name(parts.route.photo(number), scenario)
     note = image.with_name(f".{image.stem}.json")
     mark = fingerprint(exposure)
     if image.exists() and note.exists():
         noted: dict[str, Any] = json.loads(note.read_text(encoding="utf-8"))
         if noted["exposure"] == mark:
             return noted
-    rng = parts.seeds.imaging().spawn(len(names))[number]
+    rng = parts.seeds.imaging().spawn(number + 1)[number]
     grains = SiltOptics(diameter_m=scenario.tank.silt.grain_m, density_kg_m3=scenario.tank.silt.grain_density_kg_m3)
     silt = exposure.silt if exposure.silt.largest > 0.0 else None
     photo = photograph(

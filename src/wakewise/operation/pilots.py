@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from wakewise.errors import InputError
 from wakewise.interfaces import Pilot
 from wakewise.missions import RoutePilot
 from wakewise.operation.helm import HumanPilot
@@ -30,7 +31,12 @@ def human_pilot(parts: Parts) -> HumanPilot:
     )
 
 
-PILOTS: dict[str, Callable[[Parts], Pilot]] = {"route": route_pilot, "human": human_pilot}
+def operator_pilot(parts: Parts) -> Pilot:  # noqa: ARG001
+    """`operator`: a person's hands, which a scenario's file cannot hold."""
+    raise InputError("pilot: operator, flies by hand: take `wakewise cockpit`, or a recorded flight's controls")
+
+
+PILOTS: dict[str, Callable[[Parts], Pilot]] = {"route": route_pilot, "human": human_pilot, "operator": operator_pilot}
 """Our own pilots: what makes each from the parts of a flight."""
 
 

@@ -7,10 +7,11 @@ timings.parquet. Column names carry units; frames and meanings are in docs/conve
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import IO, Any
+from typing import Protocol
 
 import numpy as np
 import polars as pl
@@ -19,8 +20,9 @@ from wakewise.arrays import Array
 from wakewise.files import whole_file
 from wakewise.geometry import Pose, quat_integrate
 from wakewise.imaging.settings import METERED_EVERY_S
-from wakewise.interfaces import BodyState, FlakeCloud, Posture, ScalarGrid, WaterTruth, Witness
-from wakewise.missions import Route
+from wakewise.interfaces import BodyState, FlakeCloud, Posture, WaterTruth, Witness
+from wakewise.operation.exposures import STANCE, ExposureRecord, write_exposures
+from wakewise.operation.flight_log import FlightLog, steps_of, timings_of
 from wakewise.operation.loop import Step
 from wakewise.vehicles.tilt import TiltJoint
 
@@ -54,38 +56,25 @@ def step_columns(thrusters: int, yields: bool = False) -> list[str]:
     ]
 
 
-_STANCE = ("tips_m", "tip_speeds_m_s", "shift_m")
+class Timetable(Protocol):
+    """Says when photographs are taken and what each stretch of a flight is called; a route is one."""
 
+    def leg_name(self, time_s: float) -> str:
+        """What the vehicle is doing."""
+        ...
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ExposureRecord:
-    """One opening of the shutter: true camera poses across it, the estimate at its middle, the silt in the water.
-
-    `X_WC_before` are true poses of the camera before, oldest first, which automatic exposure goes by; else none.
-    `flakes` are those that drift before the camera; None where nobody knows, so that they are drawn for each
-    photograph.
-    Of a target that yields also, as in `wakewise.interfaces.Posture`, how it stood at its opening: `tips_m` and
-    `tip_speeds_m_s` (k, 2), `shift_m` (2,).
-    """
-
-    time_s: float
-    X_WC_true: tuple[Pose, ...]
-    X_WC_est: Pose
-    silt: ScalarGrid
-    X_WC_before: tuple[Pose, ...] = ()
-    flakes: FlakeCloud | None = None
-    tips_m: Array | None = None
-    tip_speeds_m_s: Array | None = None
-    shift_m: Array | None = None
+    def shutter_s(self, number: int, time_s: float, dt_s: float) -> float | None:
+        """When photograph `number`, counted from 0, is taken, if in the step that begins at `time_s`; else None."""
+        ...
 
 
 @dataclass(kw_only=True, eq=False)
 class FlightRecorder:
-    """Collects a flight in memory and writes it whole at its end.
+    """Collects a flight in its log and writes it whole at its end.
 
     Parameters
     ----------
-    route : Route
+    route : Timetable
         Gives the exposures and the names of the legs.
     X_BC : Pose
         Camera mount.
@@ -104,9 +93,11 @@ class FlightRecorder:
         How often the water is asked about; in between the last answer stands.
     exposed : callable, optional
         Called as `(number, exposure)` for each exposure when it has been recorded; number counts from 0.
+    log : FlightLog
+        Where rows and exposures go; by default they are kept in memory.
     """
 
-    route: Route
+    route: Timetable
     X_BC: Pose
     exposure_s: float
     instants: int
@@ -117,27 +108,25 @@ class FlightRecorder:
     exposed: Callable[[int, ExposureRecord], None] | None = None
     joint: TiltJoint | None = None
     metered: int = 0
-    exposures: list[ExposureRecord] = field(default_factory=list)
-    _rows: list[Array] = field(default_factory=list)
-    _legs: list[str] = field(default_factory=list)
-    _fallbacks: list[str] = field(default_factory=list)
-    _exposing: list[bool] = field(default_factory=list)
+    log: FlightLog = field(default_factory=FlightLog)
     _opened: int = 0
-    _collisions: list[bool] = field(default_factory=list)
-    _solve_ms: list[float] = field(default_factory=list)
+    _recent: deque[Array] = field(init=False)
     _water: WaterTruth | None = None
     _posture: Posture | None = None
     _water_time_s: float = -np.inf
 
+    def __post_init__(self) -> None:
+        self._every = max(1, round(METERED_EVERY_S / self.dt_s))
+        self._recent = deque(maxlen=self._every * max(self.metered - 1, 0) + 1)
+
     def __call__(self, step: Step) -> None:
         """Take in one step of the loop."""
-        opens_s = self.route.exposures_s
-        k = self._opened
-        exposing = bool(k < len(opens_s) and opens_s[k] < step.time_s + self.dt_s)
+        opens_s = self.route.shutter_s(self._opened, step.time_s, self.dt_s)
+        exposing = opens_s is not None
         if self.witness is not None and (exposing or step.time_s >= self._water_time_s + self.water_every_s - 1e-9):
             self._water, self._water_time_s = self.witness.water(), step.time_s
             self._posture = _posture_of(self.witness)
-        elif self.witness is not None and not self._rows:
+        elif self.witness is not None and not self.log.count:
             self._posture = _posture_of(self.witness)  # all rows have its columns or none has
         water = [getattr(self._water, name) if self._water is not None else np.nan for name in _WATER]
         truth = step.truth
@@ -156,67 +145,73 @@ class FlightRecorder:
             _posture_row(self._posture),
             np.degrees([truth.tilt_rad if truth else np.nan, step.tilt_rad, step.goal.tilt_rad]),
         ]
-        self._rows.append(np.concatenate(row))
-        self._legs.append(self.route.leg_name(step.time_s))
-        self._fallbacks.append(step.command.fallback or "")
-        self._exposing.append(exposing)
+        if not self.log.count:
+            self.log.names = step_columns(self.thrusters, yields=self._posture is not None)
+        numbers = np.concatenate(row)
+        tags: dict[str, bool | str] = {
+            "exposing": exposing,
+            "collision": bool(truth and truth.collision),
+            "fallback": step.command.fallback or "",
+            "leg": self.route.leg_name(step.time_s),
+        }
+        self._recent.append(numbers)
+        self.log.add(numbers, tags, 1e3 * step.solve_s)
         self._opened += exposing
-        self._collisions.append(bool(truth and truth.collision))
-        self._solve_ms.append(1e3 * step.solve_s)
-        if exposing and truth is not None and self.witness is not None:
-            self.exposures.append(
-                ExposureRecord(
-                    time_s=float(opens_s[k]),
-                    X_WC_true=tuple(
-                        _moved(truth.state, float(opens_s[k]) - step.time_s + after_s) @ self._mount(truth.tilt_rad)
-                        for after_s in np.linspace(0.0, self.exposure_s, self.instants)
-                    ),
-                    X_WC_est=_moved(step.estimate, float(opens_s[k]) - step.time_s + 0.5 * self.exposure_s)
-                    @ self._mount(step.tilt_rad),
-                    silt=self.witness.silt(),
-                    X_WC_before=self._before(),
-                    flakes=_flakes_before(self.witness, truth.state.X_WB @ self._mount(truth.tilt_rad)),
-                    **_stance(self._posture),
-                )
+        if opens_s is not None and truth is not None and self.witness is not None:
+            exposure = ExposureRecord(
+                time_s=opens_s,
+                X_WC_true=tuple(
+                    _moved(truth.state, opens_s - step.time_s + after_s) @ self._mount(truth.tilt_rad)
+                    for after_s in np.linspace(0.0, self.exposure_s, self.instants)
+                ),
+                X_WC_est=_moved(step.estimate, opens_s - step.time_s + 0.5 * self.exposure_s)
+                @ self._mount(step.tilt_rad),
+                silt=self.witness.silt(),
+                X_WC_before=self._before(),
+                flakes=_flakes_before(self.witness, truth.state.X_WB @ self._mount(truth.tilt_rad)),
+                **_stance(self._posture),
             )
+            self.log.expose(exposure)
             if self.exposed is not None:
-                self.exposed(len(self.exposures) - 1, self.exposures[-1])
+                self.exposed(self.log.opened - 1, exposure)
 
     def _mount(self, tilt_rad: float) -> Pose:
         return self.X_BC if self.joint is None else self.joint.mount(self.X_BC, tilt_rad)
 
     def _before(self) -> tuple[Pose, ...]:
         """True camera poses until now, the last of them now; the first of the flight stand for those before it."""
-        every = max(1, round(METERED_EVERY_S / self.dt_s))
-        rows = [self._rows[max(0, len(self._rows) - 1 - every * k)] for k in reversed(range(self.metered))]
+        last = len(self._recent) - 1
+        rows = [self._recent[max(0, last - self._every * k)] for k in reversed(range(self.metered))]
         # The last three numbers of a row are the camera's tilt, true, measured and wished.
         return tuple(Pose(row[1:4], row[4:8]) @ self._mount(math.radians(float(row[-3]))) for row in rows)
 
     @property
     def duration_s(self) -> float:
         """How long the flight has taken so far."""
-        return len(self._rows) * self.dt_s
+        return self.log.count * self.dt_s
+
+    @property
+    def exposures(self) -> list[ExposureRecord]:
+        """What was exposed, where it is kept in memory."""
+        return self.log.exposures
 
     def frame(self) -> pl.DataFrame:
-        """The steps as a table."""
-        table = np.array(self._rows).reshape(len(self._rows), -1)
-        names = step_columns(self.thrusters, yields=self._posture is not None)
-        columns = {name: table[:, i] for i, name in enumerate(names)}
-        return pl.DataFrame(columns).with_columns(
-            exposing=pl.Series(self._exposing, dtype=pl.Boolean),
-            collision=pl.Series(self._collisions, dtype=pl.Boolean),
-            fallback=pl.Series(self._fallbacks, dtype=pl.String),
-            leg=pl.Series(self._legs, dtype=pl.String),
-        )
+        """The steps as a table, of a flight that is kept in memory."""
+        return steps_of(self.log.frame().lazy()).collect()
 
     def write(self, folder: Path) -> None:
         """Write exposures.npz and timings.parquet, then steps.parquet, whose presence says that the flight is whole."""
-        if self.exposures:
-            write_exposures(folder / "exposures.npz", self.exposures, self.exposure_s)
-        with whole_file(folder / "timings.parquet") as path:
-            pl.DataFrame({"solve_ms": self._solve_ms}).write_parquet(path)
-        with whole_file(folder / "steps.parquet") as path:
-            self.frame().write_parquet(path)
+        write_record(folder, self.log.frame().lazy(), self.exposures, self.exposure_s)
+
+
+def write_record(folder: Path, table: pl.LazyFrame, exposures: list[ExposureRecord], exposure_s: float) -> None:
+    """Write a flight's exposures.npz and timings.parquet, then steps.parquet, which says that the flight is whole."""
+    if exposures:
+        write_exposures(folder / "exposures.npz", exposures, exposure_s)
+    with whole_file(folder / "timings.parquet") as path:
+        timings_of(table).write_parquet(path)
+    with whole_file(folder / "steps.parquet") as path:
+        steps_of(table).sink_parquet(path)
 
 
 def state_vector(state: BodyState) -> Array:
@@ -242,33 +237,7 @@ def _posture_row(posture: Posture | None) -> Array:
 
 def _stance(posture: Posture | None) -> dict[str, Array]:
     """The fields of an exposure that tell of a target that yields."""
-    return {} if posture is None else {name: getattr(posture, name) for name in _STANCE}
-
-
-def write_exposures(path: Path, exposures: list[ExposureRecord], exposure_s: float) -> None:
-    """Write what each photograph needs to be rendered later."""
-    with whole_file(path) as temporary, temporary.open("wb") as file:
-        np.savez_compressed(file, exposure_s=np.array(exposure_s), **exposure_arrays(exposures))
-
-
-def exposure_arrays(exposures: list[ExposureRecord]) -> dict[str, Any]:
-    """What an exposure is, as the arrays that are kept of it; silt in single precision."""
-    before = [[X.p_m for X in e.X_WC_before] for e in exposures], [[X.q for X in e.X_WC_before] for e in exposures]
-    metered = {"X_WC_before_p_m": np.array(before[0]), "X_WC_before_q": np.array(before[1])}
-    stance = {name: [getattr(e, name) for e in exposures] for name in _STANCE}
-    return (metered if exposures[0].X_WC_before else {}) | {
-        **{name: np.array(values) for name, values in stance.items() if values[0] is not None},
-        "time_s": np.array([e.time_s for e in exposures]),
-        "X_WC_p_m": np.array([[X.p_m for X in e.X_WC_true] for e in exposures]),
-        "X_WC_q": np.array([[X.q for X in e.X_WC_true] for e in exposures]),
-        "X_WC_est_p_m": np.array([e.X_WC_est.p_m for e in exposures]),
-        "X_WC_est_q": np.array([e.X_WC_est.q for e in exposures]),
-        "silt_origin_W_m": exposures[0].silt.origin_W_m,
-        "silt_spacing_m": np.array(exposures[0].silt.spacing_m),
-        "silt_kg_m3": np.array([e.silt.values for e in exposures], dtype=np.float32),
-        **_outer_arrays([e.silt.outer for e in exposures]),
-        **_flake_arrays([e.flakes for e in exposures]),
-    }
+    return {} if posture is None else {name: getattr(posture, name) for name in STANCE}
 
 
 def _flakes_before(witness: Witness, X_WC: Pose) -> FlakeCloud | None:
@@ -276,79 +245,6 @@ def _flakes_before(witness: Witness, X_WC: Pose) -> FlakeCloud | None:
     look = getattr(witness, "flakes", None)
     found: FlakeCloud | None = None if look is None else look(X_WC)
     return found
-
-
-def _flake_arrays(clouds: list[FlakeCloud | None]) -> dict[str, Any]:
-    """Arrays of the drifting flakes, one after the other; nothing where they are not known."""
-    known = [cloud for cloud in clouds if cloud is not None]
-    if len(known) < len(clouds) or not known:
-        return {}
-    one = known[0]
-    return {
-        "flakes": np.array([len(cloud.p_W_m) for cloud in known]),
-        "flake_p_W_m": np.concatenate([cloud.p_W_m for cloud in known]).astype(np.float32),
-        "flake_v_W_m_s": np.concatenate([cloud.v_W_m_s for cloud in known]).astype(np.float16),
-        "flake_looks": np.concatenate([cloud.looks for cloud in known]).astype(np.float16),
-        "flake_box_W_m": np.stack([one.low_W_m, one.high_W_m]),
-        "flake_limits": np.array([one.per_m3, one.depth_m, *one.slopes]),
-    }
-
-
-def _read_flakes(data: Any, count: int) -> list[FlakeCloud | None]:
-    """The flakes of each exposure; None of files of before they were kept."""
-    if "flakes" not in data:
-        return [None] * count
-    ends = np.cumsum(data["flakes"])
-    low, high = data["flake_box_W_m"]
-    per_m3, depth_m, across, along = (float(v) for v in data["flake_limits"])
-    parts = [np.split(data[f"flake_{name}"].astype(np.float64), ends[:-1]) for name in ("p_W_m", "v_W_m_s", "looks")]
-    return [
-        FlakeCloud(
-            p_W_m=p, v_W_m_s=v, looks=looks, low_W_m=low, high_W_m=high, per_m3=per_m3, depth_m=depth_m,
-            slopes=(across, along),
-        )
-        for p, v, looks in zip(*parts, strict=True)
-    ]  # fmt: skip
-
-
-def _outer_arrays(grids: list[ScalarGrid | None]) -> dict[str, Any]:
-    """Arrays of the silt's outer grids; nothing where there are none."""
-    known = [grid for grid in grids if grid is not None]
-    if len(known) < len(grids) or not known:
-        return {}
-    return {
-        "silt_outer_origin_W_m": known[0].origin_W_m,
-        "silt_outer_spacing_m": np.array(known[0].spacing_m),
-        "silt_outer_kg_m3": np.array([grid.values for grid in known], dtype=np.float32),
-    }
-
-
-def read_exposures(path: Path | IO[bytes]) -> list[ExposureRecord]:
-    """Read what `write_exposures` wrote, or the same arrays from an open file."""
-    with np.load(path) as data:
-        origin, spacing = data["silt_origin_W_m"], float(data["silt_spacing_m"])
-        p, q, silt = data["X_WC_p_m"], data["X_WC_q"], data["silt_kg_m3"]
-        est_p, est_q = data["X_WC_est_p_m"], data["X_WC_est_q"]
-        none = np.empty((len(p), 0))
-        before_p, before_q = data.get("X_WC_before_p_m", none), data.get("X_WC_before_q", none)
-        flakes = _read_flakes(data, len(p))
-        outers: list[ScalarGrid | None] = [None] * len(p)
-        if "silt_outer_kg_m3" in data:  # not in files of before there was one
-            far, coarse = data["silt_outer_origin_W_m"], float(data["silt_outer_spacing_m"])
-            outers = [ScalarGrid(origin_W_m=far, spacing_m=coarse, values=v) for v in data["silt_outer_kg_m3"]]
-        stance = {name: data[name] for name in _STANCE if name in data}
-        return [
-            ExposureRecord(
-                time_s=float(time_s),
-                X_WC_true=tuple(Pose(p[k, i], q[k, i]) for i in range(p.shape[1])),
-                X_WC_est=Pose(est_p[k], est_q[k]),
-                silt=ScalarGrid(origin_W_m=origin, spacing_m=spacing, values=silt[k], outer=outers[k]),
-                X_WC_before=tuple(Pose(*X) for X in zip(before_p[k], before_q[k], strict=True)),
-                flakes=flakes[k],
-                **{name: values[k] for name, values in stance.items()},
-            )
-            for k, time_s in enumerate(data["time_s"])
-        ]
 
 
 def _moved(state: BodyState, dt_s: float) -> Pose:

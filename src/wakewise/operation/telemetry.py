@@ -14,19 +14,20 @@ from wakewise.files import whole_file
 _NS = 1_000_000_000
 
 
-def write_mcap(steps: pl.DataFrame, path: Path, every: int = 5) -> None:
+def write_mcap(steps: pl.DataFrame | pl.LazyFrame, path: Path, every: int = 5) -> None:
     """Write poses (`/true/pose`, `/estimated/pose`, `/goal/pose`) and figures (`/thrusts`, `/water`) of a flight.
 
     Parameters
     ----------
-    steps : polars.DataFrame
+    steps : polars.DataFrame or LazyFrame
         The table of steps.parquet.
     path : Path
     every : int
         Keep each n-th step: 10 Hz of a 50 Hz loop is what viewers need.
     """
-    thrusts = [name for name in steps.columns if name.startswith("thrust_")]
-    water = [name for name in steps.columns if name.startswith(("target_", "bed_", "turbidity_"))]
+    kept = steps.lazy().gather_every(every).collect()
+    thrusts = [name for name in kept.columns if name.startswith("thrust_")]
+    water = [name for name in kept.columns if name.startswith(("target_", "bed_", "turbidity_"))]
     context = foxglove.Context()
     with whole_file(path) as temporary, foxglove.open_mcap(temporary, allow_overwrite=True, context=context):
         poses = {
@@ -35,7 +36,7 @@ def write_mcap(steps: pl.DataFrame, path: Path, every: int = 5) -> None:
         }
         thrust_channel = foxglove.Channel("/thrusts", schema=_numbers(thrusts), context=context)
         water_channel = foxglove.Channel("/water", schema=_numbers([*water, "disturbance"]), context=context)
-        for row in steps.gather_every(every).iter_rows(named=True):
+        for row in kept.iter_rows(named=True):
             at_ns = round(row["time_s"] * _NS)
             for who, channel in poses.items():
                 channel.log(_pose(row, who, at_ns), log_time=at_ns)

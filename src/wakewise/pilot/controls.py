@@ -55,7 +55,12 @@ CENTRED = Controls(axes=np.zeros(len(CONTROL_AXES)))
 
 
 class ControlSource(Protocol):
-    """Where a pilot's hands are read."""
+    """Where a pilot's hands are read.
+
+    One that sees may have a method `look(time_s, estimate, share)`, called before each read: where the vehicle is, and
+    what share of the fastest speeds full stick asks for. One that plays back may have `desk_at(time_s)`: what was set
+    on the desk then, by field.
+    """
 
     def read(self, time_s: float) -> Controls | None:
         """Read them at `time_s` of the flight, at most once a control step; None: nobody is there, so stop and hold."""

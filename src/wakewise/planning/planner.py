@@ -19,6 +19,7 @@ from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.interfaces import WakeModel
+from wakewise.planning import kernels
 from wakewise.planning.condensing import add_commands, add_rate_gradient, condense, condensed_room, motion_gradient
 from wakewise.planning.kernels import CLOSEST, RATE_N, W_DISTURBANCE, PlanCase, PlanTable, horizon, plan_work, set_reach
 from wakewise.planning.numeric import add_numeric, numeric_wake
@@ -45,6 +46,8 @@ from wakewise.wake.table import WakeTable, is_compiled, wake_table, with_smooth_
 
 BARRIER_RANGE = (0.02, 20.0)
 """Least and largest mu of the clearance barrier: it grows from plan to plan while the plan comes too close."""
+TRACKING = [kernels.W_TRACK, kernels.W_PATH, kernels.W_TWIST]
+"""Places of the weights that grow with a goal's obedience."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,6 +233,9 @@ class Planner:
         case.moment_B[:] = problem.moment_B_Nm
         case.current_W[:] = problem.current_W_m_s
         case.reference[:] = problem.reference
+        # The kernels read the weights at each call, so a live dial compiles nothing.
+        tracking = np.array([settings.w_track, settings.w_path, settings.w_twist])
+        self.model.table.weights[TRACKING] = problem.obedience * tracking
         set_reach(self.model.table, case)
 
     def plan(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wakewise.arrays import Array
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, FlakeCloud, Plant, Posture, ScalarGrid, Truth, WaterTruth, Witness
 from wakewise.tank.settings import TankSettings
@@ -36,6 +37,10 @@ class TankWitness:
     def water(self) -> WaterTruth:
         """Water at the target now."""
         return self.tank.measure()
+
+    def excess_velocity(self, points_W_m: Array) -> Array:
+        """What the thrusters add to the water's velocity at points now, both shape (n, 3)."""
+        return self.tank.excess_velocity(points_W_m)
 
     def silt(self) -> ScalarGrid:
         """Silt around the target now."""

@@ -31,6 +31,8 @@ class BenchOptions:
         Levers that such a bench switches, one by one; None for none of them.
     worlds : tuple of str or None
         Which worlds such a bench flies in; None for all.
+    w_tracks : tuple of float or None
+        Weights, on the paper's scale, that a bench of an operator's velocity flies; None for all.
     models : int
         Seeds, from 1, for which a bench of worlds also scans and makes a model.
     judge : int
@@ -50,6 +52,7 @@ class BenchOptions:
     scenarios: tuple[str, ...] | None = None
     levers: tuple[str, ...] | None = None
     worlds: tuple[str, ...] | None = None
+    w_tracks: tuple[float, ...] | None = None
     models: int = 1
     judge: int = 0
     fresh: bool = False

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-import platform
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -19,25 +15,24 @@ import polars as pl
 from wakewise.errors import InputError, StageError
 from wakewise.evaluation import SWAY_FIGURES, Crop, compare_surface, evaluate_surface, flight_figures
 from wakewise.extras import need
-from wakewise.files import write_json, write_text
+from wakewise.files import write_json
 from wakewise.geometry import matrix_from_quat
 from wakewise.missions import SETTLING
 from wakewise.operation import (
     Darkroom,
     Parts,
     Scenario,
-    differences,
     fly_trial,
-    photo_name,
     photograph_flight,
     read_exposures,
-    read_scenario,
-    write_scenario,
 )
+from wakewise.operation.flight_log import has_parts
 from wakewise.operation.flying import FLIGHT_JOBS
+from wakewise.operation.live_folder import gather
+from wakewise.operation.trial_folder import as_flown, claim, write_plan
 from wakewise.processes import alone
 from wakewise.reconstruction import read_cloud, read_lens, reconstruct
-from wakewise.targets import Mesh, write_mesh
+from wakewise.targets import Mesh
 from wakewise.trials.coverage import FROM_MODEL, coverage_figures
 from wakewise.trials.metrics import Figures, Gathering, comparison
 from wakewise.trials.size import SIZE_FIGURES, size_figures
@@ -109,7 +104,8 @@ def run_trial(
     if not is_warm(JOBS):
         with watch.stage("compile") as progress:
             warm(JOBS, progress)
-    _ = parts.preflight
+    if not _is_flown(folder):
+        _ = parts.pilot, parts.preflight
     claim(folder, scenario)
     with alone(folder), SurfaceMaker(folder, scenario.reconstruction, parts.target.bed_z_m) as surface:
         result = _figures(parts, scenario, folder, watch, surface.ready if meanwhile is not None else lambda: None)
@@ -131,9 +127,10 @@ def _figures(parts: Parts, scenario: Scenario, folder: Path, watch: Watch, model
             work(progress)
 
     _forget_what_was_not_measured(folder)
-    stage("plan", "planned.csv", lambda _: write_plan(parts, folder))
+    if not has_parts(folder):  # a flight by hand has no plan
+        stage("plan", "planned.csv", lambda _: write_plan(parts, folder))
     with Darkroom(parts, folder) as darkroom:
-        stage("fly", "steps.parquet", lambda progress: fly_trial(parts, folder, progress, darkroom.take))
+        stage("fly", "steps.parquet", lambda progress: _fly(parts, folder, darkroom, progress))
         stage("photograph", "images.csv", lambda progress: _photograph(parts, folder, darkroom, progress))
     stage("reconstruct", "model.json", lambda progress: reconstruct_trial(parts, folder, progress))
     modelled()
@@ -148,8 +145,21 @@ def _figures(parts: Parts, scenario: Scenario, folder: Path, watch: Watch, model
     return result
 
 
+def _is_flown(folder: Path) -> bool:
+    """Whether a folder holds a flight, if only its parts."""
+    return (folder / "steps.parquet").exists() or has_parts(folder)
+
+
+def _fly(parts: Parts, folder: Path, darkroom: Darkroom, progress: Callable[..., None]) -> None:
+    """Fly, or put together what a flight by hand left that was cut off."""
+    if not gather(parts, folder):
+        fly_trial(parts, folder, progress, darkroom.take)
+
+
 def _photograph(parts: Parts, folder: Path, darkroom: Darkroom, progress: Callable[..., None]) -> None:
     """Wait for the photographs that were begun during the flight, and render the others."""
+    if not (folder / "exposures.npz").exists():
+        raise StageError(f"{folder}: no photograph was taken in its flight, so there is nothing to make a model of")
     progress(0, 1, "photographs begun during the flight")
     darkroom.finish()
     photograph_flight(parts, folder, progress)
@@ -175,55 +185,6 @@ def compare_methods(
     )
     write_json(folder / "comparison.json", result)
     return result
-
-
-def as_flown(parts: Parts) -> Scenario:
-    """The scenario that a trial leaves behind: what was given in Python in place of its own parts is named in it."""
-    if not parts.given:
-        return parts.scenario
-    scenario, given = parts.scenario, parts.given
-    told: dict[str, Any] = {"method": parts.method, "replaced": parts.replaced}
-    told |= {name: given[name].name for name in ("vehicle", "world") if name in given}
-    if "target" in given:
-        told["target"] = scenario.target.model_copy(update={"kind": given["target"].name})
-    return scenario.model_copy(update=told)
-
-
-def claim(folder: Path, scenario: Scenario) -> None:
-    """Write scenario.yaml, or check that the one in the folder is the same trial.
-
-    Raises
-    ------
-    InputError
-        If the folder holds another trial, or is a file.
-    """
-    path = folder / "scenario.yaml"
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"--out {folder}: is a file, must be a folder or not exist")
-    if path.exists():
-        changed = differences(read_scenario(path), scenario)
-        if changed:
-            raise InputError(
-                f"--out {folder}: holds another trial ({'; '.join(changed[:3])}); give another --out or remove it"
-            )
-        return
-    packages = ("wakewise", "numpy", "numba", "pycolmap", "opencv-python-headless", "embreex")
-    versions = {"python": platform.python_version()} | {name: version(name) for name in packages}
-    write_scenario(path, scenario, versions)
-
-
-def write_plan(parts: Parts, folder: Path) -> None:
-    """Write the truth (truth.ply) and where the photographs are to be taken from (planned.csv)."""
-    write_mesh(folder / "truth.ply", parts.target.mesh)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("name", "time_s", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"))
-    route = parts.route
-    for name, time_s, X_WC in zip(route.exposure_names, route.exposures_s, route.X_WC_planned, strict=True):
-        writer.writerow(
-            (photo_name(name, parts.scenario), f"{time_s:.6f}", *(f"{value:.9f}" for value in (*X_WC.p_m, *X_WC.q)))
-        )
-    write_text(folder / "planned.csv", text.getvalue())
 
 
 def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None]) -> None:

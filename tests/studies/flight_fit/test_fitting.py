@@ -78,8 +78,8 @@ def fitted(slope, pairs, seed, gain=1.0):
 
 @pytest.mark.parametrize("slope", [0.1, 0.16])
 def test_it_finds_the_width_that_the_water_has(slope):
-    """Within 12 %, and the current within 3 mm/s, from two minutes of pairs with a pixel's noise and unknown depths."""
-    fit = fitted(slope, 120, 1)
+    """Within 12 %, and the current within 3 mm/s, from a minute of pairs with a pixel's noise and unknown depths."""
+    fit = fitted(slope, 60, 1)
     assert fit.half_width_slope == pytest.approx(slope, rel=0.12)
     assert fit.gain == pytest.approx(1.0, abs=0.1)
     np.testing.assert_allclose(fit.current_m_s, CURRENT, atol=0.003)
@@ -88,14 +88,14 @@ def test_it_finds_the_width_that_the_water_has(slope):
 
 def test_the_strength_is_found_apart_from_the_width():
     """Thrusters a quarter weaker than believed are told from wider jets."""
-    fit = fitted(0.12, 120, 2, gain=0.75)
+    fit = fitted(0.12, 60, 2, gain=0.75)
     assert fit.gain == pytest.approx(0.75, abs=0.08)
     assert fit.half_width_slope == pytest.approx(0.12, rel=0.15)
 
 
 def test_the_error_falls_with_minutes():
     """As the root of the number of flakes, by the fit's own word and in truth over some draws."""
-    few, many = ([fitted(0.13, pairs, seed) for seed in (3, 4, 5)] for pairs in (8, 120))
+    few, many = ([fitted(0.13, pairs, seed) for seed in (3, 4, 5)] for pairs in (8, 60))
     assert np.mean([f.slope_error for f in many]) < 0.5 * np.mean([f.slope_error for f in few])
     worst = [max(abs(f.half_width_slope - 0.13) for f in fits) for fits in (few, many)]
     assert worst[1] < worst[0]

@@ -1,0 +1,133 @@
+"""`wakewise cockpit`: fly by hand, in the browser."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from wakewise.cli.console import print_json
+from wakewise.cli.options import (
+    Json,
+    Out,
+    Preset,
+    ScenarioFile,
+    Seed,
+    Sets,
+    TargetName,
+    TargetSize,
+    Vehicle,
+    World,
+    default_folder,
+    overrides,
+)
+
+if TYPE_CHECKING:
+    from wakewise.cockpit.session import Session
+    from wakewise.pilot import ControlSource
+
+Port = Annotated[int, typer.Option("--port", help="Port of the page; 0 takes any that is free.", min=0, max=65535)]
+Host = Annotated[
+    str,
+    typer.Option(
+        "--host", help="Address to listen at. Any but this computer's own asks for the token that is printed then."
+    ),
+]
+Gamepad = Annotated[bool, typer.Option("--gamepad", help="Fly with a gamepad at this computer, too.")]
+NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Do not open the page in a browser.")]
+
+_LOOK_S = 0.1
+
+
+def cockpit(
+    scenario: ScenarioFile = None,
+    preset: Preset = "quick",
+    out: Out = None,
+    target: TargetName = None,
+    target_size: TargetSize = None,
+    vehicle: Vehicle = None,
+    world: World = None,
+    seed: Seed = None,
+    sets: Sets = None,
+    port: Port = 8765,
+    host: Host = "127.0.0.1",
+    gamepad: Gamepad = False,
+    no_browser: NoBrowser = False,
+    json: Json = False,
+) -> None:
+    """Fly by hand: a page in the browser with the camera's picture, the helm, and what the thrusters do to the target.
+
+    Ctrl-C ends the flight. Each flight leaves a folder like any other trial, from which `wakewise scan --resume` makes
+    photographs, model and report.
+    """
+    from wakewise.extras import need
+
+    need("wakewise cockpit", "cockpit")
+    from wakewise.cockpit.server import Server
+    from wakewise.cockpit.session import Session
+    from wakewise.operation import load_scenario
+
+    changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, world=world)
+    resolved = load_scenario(preset, scenario, changes)
+    session = Session(resolved, out or default_folder(resolved, "cockpit"), device=_gamepad() if gamepad else None)
+    server = Server(session, host, port)
+    server.start()
+    try:
+        session.start()
+        _say(f"cockpit: {server.address} (Ctrl-C ends the flight)")
+        if not no_browser:
+            _open(server.address)
+        _watch(session)
+    except KeyboardInterrupt:  # how a flight by hand ends
+        pass
+    finally:
+        session.stop()
+        server.stop()
+    if session.fault is not None:
+        raise session.fault
+    for folder in session.flown:
+        _say(f"kept: {folder}")
+    if json:
+        print_json({"address": server.address, "flights": [str(folder) for folder in session.flown]})
+
+
+def _watch(session: Session) -> None:
+    """Say what is being prepared, until the session is over."""
+    began_s, told = time.monotonic(), None
+    from wakewise.warming import is_warm
+
+    if is_warm(("plan", "fly")):
+        _say("the first light takes about ten seconds")
+    else:
+        _say("kernels are compiled first, this time only: some minutes")
+    while session.running:
+        if session.preparing != told:
+            told = session.preparing
+            _say(f"  {time.monotonic() - began_s:5.1f} s  {told or 'first light'}")
+        time.sleep(_LOOK_S)
+
+
+def _gamepad() -> ControlSource:
+    """The gamepad at this computer."""
+    from wakewise.extras import need
+
+    need("wakewise cockpit --gamepad", "gamepad")
+    from wakewise.pilot.gamepad import Gamepad
+
+    return Gamepad()
+
+
+def _open(address: str) -> None:
+    """Open the page where there is a screen to open it on."""
+    import os
+    import webbrowser
+
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        return
+    webbrowser.open(address)
+
+
+def _say(line: str) -> None:
+    typer.echo(line, err=True)

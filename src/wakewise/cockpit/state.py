@@ -1,0 +1,127 @@
+"""What is sent: a flight's parts once, and ten times a second how it stands, as plain numbers for JSON.
+
+Numbers are rounded to what can be seen; one that is not finite is null.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from wakewise.arrays import Array
+from wakewise.cockpit.gauges import Gauges
+from wakewise.cockpit.lookout import SAMPLED_S, WINDOW_S, Lookout, Moment
+from wakewise.geometry import euler_from_quat
+from wakewise.operation import Parts
+
+POINTS_EVERY = 5
+"""States between two looks at the water of every point: twice a second."""
+
+
+def described(parts: Parts, gauges: Gauges) -> dict[str, Any]:
+    """Scenario, vehicle and target, as a client is told when it comes."""
+    scenario, vehicle, target = parts.scenario, parts.vehicle, parts.found_target
+    return {
+        "scenario": told_scenario(parts),
+        "vehicle": {
+            "name": vehicle.name,
+            "thrusters": [
+                {
+                    "name": thruster.name,
+                    "position_B_m": rounded(thruster.p_BT_m, 4),
+                    "axis_B": rounded(thruster.axis_B, 4),
+                    "limit_N": rounded((-thruster.max_reverse_N, thruster.max_forward_N), 2),
+                }
+                for thruster in vehicle.thrusters
+            ],
+        },
+        "target": {
+            "points_W_m": [rounded(point, 4) for point in gauges.points_W_m],
+            "centre_W_m": rounded(target.centre_W_m, 4),
+            "radius_m": number(target.radius_m, 4),
+            "bed_z_m": number(target.bed_z_m, 4),
+            "depth_m": number(scenario.tank.size_m[2], 3),
+        },
+    }
+
+
+def told_scenario(parts: Parts) -> dict[str, Any]:
+    """What a scenario is called, known before any of its parts is made."""
+    scenario = parts.scenario
+    return {
+        "name": scenario.name,
+        "world": scenario.world,
+        "method": scenario.method,
+        "target": scenario.target.kind,
+        "seed": scenario.seed,
+    }
+
+
+class Instruments:
+    """Makes a state of a moment; one for each flight.
+
+    Parameters
+    ----------
+    gauges : Gauges
+    lookout : Lookout
+    """
+
+    def __init__(self, gauges: Gauges, lookout: Lookout) -> None:
+        self._gauges, self._lookout = gauges, lookout
+        self._both: deque[tuple[float, float]] = deque(maxlen=round(WINDOW_S / SAMPLED_S))
+        self._predicted: list[float | None] = []
+        self._count = 0
+
+    def read(self, now: Moment) -> dict[str, Any]:
+        """How the flight stands, but for what desk, helm, coverage and photographs add."""
+        step, estimate = now.step, now.step.estimate
+        flown, direct = self._gauges.disturbances(estimate, now.thrusts_N)
+        if math.isfinite(flown + direct):
+            self._both.append((flown, direct))
+        if self._count % POINTS_EVERY == 0:
+            self._predicted = rounded(self._gauges.predicted_m_s(estimate, now.thrusts_N), 4)
+        self._count += 1
+        roll, pitch, heading = (math.degrees(angle) for angle in euler_from_quat(estimate.X_WB.q))
+        R_BW = estimate.X_WB.R.T
+        return {
+            "time_s": number(step.time_s, 2),
+            "thrusts_N": rounded(step.command.thrusts_N, 3),
+            "commanded_m_s": rounded(R_BW @ now.asked_W_m_s, 4),
+            "velocity_m_s": rounded(R_BW @ now.velocity_W_m_s, 4),
+            "deviation_pct": number(self._lookout.deviation_pct, 1),
+            "disturbance": number(flown, 8),
+            "direct_disturbance": number(direct, 8),
+            "saved_pct": number(self.saved_pct, 1),
+            "predicted_m_s": self._predicted,
+            "true_m_s": None if now.true_m_s is None else rounded(now.true_m_s, 4),
+            "depth_m": number(float(estimate.X_WB.p_m[2]), 3),
+            "roll_deg": number(roll, 2),
+            "pitch_deg": number(pitch, 2),
+            "heading_deg": number(heading % 360.0, 2),
+            "tilt_deg": number(math.degrees(step.tilt_rad), 2),
+            "power_W": number(now.power_W, 1),
+            "energy_J": number(now.energy_J, 1),
+            "position_W_m": rounded(estimate.X_WB.p_m, 4),
+            "goal_W_m": rounded(step.goal.X_WB.p_m, 4),
+            "fallback": step.command.fallback,
+        }
+
+    @property
+    def saved_pct(self) -> float | None:
+        """How much less D the flown thrusts made than direct allocation, over ten seconds; None without any."""
+        flown, direct = np.sum(self._both, axis=0) if self._both else (0.0, 0.0)
+        return 100.0 * (1.0 - float(flown / direct)) if direct > 0.0 else None
+
+
+def number(value: float | None, digits: int) -> float | None:
+    """A number that JSON has, or None."""
+    return None if value is None or not math.isfinite(value) else round(float(value), digits)
+
+
+def rounded(values: Iterable[float] | Array, digits: int) -> list[float | None]:
+    """Numbers that JSON has."""
+    return [number(value, digits) for value in np.asarray(values, dtype=np.float64).tolist()]
