@@ -59,11 +59,15 @@ Judge = Annotated[
     int,
     typer.Option(help="worlds: seeds flown in the lattice as well, minutes of a core each.", min=0, max=1000),
 ]
-Fresh = Annotated[bool, typer.Option("--fresh", help="gentle, operator, worlds: fly anew what an earlier run has flown.")]
+Fresh = Annotated[
+    bool, typer.Option("--fresh", help="gentle, operator, worlds: fly anew what an earlier run has flown.")
+]
 Workers = Annotated[int, typer.Option(help="gentle, operator, worlds: processes that fly side by side.", min=1, max=64)]
 Store = Annotated[
     Path | None,
-    typer.Option(help="gentle, operator, worlds: folder that keeps flights; the cache if not given.", show_default=False),
+    typer.Option(
+        help="gentle, operator, worlds: folder that keeps flights; the cache if not given.", show_default=False
+    ),
 ]
 Plot = Annotated[
     Path | None,

@@ -23,6 +23,7 @@ import numpy as np
 
 from wakewise.arrays import Array, freeze
 from wakewise.control.carried import Carried
+from wakewise.control.firmness import firmer, stray_of
 from wakewise.control.instant import instant_allocator
 from wakewise.control.loop import HOLD_S, ControllerState, TrackingController
 from wakewise.control.settings import ControlSettings
@@ -57,7 +58,7 @@ class PlanState:
     make the thrusters give at the plan's start; `share`, shape (n, 6), shares corrections out; `backup` is the state
     of PID and allocator; `goal_nu`, shape (6,), is the twist of the last goal. `moved_N` is what was flown beside the
     planned commands in the null space, where somebody else shared the wrench out, and `moved_given_N` what of it the
-    thrusters give by now, both shape (n,).
+    thrusters give by now, both shape (n,). `firmness` multiplies the weights of tracking (see `firmness.py`).
     """
 
     tracker: TrackerState
@@ -72,6 +73,7 @@ class PlanState:
     goal_nu: Array | None = None
     moved_N: Array | None = None
     moved_given_N: Array | None = None
+    firmness: float = 1.0
 
     def __post_init__(self) -> None:
         freeze(self, thrusts_N=(None,), nominal_N=(None,))
@@ -187,15 +189,17 @@ class PlanningController:
                     "off the path", f"off the planned path by {away:.2f} m: planned anew from the estimate"
                 )
 
+        reference = reference_of(goal, settings.stages, settings.stage_s, change_B)
+
         def make() -> PlanProblem:
             return PlanProblem(
                 state=nominal,
                 thrusts_N=thrusts,
                 command_N=before,
-                reference=reference_of(goal, settings.stages, settings.stage_s, change_B),
+                reference=reference,
                 force_W_N=estimate.X_WB.R @ estimate.load_B[:3],
                 moment_B_Nm=estimate.load_B[3:],
-                obedience=goal.obedience,
+                obedience=goal.obedience * state.firmness,
             )
 
         found = self.guard.ask(make, state.plan, state.age_s)
@@ -204,9 +208,11 @@ class PlanningController:
         if found.trouble is not None:
             # The old plan keeps its clock.
             return replace(state, trouble=found.trouble)
+        stray = stray_of(found.plan.states, reference, settings.stage_s)
         return replace(
             state,
             plan=found.plan,
+            firmness=firmer(state.firmness, stray, goal.stray),
             share=correction_share(self.model, found.plan),
             age_s=0.0,
             nominal_N=thrusts,

@@ -59,11 +59,11 @@ class Motion:
         sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
         return np.array([p - r * sp, q * cr + r * sr * cp, -q * sr + r * cr * cp])
 
-    def goal(self, obedience: float = 1.0) -> Goal:
+    def goal(self, obedience: float = 1.0, stray: float | None = None) -> Goal:
         """As the controllers take it."""
         X_WB = self.X_WB
         twist = np.concatenate([X_WB.R.T @ self.velocity_W_m_s, self.omega_B_rad_s])
-        return Goal(X_WB=X_WB, nu_B=twist, tilt_rad=self.tilt_rad, obedience=obedience)
+        return Goal(X_WB=X_WB, nu_B=twist, tilt_rad=self.tilt_rad, obedience=obedience, stray=stray)
 
     def camera(self, aim: CameraAim) -> tuple[Array, Array]:
         """Place of the camera in W, and its velocity against the body's place, shape (3,) each."""

@@ -36,7 +36,29 @@ def operator_pilot(parts: Parts) -> Pilot:  # noqa: ARG001
     raise InputError("pilot: operator, flies by hand: take `wakewise cockpit`, or a recorded flight's controls")
 
 
-PILOTS: dict[str, Callable[[Parts], Pilot]] = {"route": route_pilot, "human": human_pilot, "operator": operator_pilot}
+def assisted_person(parts: Parts) -> Pilot:
+    """`assisted`: the person of `human` at the desk's sticks, camera kept on the target, brakes and all."""
+    from wakewise.operation.assisted import assisted_pilot
+    from wakewise.operation.desk import Desk, DeskState
+    from wakewise.operation.hands import PersonsHands
+
+    hands = PersonsHands(
+        wish=route_pilot(parts),
+        X_BC=parts.vehicle.X_BC,
+        target_W_m=parts.target.centre_W_m,
+        dt_s=1.0 / parts.control.rate_hz,
+        seed=parts.control.person or 0,
+    )
+    begin = DeskState(mode="operator")
+    return assisted_pilot(parts, hands, Desk(begin), begin)
+
+
+PILOTS: dict[str, Callable[[Parts], Pilot]] = {
+    "route": route_pilot,
+    "human": human_pilot,
+    "assisted": assisted_person,
+    "operator": operator_pilot,
+}
 """Our own pilots: what makes each from the parts of a flight."""
 
 

@@ -66,7 +66,7 @@ class Scenario(Settings):
     draws: dict[str, Draw] = Field(
         default={}, description="fields that the seed draws, by dotted name: two numbers, or in_log, any_of, level"
     )
-    pilot: str = Field("route", description="where goals come from: route, human, or package.module:make")
+    pilot: str = Field("route", description="where goals come from: route, human, assisted, or package.module:make")
     target: TargetSettings = TargetSettings()
     survey: SurveySettings = SurveySettings()
     mission: MissionSettings = MissionSettings()

@@ -29,7 +29,7 @@ from wakewise.operation import (
 from wakewise.operation.flight_log import has_parts
 from wakewise.operation.flying import FLIGHT_JOBS
 from wakewise.operation.live_folder import gather
-from wakewise.operation.trial_folder import as_flown, claim, write_plan
+from wakewise.operation.trial_folder import as_flown, check_place, claim, write_plan
 from wakewise.processes import alone
 from wakewise.reconstruction import read_cloud, read_lens, reconstruct
 from wakewise.targets import Mesh
@@ -67,6 +67,9 @@ _SURFACE_FIGURES = (
 )
 _MODEL_FIGURES = ("reprojection_px", "cameras_rmse_mm", "features_per_image", "inlier_matches", "mapping")
 
+FEWEST_PHOTOS = 3
+"""A model is put in its place by the estimates of at least as many cameras."""
+
 REGION_SHARE = 1.25
 """What is reconstructed is a little more than the target: estimated cameras put it some millimetres off its place."""
 
@@ -101,6 +104,7 @@ def run_trial(
     watch = watch or Quiet()
     parts = flight if isinstance(flight, Parts) else flight.parts()
     scenario = as_flown(parts)
+    check_place(folder, scenario)
     if not is_warm(JOBS):
         with watch.stage("compile") as progress:
             warm(JOBS, progress)
@@ -203,6 +207,10 @@ def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None])
     photos = pl.read_csv(folder / "images.csv")
     names = photos["name"].to_list()
     centres = photos.select("est_x_m", "est_y_m", "est_z_m").to_numpy()
+    if len(names) < FEWEST_PHOTOS:
+        failure = f"{len(names)} photographs were taken, at least {FEWEST_PHOTOS} are needed"
+        write_json(folder / "model.json", {"figures": {}, "failure": failure})
+        return
     rotations = matrix_from_quat(photos.select("est_qw", "est_qx", "est_qy", "est_qz").to_numpy())
     try:
         model = reconstruct(
@@ -237,7 +245,8 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
     gathering.add(flight_figures(flown))
     gathering.missing(("exceedance_ambient_pct",), "the water is still without the vehicle")
     add_yardsticks(gathering, parts, flown)
-    solve_ms = pl.read_parquet(folder / "timings.parquet")["solve_ms"].to_numpy()[50:]
+    solve_ms = pl.read_parquet(folder / "timings.parquet")["solve_ms"].to_numpy()
+    solve_ms = solve_ms[min(50, len(solve_ms) // 2) :]  # the first ones load what later ones find loaded
     gathering.add({"solve_ms_median": float(np.median(solve_ms)), "solve_ms_p99": float(np.percentile(solve_ms, 99))})
     photos = pl.read_csv(folder / "images.csv")
     gathering.add({"images": len(photos)})

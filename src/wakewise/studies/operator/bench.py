@@ -38,7 +38,11 @@ from wakewise.studies.operator.waters import water_of
 from wakewise.studies.side_by_side import Failure, Key
 from wakewise.trials.timing import BenchOptions
 
-SOURCES = (*FLIES, "pilot", "studies/operator")
+SOURCES = (
+    *FLIES,
+    "pilot",
+    *(f"studies/operator/{name}.py" for name in ("waters", "courses", "heard", "flight", "paper")),
+)
 """Parts of the package that can change a flight of this bench."""
 ELSEWHERE = {
     "latency_ms_p99": "from stick to thrust: measured in the cockpit's loop, not in a flight without one",
@@ -95,9 +99,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
 class Told:
     """Rows of the bench by method, w_track and flight."""
 
-    def __init__(
-        self, trials: Mapping[Key, OperatorTrial], rows: Mapping[Key, Row], failures: list[Failure]
-    ) -> None:
+    def __init__(self, trials: Mapping[Key, OperatorTrial], rows: Mapping[Key, Row], failures: list[Failure]) -> None:
         self._rows: dict[str, dict[Known, Row]] = {}
         self._lost: dict[str, set[Known]] = {}
         gone = {(failure.flow, failure.name, failure.seed) for failure in failures}
@@ -132,7 +134,8 @@ class Told:
         def here(flights: Flights) -> dict[Known, Row]:
             return {key: row for key, row in flights.items() if self.courses[key] == course and key[1] == PILOTS[0]}
 
-        lost = here(dict.fromkeys(self.lost(method, w_track), {}))
+        empty: dict[Known, Row] = {key: {} for key in self.lost(method, w_track)}
+        lost = here(empty)
         return table(here(self.of(method, w_track)), here(self.of(DIRECT)), self.trims, frozenset(lost))
 
 

@@ -104,7 +104,7 @@ def look_route(centre_W_m: Array, azimuth_rad: float, standoff_m: float) -> Rout
     turn = -LOOK_ARC_M / (standoff_m * np.cos(elevation))
     far = np.array([azimuth_rad, elevation, standoff_m + APPROACH_M])
     near = np.array([azimuth_rad, elevation, standoff_m])
-    round_ = near + [turn, 0.0, 0.0]
+    round_ = near + np.array([turn, 0.0, 0.0])
     legs: tuple[Leg, ...] = (
         rest_to_rest("approach", far, near, SPEED_M_S, SLEW_M_S2),
         rest_to_rest("arc", near, round_, SPEED_M_S, SLEW_M_S2),

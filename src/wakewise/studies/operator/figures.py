@@ -34,7 +34,9 @@ Known = tuple[str, str, int]
 Flights = Mapping[Known, Row]
 
 
-def table(ours: Flights, direct: Flights, trims: Mapping[Known, str], lost: frozenset[Known] = frozenset()) -> dict[str, Any]:
+def table(
+    ours: Flights, direct: Flights, trims: Mapping[Known, str], lost: frozenset[Known] = frozenset()
+) -> dict[str, Any]:
     """Figures of some flights of a method against direct allocation in the same waters.
 
     Parameters
@@ -52,7 +54,9 @@ def table(ours: Flights, direct: Flights, trims: Mapping[Known, str], lost: froz
     answer[DEVIATION] = own[DEVIATION]
     answer["velocity_deviation_interval_pct"] = own[f"{DEVIATION}_interval"]
     answer["velocity_deviation_worst_pct"] = _most(ours, DEVIATION)
-    answer["velocity_deviation_over_15_flights"] = sum(float(row.get(DEVIATION) or 0.0) >= 15.0 for row in ours.values())
+    answer["velocity_deviation_over_15_flights"] = sum(
+        float(row.get(DEVIATION) or 0.0) >= 15.0 for row in ours.values()
+    )
     answer["velocity_deviation_floor_pct"] = means(paired.values(), (DEVIATION,))[DEVIATION]
     for key in DEVIATIONS[1:]:
         answer[key] = own[key]

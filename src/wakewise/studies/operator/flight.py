@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from wakewise.allocation import disturbance_of
 from wakewise.arrays import Array
 from wakewise.control.intent import FULL_M_S, PAPER_W_TRACK
+from wakewise.control.spare import watching
 from wakewise.evaluation import flight_figures
 from wakewise.interfaces import BodyState, Witness
 from wakewise.missions import SETTLING, RoutePilot
@@ -25,7 +27,6 @@ from wakewise.studies.gentle.paper import WATER_EVERY_S
 from wakewise.studies.operator.courses import COURSES, SQUARE, CourseHands, look_route, operator_route, start_pose
 from wakewise.studies.operator.heard import Overheard
 from wakewise.studies.operator.waters import water_of
-from wakewise.wake import WakeView, disturbance
 
 PILOTS = ("script", "human")
 LOOK = "look"
@@ -123,7 +124,8 @@ def fly_trial(trial: OperatorTrial) -> dict[str, float | None]:
     heard, pilot = parts.controller, parts.pilot
     assert isinstance(heard, Overheard)
     assert isinstance(pilot, AssistedPilot)
-    view = WakeView.of(parts.vehicle, parts.region, parts.wake)
+    # One yardstick for all methods: what the levers know, in the current that the estimator finds.
+    watch = watching(parts.vehicle, parts.region, parts.wake, parts.control)
     rows: list[tuple[Array, ...]] = []
     D: list[float] = []
     solve_ms: list[float] = []
@@ -138,7 +140,8 @@ def fly_trial(trial: OperatorTrial) -> dict[str, float | None]:
         rows.append((asked, state.X_WB.R @ state.nu_B[:3], planned, by_sticks(pilot)))
         solve_ms.append(1e3 * step.solve_s)
         if len(rows) % every == 1:
-            D.append(disturbance(view.gram(state.X_WB), step.truth.thrusts_N))
+            thrusts = step.truth.thrusts_N
+            D.append(float(disturbance_of(watch.gram(step.estimate, thrusts), thrusts)))
 
     # The courses lie where the mission's own orbits are, which its check has seen, or above the target.
     flown = fly(parts, checked=False, water_every_s=WATER_EVERY_S, duration_s=trial.duration_s, watch=listen).steps

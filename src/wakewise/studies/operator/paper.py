@@ -125,9 +125,7 @@ def paper_figures(rows: Mapping[Key, Row], w_tracks: tuple[float, ...]) -> dict[
     answer: dict[str, Any] = {"circular": True, "seeds": len({key[2] for key in rows})}
     for course, name in zip(PAPER_COURSES, ("w_track", "w_track_over"), strict=True):
         floor = _mean(flights(course, DIRECT, PAPER_W_TRACK), "velocity_deviation_pct")
-        answer[name] = {
-            f"{w:g}": _row(flights(course, OURS, w), flights(course, UNAWARE, w), floor) for w in w_tracks
-        }
+        answer[name] = {f"{w:g}": _row(flights(course, OURS, w), flights(course, UNAWARE, w), floor) for w in w_tracks}
     return answer
 
 
