@@ -40,11 +40,17 @@ check: setup
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-test: check
+# Types are looked at beside the kernels and the tests, which leave a core idle now and then; what was found is said last.
+# A file at a time: what its tests share is made once, and its kernels are loaded by one of the two workers. Each has a
+# core, and the library of linear algebra would have all of them.
+test: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports
 	@sh tools/browser.sh
-	$(BIN)/wakewise warm
-	@# A file at a time: what its tests share is made once, and its kernels are loaded by one of the two workers.
-	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
+	@$(BIN)/mypy > $(VENV)/types.txt 2>&1 & types=$$!; \
+	$(BIN)/wakewise warm && OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder; \
+	tests=$$?; wait $$types; types=$$?; cat $(VENV)/types.txt; test $$tests -eq 0 -a $$types -eq 0
 
 bench: setup
 	$(BIN)/wakewise bench

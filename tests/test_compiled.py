@@ -102,7 +102,7 @@ def test_a_kernel_apart_is_kept_and_compiled_anew_as_any(small_package: Path) ->
 
 
 def test_a_kernel_apart_is_brought_along_through_one_that_was_read_from_disk(small_package: Path) -> None:
-    """Two levels up, where the level between was kept before: the caller, read from disk alone, finds it by its name."""
+    """Two levels up, where the level between was kept before: the caller finds it when it is read from disk alone."""
     callee = small_package / "callee.py"
     callee.write_text(callee.read_text().replace("@njit", "@njit(apart=True)"))
     (small_package / "above.py").write_text(

@@ -57,7 +57,8 @@ def test_an_output_without_signs_shows_the_rest() -> None:
 
 
 @pytest.mark.parametrize(
-    "arguments", [["scan", "--out", "file/x"], ["target", "show", "brain", "--out", "file/x.html"]]
+    "arguments",
+    [["scan", "--out", "file/x"], ["target", "show", "branching", "--points", "30", "--out", "file/x.html"]],
 )
 def test_a_place_that_cannot_be_written_is_one_line(
     arguments: list[str], capsys: Capsys, tmp_path: Path, monkeypatch: Monkeypatch

@@ -44,7 +44,7 @@ def test_a_flight_begun_again_is_the_same(parts):
 @pytest.mark.slow
 def test_any_method_is_flown_by_a_person(parts):
     """`dp` follows the goals within millimetres, and so comes centimetres off the route."""
-    flight = fly(parts.replace(**{"mission.settle_s": 6.0}), duration_s=12.0)
+    flight = fly(parts.replace(**{"mission.settle_s": 6.0}), duration_s=12.0, water_every_s=np.inf)
     assert flight.figures["collisions"] == 0
     last = flight.steps.tail(1)
     true = last.select("true_x_m", "true_y_m", "true_z_m").to_numpy()[0]

@@ -27,7 +27,7 @@ from pathlib import Path
 from wakewise.operation import fly, load_scenario
 folder = Path(sys.argv[1])
 folder.mkdir()
-fly(load_scenario("quick", None, json.loads(sys.argv[2])).parts(), duration_s=5.0).write(folder)
+fly(load_scenario("quick", None, json.loads(sys.argv[2])).parts(), duration_s=3.0).write(folder)
 """
 
 
@@ -38,7 +38,7 @@ def _start(folder: Path) -> subprocess.Popen:
 def test_the_same_seed_gives_the_same_bytes_on_one_and_on_two_processes(tmp_path):
     """One flight alone, here, then two at once: all three leave the same steps.parquet, byte for byte."""
     (tmp_path / "alone").mkdir()
-    fly(load_scenario("quick", None, SHORT).parts(), duration_s=5.0).write(tmp_path / "alone")
+    fly(load_scenario("quick", None, SHORT).parts(), duration_s=3.0).write(tmp_path / "alone")
     both = [_start(tmp_path / name) for name in ("one", "two")]
     assert [process.wait() for process in both] == [0, 0]
     records = {name: (tmp_path / name / "steps.parquet").read_bytes() for name in ("alone", "one", "two")}

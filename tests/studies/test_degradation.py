@@ -19,6 +19,10 @@ SMALL = {
     "imaging.height": 240,
     "imaging.fov_deg": 50,
     "imaging.samples": 1,
+    "reconstruction.dense_px": 160,
+    "reconstruction.dense_zoom": 1.0,
+    "reconstruction.stereo_paths": 3,
+    "reconstruction.stereo_partners": 2,
 }
 
 
