@@ -72,8 +72,9 @@ def small_package(tmp_path: Path) -> Path:
     return folder
 
 
-def _run(package: Path) -> list[str]:
-    code = "from wakewise.caller import g; print(g(), sum(g.stats.cache_hits.values()))"
+def _run(package: Path, name: str = "caller.g") -> list[str]:
+    module, _, kernel = name.partition(".")
+    code = f"from wakewise.{module} import {kernel} as g; print(g(), sum(g.stats.cache_hits.values()))"
     environment = {"PYTHONPATH": str(package.parent), "PATH": "", "NUMBA_CACHE_DIR": str(package.parent / "kept")}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     return done.stdout.split()
@@ -98,6 +99,18 @@ def test_a_kernel_apart_is_kept_and_compiled_anew_as_any(small_package: Path) ->
     assert _run(small_package) == ["10.0", "1"]
     (small_package / "constants.py").write_text("STEP = 2.0\n")
     assert _run(small_package) == ["20.0", "0"]
+
+
+def test_a_kernel_apart_is_brought_along_through_one_that_was_read_from_disk(small_package: Path) -> None:
+    """Two levels up, where the level between was kept before: the caller, read from disk alone, finds it by its name."""
+    callee = small_package / "callee.py"
+    callee.write_text(callee.read_text().replace("@njit", "@njit(apart=True)"))
+    (small_package / "above.py").write_text(
+        "from wakewise.compiled import njit\nfrom wakewise.caller import g\n@njit\ndef h():\n    return 2.0 * g()\n"
+    )
+    assert _run(small_package) == ["10.0", "0"]
+    assert _run(small_package, "above.h") == ["20.0", "0"]
+    assert _run(small_package, "above.h") == ["20.0", "1"]
 
 
 def test_a_kernel_apart_is_not_copied_into_its_caller() -> None:

@@ -137,6 +137,16 @@ class _UserFolder(_OfAllItsFiles, caching.UserWideCacheLocator):
 class _Impl(caching.CompileResultCacheImpl):
     _locator_classes = [_GivenFolder, _BesideSource, _UserFolder]  # noqa: RUF012  (as Numba has it)
 
+    def rebuild(self, target_context: Any, payload: Any) -> Any:
+        """A kernel read from disk, and what must be there when it is loaded.
+
+        Numba does what must be done and forgets it. A caller that is compiled later copies this kernel's code, names of
+        kernels apart in it, and is kept; read from disk by a process that has none of them, it would jump nowhere.
+        """
+        kernel = super().rebuild(target_context, payload)
+        kernel.library._reload_init.update(kernel.reload_init)
+        return kernel
+
 
 class KernelCache(caching.FunctionCache):
     """Numba's cache of one kernel, with the two remedies that this page begins with."""

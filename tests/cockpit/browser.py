@@ -21,7 +21,13 @@ SWITCHES = (
     "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-extensions",
     "--disable-dev-shm-usage", "--no-proxy-server", "--hide-scrollbars", "--force-color-profile=srgb",
 )  # fmt: skip
-KEYS = {"Space": (" ", 32), "Enter": ("Enter", 13), "Escape": ("Escape", 27), "ArrowUp": ("ArrowUp", 38), "Tab": ("Tab", 9)}
+KEYS = {
+    "Space": (" ", 32),
+    "Enter": ("Enter", 13),
+    "Escape": ("Escape", 27),
+    "ArrowUp": ("ArrowUp", 38),
+    "Tab": ("Tab", 9),
+}
 PATIENCE_S = 20.0
 
 
@@ -141,7 +147,15 @@ class Page:
     def _key(self, kind: str, code: str, repeat: bool) -> None:
         key, number = KEYS.get(code, (code[-1].lower(), ord(code[-1])))
         text = {"text": "\r"} if code == "Enter" and kind == "keyDown" else {}
-        self.call("Input.dispatchKeyEvent", type=kind, code=code, key=key, windowsVirtualKeyCode=number, autoRepeat=repeat, **text)
+        self.call(
+            "Input.dispatchKeyEvent",
+            type=kind,
+            code=code,
+            key=key,
+            windowsVirtualKeyCode=number,
+            autoRepeat=repeat,
+            **text,
+        )
 
     def place(self, selector: str, dx: float = 0.0, dy: float = 0.0) -> tuple[float, float]:
         """Middle of an element in pixels, moved by shares of its half size."""
@@ -159,12 +173,18 @@ class Page:
 
     def touch(self, kind: str, points: list[tuple[float, float]]) -> None:
         """Fingers that are down after "touchStart", "touchMove", "touchEnd" or "touchCancel"."""
-        self.call("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)])
+        self.call(
+            "Input.dispatchTouchEvent",
+            type=kind,
+            touchPoints=[{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)],
+        )
 
     # ---- what the page finds itself in
 
     def size(self, width: int, height: int, *, phone: bool = False, scale: float = 0.0) -> None:
-        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=scale, mobile=phone)
+        self.call(
+            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=scale, mobile=phone
+        )
         self.call("Emulation.setTouchEmulationEnabled", enabled=phone, maxTouchPoints=5 if phone else 1)
 
     def front(self) -> None:
@@ -176,7 +196,10 @@ class Page:
         self.call("Emulation.setFocusEmulationEnabled", enabled=True)
 
     def colours(self, dark: bool) -> None:
-        self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}])
+        self.call(
+            "Emulation.setEmulatedMedia",
+            features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}],
+        )
 
     def shot(self, path: Path) -> None:
         path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))

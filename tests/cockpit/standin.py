@@ -6,7 +6,9 @@ Nothing here is a result: wash, thrusts and pictures are drawn from sines. It re
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
+import logging
 import math
 import mimetypes
 import struct
@@ -26,10 +28,12 @@ from websockets.http11 import Request, Response
 PAGE = files("wakewise.cockpit") / "page"
 POLICY = "default-src 'self'; frame-src http://127.0.0.1:*; base-uri 'none'; form-action 'none'"
 LAPSE_S = 1.0
+QUIET = logging.getLogger("standin")
+QUIET.disabled = True
 AROUND = b"<input id=outside><iframe id=f width=480 height=400 src='/?widget=1'></iframe>"
 """Another ground station, with the page as a widget."""
 CORNERS = [(x, y) for x in ("front", "rear") for y in ("right", "left")]
-THRUSTERS = [{"name": f"{x} {y} {kind}", "position_B_m": [0.15, 0.1, 0.0], "axis_B": [1, 0, 0], "limit_N": [-40.0, 50.0]}
+THRUSTERS = [{"name": f"{x} {y} {kind}", "position_B_m": [0.1, 0.1, 0.0], "axis_B": [1, 0, 0], "limit_N": [-40, 50]}
              for kind in ("horizontal", "vertical") for x, y in CORNERS]  # fmt: skip
 
 
@@ -126,7 +130,9 @@ class StandIn:
     async def _serve(self) -> None:
         self._stop = asyncio.Event()
         self.started_s = time.monotonic()
-        async with serve(self._talk, "127.0.0.1", 0, process_request=self._static, compression=None, close_timeout=0.3) as server:
+        async with serve(
+            self._talk, "127.0.0.1", 0, process_request=self._static, compression=None, close_timeout=0.3, logger=QUIET
+        ) as server:
             self.port = next(iter(server.sockets)).getsockname()[1]
             ticking = [asyncio.create_task(self._states()), asyncio.create_task(self._pictures())]
             self._ready.set()
@@ -239,10 +245,8 @@ class StandIn:
             await self._send(client, data)
 
     async def _send(self, client: Client, message: object) -> None:
-        try:
+        with contextlib.suppress(ConnectionClosed):
             await client.socket.send(message if isinstance(message, str | bytes) else json.dumps(message))
-        except ConnectionClosed:
-            pass
 
     async def _states(self) -> None:
         while True:
@@ -257,7 +261,9 @@ class StandIn:
             idle = [c for c in self.clients.values() if c.seen >= c.sent]
             if idle and not self.quiet:
                 number += 1
-                data = struct.pack("<II", number, int(1e3 * self.time_s)) + picture(self.time_s, self.width, 3 * self.width // 4)
+                data = struct.pack("<II", number, int(1e3 * self.time_s)) + picture(
+                    self.time_s, self.width, 3 * self.width // 4
+                )
                 for client in idle:
                     client.sent = number
                     await self._send(client, data)
@@ -284,7 +290,11 @@ class StandIn:
         flown = direct * ((0.05 + 0.03 * math.sin(0.9 * t)) if aware else 1.0)
         bearing = 0.15 * t
         eye = np.array([-0.8 * math.cos(bearing), -0.8 * math.sin(bearing), -0.25])
-        hit = np.exp(-(((POINTS_W_M - 0.15 * np.array([-math.cos(bearing + 0.6), -math.sin(bearing + 0.6), -0.4])) / 0.07) ** 2).sum(1))
+        hit = np.exp(
+            -(
+                ((POINTS_W_M - 0.15 * np.array([-math.cos(bearing + 0.6), -math.sin(bearing + 0.6), -0.4])) / 0.07) ** 2
+            ).sum(1)
+        )
         wash = 1e-3 * (0.6 + hit * (9 if aware else 40) * (1 + 0.3 * math.sin(0.8 * t)))
         return {
             "type": "state", "time_s": round(t, 2), "mode": self.desk["mode"], "desk": self.desk, "controls": self.axes,
@@ -293,12 +303,16 @@ class StandIn:
             "velocity_m_s": [0.11 * math.sin(0.3 * t), 0.02, 0.0], "deviation_pct": 6.5 + 2.5 * math.sin(0.5 * t),
             "disturbance": flown, "direct_disturbance": direct, "saved_pct": 100 * (1 - flown / direct),
             "predicted_m_s": wash.round(5).tolist(),
-            "true_m_s": (wash * (0.8 + 0.2 * np.sin(9 * POINTS_W_M[:, 0] / 0.15))).round(5).tolist() if self.tank else None,
-            "depth_m": 1.23 + 0.02 * math.sin(t), "roll_deg": 1.4 * math.sin(0.7 * t), "pitch_deg": -4 + 2 * math.sin(0.4 * t),
+            "true_m_s": (wash * (0.8 + 0.2 * np.sin(60 * POINTS_W_M[:, 0]))).round(5).tolist() if self.tank else None,
+            "depth_m": 1.23 + 0.02 * math.sin(t), "roll_deg": 1.4 * math.sin(0.7 * t),
+            "pitch_deg": -4 + 2 * math.sin(0.4 * t),
             "heading_deg": math.degrees(bearing) % 360, "tilt_deg": -12.0, "power_W": 84 + 22 * math.sin(0.4 * t),
             "energy_J": 84 * t + 5200, "position_W_m": eye.round(3).tolist(), "goal_W_m": eye.round(3).tolist(),
-            "coverage": {"share": 0.34, "patches": [max(0.0, min(1.0, 0.5 + 0.6 * math.sin(0.9 * k))) for k in range(96)],
-                         "next": {"position_W_m": (eye + [0.3, 0.25, -0.2]).round(3).tolist(), "words": "its left flank, from higher up"}},
+            "coverage": {
+                "share": 0.34,
+                "patches": [max(0.0, min(1.0, 0.5 + 0.6 * math.sin(0.9 * k))) for k in range(96)],
+                "next": {"position_W_m": (eye + 0.25).round(3).tolist(), "words": "its left flank, from higher up"},
+            },
             "photos": self.photos + 12, "loop": {"behind_ms": 0.4, "solve_ms_p99": 7.2, "stick_to_thrust_ms_p99": 96.0},
             "fallback": None, "helm": None, "spectators": max(0, len(self.clients) - 1),
         }  # fmt: skip

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import json
+import urllib.error
+import urllib.request
 from typing import Any
+
+import pytest
+from rehearsal import Rehearsal
 
 from wakewise.cockpit.extras import cockpit_extras, extras_files, register_service
 from wakewise.cockpit.files import Files
+from wakewise.cockpit.server import Server
 
 # Required and optional keys of each object, as Cockpit's "External Integrations" lists them.
-EXTRAS = ({"targetSystem": str, "targetCockpitApiVersion": str, "widgets": list, "actions": list}, {"joystickSuggestions": list})
+EXTRAS = (
+    {"targetSystem": str, "targetCockpitApiVersion": str, "widgets": list, "actions": list},
+    {"joystickSuggestions": list},
+)
 WIDGET = (
     {"name": str, "iframeUrl": str},
     {"iconUrl": str, "iframeIcon": str, "collapsibleContainerName": str, "version": str, "startCollapsed": bool,
@@ -58,3 +67,31 @@ def test_every_address_that_is_named_is_served() -> None:
     found = files.at(register_service()["extras"]["cockpit"])
     assert found is not None
     assert json.loads(found.body) == cockpit_extras()
+
+
+def test_another_sites_page_reads_the_extras_and_nothing_else() -> None:
+    """Cockpit asks from a page of its own; a foreign host name is refused all the same."""
+    show = Rehearsal()
+    server = Server(show)
+    server.start()
+    try:
+        answer = ask(server, "/cockpit_extras.json", Origin="http://blueos.local")
+        assert answer.headers["Access-Control-Allow-Origin"] == "*"
+        assert json.loads(answer.read()) == cockpit_extras()
+        answer.close()
+        for path, headers in (
+            ("/", {"Origin": "http://blueos.local"}),
+            ("/register_service", {"Host": "evil.example"}),
+        ):
+            with pytest.raises(urllib.error.HTTPError) as refusal:
+                ask(server, path, **headers)
+            assert refusal.value.code == 403
+            refusal.value.close()
+    finally:
+        server.stop()
+        show.close()
+
+
+def ask(server: Server, path: str, **headers: str) -> Any:
+    request = urllib.request.Request(f"http://127.0.0.1:{server.port}{path}", headers=headers)
+    return urllib.request.build_opener(urllib.request.ProxyHandler({})).open(request, timeout=10)

@@ -16,13 +16,16 @@ NOTHING = dict.fromkeys(
      "spectators")
 )  # fmt: skip
 ODD = (
-    "", "not JSON", "null", "[]", "7", '"state"', "{}", '{"type": 3}', '{"type": "unheard of"}', '{"type": "__proto__"}',
+    "", "not JSON", "null", "[]", "7", '"state"', "{}", '{"type": 3}', '{"type": "unheard of"}', '{"type": "_"}',
+    '{"type": "__proto__"}',
     {"type": "state"}, {"type": "state", **NOTHING}, {"type": "state", **dict.fromkeys(NOTHING, "x")},
-    {"type": "state", **dict.fromkeys(NOTHING, [])}, {"type": "state", **dict.fromkeys(NOTHING, {"a": [1, None]})},
+    {"type": "state", **{name: [] for name in NOTHING}},
+    {"type": "state", **{name: {"a": [1, None]} for name in NOTHING}},
     {"type": "state", "thrusts_N": [None, "x", 1e308], "predicted_m_s": [1e308, None, -5, "x"], "true_m_s": [],
      "coverage": {"share": 1e9, "patches": [None, "x", -7, 1e308], "next": {"position_W_m": [0], "words": {}}}},
     {"type": "welcome"}, {"type": "welcome", "vehicle": None, "target": None, "desk": None, "scenario": None},
-    {"type": "welcome", "vehicle": {"thrusters": [None, {}, {"limit_N": "x", "name": 3}]}, "scene_url": "javascript:alert(1)",
+    {"type": "welcome", "vehicle": {"thrusters": [None, {}, {"limit_N": "x", "name": 3}]},
+     "scene_url": "javascript:alert(1)",
      "target": {"points_W_m": [None, [1], [1, 2, "x"], [1, 2, 3]], "centre_W_m": "x", "radius_m": -1},
      "desk": {"ranges": {"w_track": [9, 1], "gain": "x"}, "w_track": "x"}},
     {"type": "helm", "yours": "yes", "lease": 5, "holder": {}, "asked_by": "x", "why": []},

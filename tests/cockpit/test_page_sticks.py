@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from itertools import pairwise
 from typing import Any
 
 from browser import Browser, until
@@ -47,7 +48,7 @@ def test_sticks_go_out_25_times_a_second_by_a_timer(standin: StandIn, fly: Any) 
     messages, times = standin.of("sticks", start_s), standin.times("sticks", start_s)
     assert [m["seq"] for m in messages] == list(range(messages[0]["seq"], messages[0]["seq"] + len(messages)))
     assert 15 <= len(times) / (times[-1] - times[0]) <= 30
-    assert all(b["t"] > a["t"] for a, b in zip(messages, messages[1:], strict=False))
+    assert all(b["t"] > a["t"] for a, b in pairwise(messages))
 
 
 def test_space_stops_whatever_has_the_focus(standin: StandIn, fly: Any) -> None:
@@ -125,8 +126,10 @@ def test_a_lost_link_comes_back_as_a_spectator(standin: StandIn, fly: Any) -> No
     """The page says so, tries again by itself, and flies only after the helm was asked for anew."""
     page = fly()
     page.down("KeyW")
-    page.js("window.said = []; new MutationObserver(() => said.push(document.getElementById('banner-what').innerText))"
-            ".observe(document.getElementById('banner-what'), {childList: true, characterData: true, subtree: true}); 1")  # fmt: skip
+    page.js(
+        "window.said = []; const what = document.getElementById('banner-what');"
+        "new MutationObserver(() => said.push(what.innerText)).observe(what, {childList: true, subtree: true}); 1"
+    )
     standin.drop()
     page.until("said.some((one) => one.startsWith('Link lost: the vehicle holds'))")
     until(lambda: len(standin.of("hello")) == 2, "to be back")
@@ -193,7 +196,9 @@ def test_capture_and_the_desk_go_with_the_lease(standin: StandIn, fly: Any) -> N
     page.click("[data-assist=orbit]")
     page.press("BracketRight")
     until(lambda: standin.desk["orbit"] and standin.desk["w_track"] > 5, "the desk")
-    page.js("(() => { const d = document.getElementById('w-track'); d.value = 0; d.dispatchEvent(new Event('input')); })()")
+    page.js(
+        "(() => { const d = document.getElementById('w-track'); d.value = 0; d.dispatchEvent(new Event('input')); })()"
+    )
     until(lambda: standin.desk["w_track"] == 0.5, "the gentlest")
     page.until("document.getElementById('regime').innerText === 'delicate'")
     assert [m["what"] for m in standin.of("press")] == ["operator", "capture", "capture"]

@@ -35,7 +35,9 @@ def test_a_share_request_opens_no_connection(scene: Scene, monkeypatch: pytest.M
     outside: list[object] = []
     monkeypatch.setattr("viser._viser.ViserTunnel", lambda *a: outside.append(a))
     original = type(scene._server).request_share_url
-    monkeypatch.setattr(type(scene._server), "request_share_url", lambda self, *a: asked.append("share") or original(self, *a))
+    monkeypatch.setattr(
+        type(scene._server), "request_share_url", lambda self, *a: asked.append("share") or original(self, *a)
+    )
     url = scene.url.replace("http", "ws")
     with connect(url, subprotocols=[f"viser-v{viser.__version__}"], max_size=None, proxy=None) as client:
         dialled = socket.socket.connect
@@ -78,8 +80,9 @@ def test_a_moment_moves_vehicle_thrusts_and_colours(scene: Scene) -> None:
 
 def test_colours_rise_with_the_wash() -> None:
     """Ends are the ends of the scale; what is not known is drawn as still."""
-    colours = speed_colours(np.array([0.0, np.nan, 0.004, 9.0]))
-    assert colours.tolist() == SPEED_RGB[[0, 0, 1, 3]].tolist()
+    sand_m_s = 1e-3 * (101.0**0.3 - 1.0)
+    colours = speed_colours(np.array([0.0, np.nan, sand_m_s, 0.1, 9.0]))
+    assert colours.tolist() == SPEED_RGB[[0, 0, 1, 3, 3]].tolist()
 
 
 def test_without_viser_there_is_no_scene(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,6 +7,7 @@ import http.client
 import json
 import socket
 import time
+from collections import deque
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
 from typing import Any
@@ -58,7 +59,7 @@ class Page:
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket, self.lease, self.seq, self.id = socket, None, 0, ""
-        self.told: list[dict[str, Any]] = []
+        self.told: deque[dict[str, Any]] = deque(maxlen=20)
         self.pictures: list[bytes] = []
 
     async def say(self, **told: Any) -> None:

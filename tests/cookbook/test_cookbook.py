@@ -39,6 +39,7 @@ SMALL = {
     "imaging.width": 160,
     "imaging.height": 120,
     "target.kind": "brain",
+    "target.points": 60,
 }
 """Three photographs: whether they make a model does not matter to whose controller it was."""
 
@@ -71,6 +72,7 @@ def test_each_kind_is_found_by_its_name(installed: Path, tmp_path: Path) -> None
             "world": "quiet-tank",
             "pilot": "hover",
             "target.kind": "pyramid",
+            "target.points": 60,
             "control.wake.model": "top-hat",
             "tank.current.file": "tide",
         },

@@ -1,6 +1,7 @@
 """Assisted flight by hand: goals that never jump, hold what they should, and let a mission go on where it was left."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from wakewise.operation.desk import Desk, DeskState
 from wakewise.operation.scanning import PACE_S
 from wakewise.operation.steering import BRAKING_M_S2
 from wakewise.pilot import CENTRED, Controls
+from wakewise.planning.barrier import least_gap
+from wakewise.planning.problem import CLEARANCE_M
 
 DT_S = 0.02
 
@@ -260,3 +263,37 @@ def test_a_flight_without_a_mission_holds_instead(parts):
     some = parts.replace(route=open_route(parts.found_target.centre_W_m, 10.0), start=parts.start)
     flown = Flown(some, mode="scan").until(0.1)
     assert flown.desk.state.mode == "hold" and "no mission" in flown.pilot.notes()[0].text
+
+
+@pytest.mark.parametrize("orbit", [False, True])
+def test_sticks_run_into_nothing(parts, orbit):
+    """Full stick at the target, then at the bed: the goal comes to rest at the clearance, and may leave again."""
+    now = [sticks(forward=1.0)]
+    flown = Flown(parts, Hands(lambda _: now[0]), mode="operator", gain=0.8, orbit=orbit)
+    around, half = parts.surroundings, 0.5 * np.array(parts.vehicle.size_m)
+
+    def gap():
+        X_WB = flown.body.X_WB
+        return least_gap(X_WB.p_m, X_WB.R, half, np.array(around.planes), np.array(around.spheres))
+
+    for axes in (sticks(forward=1.0), sticks(down=1.0)):
+        now[0] = axes
+        for _ in range(12):
+            flown.until(DT_S * flown.step + 0.5)
+            assert gap() > CLEARANCE_M - 0.02
+    assert "in the way" in flown.pilot.notes()[-1].text
+    near = gap()
+    now[0] = sticks(forward=-1.0, down=-0.3)
+    flown.until(DT_S * flown.step + 3.0)
+    assert gap() > near + 0.05
+
+
+def test_an_estimate_that_is_no_number_moves_nothing(parts):
+    """The commanded place stays finite and goes on where it was once there is an estimate again."""
+    flown = Flown(parts, Hands(lambda _: sticks(right=0.5)), mode="operator").until(2.0)
+    sound, lost = flown.body, np.full(3, np.nan)
+    nowhere = SimpleNamespace(p_m=lost, R=np.full((3, 3), np.nan), q=np.full(4, np.nan))
+    flown.body = SimpleNamespace(X_WB=nowhere, nu_B=np.full(6, np.nan))
+    goal = flown.pilot.goal(2.0, flown.body)
+    assert np.linalg.norm(goal.X_WB.p_m - sound.X_WB.p_m) < 0.01
+    assert np.isfinite(flown.pilot.goal(2.02, sound).X_WB.p_m).all() and flown.pilot.deviation_pct is not None

@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from wakewise.errors import InputError
-from wakewise.operation.desk import FIELDS, Desk, DeskState, regime
+from wakewise.operation.desk import FIELDS, Desk, DeskState, Meaning, meaning, regime
 
 
 @pytest.mark.parametrize(
@@ -62,6 +62,14 @@ def test_regimes_are_the_papers():
         "transit",
         "transit",
     ]
+
+
+def test_the_dials_meaning_is_what_was_measured():
+    """Between two measurements by the logarithm, beyond them the last one; regime alone where there is none."""
+    measured = {5.0: (7.0, 90.0), 20.0: (6.0, 80.0)}
+    assert meaning(10.0, measured) == Meaning(regime="work", deviation_pct=6.5, saved_pct=85.0)
+    assert meaning(50.0, measured).saved_pct == 80.0 and meaning(0.5, measured).deviation_pct == 7.0
+    assert meaning(1.0) == Meaning(regime="delicate")
 
 
 def test_threads_lose_no_change():

@@ -5,9 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
-from wakewise.operation import fly_trial, load_scenario
+from wakewise.operation import fly, load_scenario
 
 SHORT = {
     "world": "tank",
@@ -26,8 +24,10 @@ SHORT = {
 FLIGHT = """
 import json, sys
 from pathlib import Path
-from wakewise.operation import fly_trial, load_scenario
-fly_trial(load_scenario("quick", None, json.loads(sys.argv[2])).parts(), Path(sys.argv[1]))
+from wakewise.operation import fly, load_scenario
+folder = Path(sys.argv[1])
+folder.mkdir()
+fly(load_scenario("quick", None, json.loads(sys.argv[2])).parts(), duration_s=5.0).write(folder)
 """
 
 
@@ -35,10 +35,10 @@ def _start(folder: Path) -> subprocess.Popen:
     return subprocess.Popen([sys.executable, "-c", FLIGHT, str(folder), json.dumps(SHORT)], stdout=subprocess.DEVNULL)
 
 
-@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_on_one_and_on_two_processes(tmp_path):
     """One flight alone, here, then two at once: all three leave the same steps.parquet, byte for byte."""
-    fly_trial(load_scenario("quick", None, SHORT).parts(), tmp_path / "alone")
+    (tmp_path / "alone").mkdir()
+    fly(load_scenario("quick", None, SHORT).parts(), duration_s=5.0).write(tmp_path / "alone")
     both = [_start(tmp_path / name) for name in ("one", "two")]
     assert [process.wait() for process in both] == [0, 0]
     records = {name: (tmp_path / name / "steps.parquet").read_bytes() for name in ("alone", "one", "two")}

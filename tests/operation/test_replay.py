@@ -24,6 +24,7 @@ def flown(flight: LiveFlight) -> None:
         raise flight.fault
 
 
+@pytest.mark.slow
 def test_the_same_hands_give_the_same_flight_to_the_byte(tmp_path: Path) -> None:
     """Sticks, buttons, the desk, photographs that others asked for: all is where it was, in each row and exposure."""
     hands = script_of(

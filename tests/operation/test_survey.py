@@ -35,7 +35,7 @@ def test_its_error_has_the_stated_spread():
 
 def test_mission_and_controller_go_by_what_is_known_and_the_world_by_what_is():
     """Route, region and surroundings shift with the belief; the world's target does not."""
-    known, exact = (Scenario(seed=3).replace(**changes).parts() for changes in ({}, EXACT))
+    known, exact = (Scenario(seed=3).replace(**{"target.points": 60}, **changes).parts() for changes in ({}, EXACT))
     shift = known.found_target.centre_W_m - known.target.centre_W_m
     assert exact.found_target is exact.target
     for a, b in (

@@ -7,6 +7,7 @@ import pytest
 from plan_cases import AROUND, CENTRE, CONE, REGION, VEHICLE, model, problem
 from pydantic import ValidationError
 
+from wakewise.control.intent import obeying
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_from_euler
 from wakewise.interfaces import Goal
@@ -151,3 +152,25 @@ def test_infeasible_starts_are_refused():
         check_start(VEHICLE, REGION, inside, Surroundings(spheres=AROUND.spheres))
     with pytest.raises(InputError, match="finite"):
         check_start(VEHICLE, REGION, np.full(13, np.nan), AROUND)
+
+
+def test_obedience_is_the_dial_of_the_tracking_weights():
+    """A problem that is to be obeyed four times as closely is planned as by settings of w_track 20, and 1 as ever."""
+    asked, strict = problem(), Planner(model(**obeying(PlanSettings(), 20.0).model_dump()))
+    dial, usual = Planner(model()), Planner(model())
+    for obedience, other in ((4.0, strict), (1.0, usual)):
+        asked = replace(asked, obedience=obedience)
+        dial.load(asked)
+        other.load(replace(asked, obedience=1.0))
+        assert dial.cost(START) == other.cost(START)
+    turned = Planner(model()).plan(replace(asked, obedience=4.0), START)
+    wished = asked.reference[-1, :3]
+    off = [np.linalg.norm(plan.states[-1, :3] - wished) for plan in (turned, usual.plan(asked, START))]
+    assert off[0] < off[1]
+
+
+@pytest.mark.parametrize("bad", [0.0, -1.0, float("nan"), float("inf")])
+def test_an_obedience_that_means_nothing_is_refused_before_it_is_planned(bad):
+    """Zero, negative, not finite; the planner's guard then falls back and says so."""
+    with pytest.raises(InputError, match="obedience"):
+        replace(problem(), obedience=bad)

@@ -178,6 +178,7 @@ def small_views() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("wakewise.reports.model.VIEW_PIXELS", 48)
         patch.setattr("wakewise.reports.compare.VIEW_PIXELS", 48)
+        patch.setattr("wakewise.reports.coverage.PIXELS", 48)
         yield
 
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -36,6 +39,12 @@ Host = Annotated[
     ),
 ]
 Gamepad = Annotated[bool, typer.Option("--gamepad", help="Fly with a gamepad at this computer, too.")]
+Mapping = Annotated[
+    Path | None,
+    typer.Option(
+        "--mapping", metavar="FILE", help="YAML file that says what the gamepad's parts do.", show_default=False
+    ),
+]
 NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Do not open the page in a browser.")]
 
 _LOOK_S = 0.1
@@ -54,6 +63,7 @@ def cockpit(
     port: Port = 8765,
     host: Host = "127.0.0.1",
     gamepad: Gamepad = False,
+    mapping: Mapping = None,
     no_browser: NoBrowser = False,
     json: Json = False,
 ) -> None:
@@ -65,32 +75,35 @@ def cockpit(
     from wakewise.extras import need
 
     need("wakewise cockpit", "cockpit")
+    from wakewise.cockpit.gate import is_loopback
     from wakewise.cockpit.server import Server
     from wakewise.cockpit.session import Session
     from wakewise.operation import load_scenario
 
     changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, world=world)
     resolved = load_scenario(preset, scenario, changes)
-    session = Session(resolved, out or default_folder(resolved, "cockpit"), device=_gamepad() if gamepad else None)
-    server = Server(session, host, port)
-    server.start()
-    try:
-        session.start()
-        _say(f"cockpit: {server.address} (Ctrl-C ends the flight)")
-        if not no_browser:
-            _open(server.address)
-        _watch(session)
-    except KeyboardInterrupt:  # how a flight by hand ends
-        pass
-    finally:
-        session.stop()
-        server.stop()
+    folder = out or default_folder(resolved, "cockpit")
+    with ExitStack() as stack:
+        device = stack.enter_context(_gamepad(mapping)) if gamepad or mapping is not None else None
+        session = Session(resolved, folder, device=device, scene=is_loopback(host))
+        server = Server(session, host, port)
+        server.start()
+        stack.callback(server.stop)
+        stack.callback(session.stop)
+        try:
+            session.start()
+            _say(f"cockpit: {server.address} (Ctrl-C ends the flight)")
+            if not no_browser:
+                _open(server.address)
+            _watch(session)
+        except KeyboardInterrupt:  # how a flight by hand ends
+            _say("ending the flight")
     if session.fault is not None:
         raise session.fault
-    for folder in session.flown:
-        _say(f"kept: {folder}")
+    for kept in session.flown:
+        _say(f"kept: {kept}")
     if json:
-        print_json({"address": server.address, "flights": [str(folder) for folder in session.flown]})
+        print_json({"address": server.address, "flights": [str(kept) for kept in session.flown]})
 
 
 def _watch(session: Session) -> None:
@@ -109,14 +122,15 @@ def _watch(session: Session) -> None:
         time.sleep(_LOOK_S)
 
 
-def _gamepad() -> ControlSource:
-    """The gamepad at this computer."""
-    from wakewise.extras import need
-
-    need("wakewise cockpit --gamepad", "gamepad")
+@contextmanager
+def _gamepad(mapping: Path | None) -> Iterator[ControlSource]:
+    """The gamepad at this computer; refused where all there is is one that the mapping is not for."""
     from wakewise.pilot.gamepad import Gamepad
+    from wakewise.pilot.pad_mapping import load_mapping
 
-    return Gamepad()
+    with Gamepad(None if mapping is None else load_mapping(mapping)) as pad:
+        pad.check()
+        yield pad
 
 
 def _open(address: str) -> None:

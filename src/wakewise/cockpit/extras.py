@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from importlib.metadata import version
 from typing import Any
 
-import wakewise
 from wakewise.cockpit.files import File
 
 EXTRAS_PATH, SERVICE_PATH = "/cockpit_extras.json", "/register_service"
@@ -29,7 +29,7 @@ def cockpit_extras() -> dict[str, Any]:
                 "name": "Wakewise: gentle flight",
                 "iframeUrl": WIDGET_PATH,
                 "iframeIcon": ICON_PATH,
-                "version": wakewise.__version__,
+                "version": version("wakewise"),
             }
         ],
         "actions": [],
@@ -44,7 +44,7 @@ def register_service() -> dict[str, Any]:
         "description": "Fly an underwater vehicle by hand while its wash leaves the target still.",
         "icon": ICON_PATH,
         "company": "Wakewise",
-        "version": wakewise.__version__,
+        "version": version("wakewise"),
         "webpage": "",
         "api": "",
         "new_page": False,
@@ -60,4 +60,5 @@ def extras_files() -> dict[str, Callable[[], File]]:
 
 
 def _json(told: dict[str, Any]) -> File:
-    return File(body=json.dumps(told, indent=1).encode(), kind="application/json")
+    # Cockpit reads them from its own page, which a browser counts as another site.
+    return File(body=json.dumps(told, indent=1).encode(), kind="application/json", shared=True)

@@ -20,10 +20,11 @@ _TYPES = {
 
 @dataclass(frozen=True, kw_only=True)
 class File:
-    """What is answered at one address."""
+    """What is answered at one address; `shared`: pages of other sites may read it, too."""
 
     body: bytes
     kind: str
+    shared: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

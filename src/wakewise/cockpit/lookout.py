@@ -90,6 +90,11 @@ class Lookout:
         """Somebody looks: for a while the true water is asked, too."""
         self._looked_s = time.monotonic()
 
+    @property
+    def looked_at(self) -> bool:
+        """Whether somebody has looked of late."""
+        return time.monotonic() - self._looked_s < LOOKS_S
+
     def __call__(self, step: Step, witness: Witness | None) -> None:
         """Take down a step."""
         self._given()
@@ -105,7 +110,7 @@ class Lookout:
         if now_s >= self._sampled_s + SAMPLED_S - 1e-9:
             self._sampled_s = now_s
             self._followed.append((asked_W, velocity_W))
-        if witness is not None and time.monotonic() - self._looked_s < LOOKS_S:
+        if witness is not None and self.looked_at:
             self._ask(now_s, witness)
         tilt_rad = step.truth.tilt_rad if step.truth is not None else step.tilt_rad
         self.now = Moment(

@@ -18,9 +18,10 @@ from wakewise.arrays import Array
 from wakewise.geometry import Pose
 from wakewise.vehicles import Vehicle
 
-SPEED_STOPS_M_S = np.array([0.0, 0.004, 0.013, 0.03])
+SPEED_SHARES = np.array([0.0, 0.3, 0.6, 1.0])
 SPEED_RGB = np.array([[108, 146, 160], [226, 190, 104], [224, 116, 60], [178, 34, 62]], dtype=np.float64)
-"""Colours of the wash, as on the page."""
+"""Colours of the wash along its scale, as on the page: a logarithm from 1 mm/s to `MOST_M_S`."""
+MOST_M_S, _GENTLE_M_S = 0.1, 1e-3
 HULL_RGB, JET_RGB, PATH_RGB = (247, 200, 89), (11, 114, 133), (120, 135, 145)
 METRES_PER_NEWTON = 0.01
 _PATH_STEP_M, _PATH_POINTS = 0.02, 4000
@@ -34,8 +35,9 @@ def has_viser() -> bool:
 
 def speed_colours(speeds_m_s: Array) -> Array:
     """Colours 0 to 255, uint8, shape (n, 3), of speeds of the wash, shape (n,); what is not known counts as still."""
-    known = np.nan_to_num(np.asarray(speeds_m_s, dtype=np.float64))
-    channels = [np.interp(known, SPEED_STOPS_M_S, SPEED_RGB[:, k]) for k in range(3)]
+    known = np.maximum(np.nan_to_num(np.asarray(speeds_m_s, dtype=np.float64)), 0.0)
+    shares = np.log1p(known / _GENTLE_M_S) / np.log1p(MOST_M_S / _GENTLE_M_S)
+    channels = [np.interp(shares, SPEED_SHARES, SPEED_RGB[:, k]) for k in range(3)]
     return np.round(np.stack(channels, axis=-1)).astype(np.uint8)
 
 
@@ -92,13 +94,13 @@ class Scene:
         # Environment maps would be fetched from the network.
         scene.configure_environment_map(None)
         scene.add_light_ambient("/light", intensity=1.2)
-        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
         panel = getattr(server.gui, "main_panel", None)  # not in viser 1.0
         if panel is not None:
             panel.minimize()
         centre, reach_m = self._points_W_m.mean(axis=0), float(np.ptp(self._points_W_m, axis=0).max())
         server.initial_camera.look_at = tuple(centre)
-        server.initial_camera.position = tuple(centre + (2.2 * reach_m + 0.8) * np.array([-0.75, -0.45, -0.5]))
+        server.initial_camera.position = tuple(centre + (2.2 * reach_m + 2.0) * np.array([-0.75, -0.45, -0.5]))
         server.initial_camera.up = (0.0, 0.0, -1.0)
         hull = scene.add_frame("/vehicle", show_axes=False)
         scene.add_box("/vehicle/hull", color=HULL_RGB, dimensions=tuple(0.8 * vehicle.size_m), opacity=0.55)
@@ -141,10 +143,10 @@ class Scene:
 
 
 def _closed_server() -> Any:
-    """viser's server on this computer's own address, which opens no tunnel whoever asks."""
+    """Viser's server on this computer's own address, which opens no tunnel whoever asks."""
     import viser
 
-    class ClosedServer(viser.ViserServer):
+    class ClosedServer(viser.ViserServer):  # type: ignore[misc]
         """Its handlers look both methods up when a request comes, so these are what is called."""
 
         def request_share_url(self, verbose: bool = True) -> str | None:  # noqa: ARG002

@@ -121,10 +121,16 @@ class Seat:
                 self._unflown_s = None
 
     @property
-    def stick_to_thrust_ms_p99(self) -> float | None:
-        """From a message's arrival to thrusts that know of it, 99th percentile of the last 1024; None before any."""
+    def waits_s(self) -> tuple[float, ...]:
+        """From a message's arrival to thrusts that know of it, of the last ones flown."""
         with self._lock:
-            return 1e3 * float(np.percentile(self._waits_s, 99)) if self._waits_s else None
+            return tuple(self._waits_s)
+
+    @property
+    def stick_to_thrust_ms_p99(self) -> float | None:
+        """The 99th percentile of `waits_s`; None before any."""
+        waits_s = self.waits_s
+        return 1e3 * float(np.percentile(waits_s, 99)) if waits_s else None
 
     def _read_device(self, time_s: float) -> None:
         assert self._device is not None

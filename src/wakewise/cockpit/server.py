@@ -14,6 +14,7 @@ import logging
 import secrets
 import socket
 import threading
+from dataclasses import replace
 from typing import Any
 
 from websockets.asyncio.server import Server as Listening
@@ -23,6 +24,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from wakewise.cockpit.client import Client
+from wakewise.cockpit.extras import extras_files
 from wakewise.cockpit.files import Files
 from wakewise.cockpit.gate import Caller, Gate, is_loopback, page_headers
 from wakewise.cockpit.messages import (
@@ -77,7 +79,7 @@ class Server:
         self.show, self.host, self.port = show, host, port
         self.token = token or secrets.token_urlsafe(16)
         self.clients: dict[str, Client] = {}
-        self._files = files or Files()
+        self._files = files or Files(more=extras_files())
         self._gate = Gate(port=port, token=self.token)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._listening: Listening | None = None
@@ -92,7 +94,7 @@ class Server:
     @property
     def address(self) -> str:
         """Where the page is, for this computer's browser, or with the token where it is asked for."""
-        if is_loopback(self.host) or self.host == "localhost":
+        if is_loopback(self.host):
             host = f"[{self.host}]" if ":" in self.host else self.host
             return f"http://{host}:{self.port}/"
         return f"http://{self.host}:{self.port}/#token={self.token}"
@@ -165,17 +167,19 @@ class Server:
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request for a file, let a socket open, or refuse either."""
         caller = _caller(connection, request)
-        refused = self._gate.refusal(caller)
+        file = self._files.at(request.path)
+        shared = file is not None and file.shared
+        refused = self._gate.refusal(replace(caller, origin=None) if shared else caller)
         if refused is not None:
             return _response(http.HTTPStatus.FORBIDDEN, f"refused: {refused}\n".encode())
         if request.path.partition("?")[0] == "/ws":
             if len(self.clients) >= MOST_CLIENTS:
                 return _response(http.HTTPStatus.SERVICE_UNAVAILABLE, b"too many pages are open\n")
             return None
-        file = self._files.at(request.path)
         if file is None:
             return _response(http.HTTPStatus.NOT_FOUND, b"there is nothing here\n")
-        return _response(http.HTTPStatus.OK, file.body, file.kind, page_headers(caller.host or ""))
+        more = page_headers(caller.host or "") | ({"Access-Control-Allow-Origin": "*"} if shared else {})
+        return _response(http.HTTPStatus.OK, file.body, file.kind, more)
 
     async def _meet(self, connection: ServerConnection) -> None:
         """One client, from its first word to its last."""
@@ -269,8 +273,11 @@ class Server:
     def _tell_helm(self, why: str, always: Client | None = None) -> None:
         """Tell everybody of a change at the helm, and `always` this one how it stands."""
         holding = self.show.seat.holding
-        changed = holding != self._told
+        changed, before = holding != self._told, self._told
         self._told = holding
+        if before is not None and holding.holder != before.holder:
+            name = self._named(holding.holder)
+            self._to_all(Note(text="nobody has the helm" if name is None else f"{name} has the helm").message())
         asking = self.clients.get(holding.asked_by or "")
         told = {
             "type": "helm",

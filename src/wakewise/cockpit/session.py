@@ -21,6 +21,7 @@ from wakewise.cockpit.frames import LiveCamera, View
 from wakewise.cockpit.gauges import Gauges
 from wakewise.cockpit.guide import LiveGuide
 from wakewise.cockpit.lookout import Lookout
+from wakewise.cockpit.scene import Scene, open_scene
 from wakewise.cockpit.seat import Seat
 from wakewise.cockpit.show import Note, Picture
 from wakewise.cockpit.state import Instruments, described, number, rounded, told_scenario
@@ -31,7 +32,7 @@ from wakewise.operation.desk import MODES, RANGES, WAYS, Desk, regime
 from wakewise.operation.live import LiveFlight
 from wakewise.pilot.controls import CENTRED, ControlSource
 
-TENDED_S = 0.05
+TENDED_S, SCENE_EVERY_S = 0.05, 0.2
 _MOST_NOTES = 200
 
 
@@ -51,6 +52,8 @@ class Session:
         Whether the camera's picture is drawn.
     guided : bool
         Whether a coverage guide follows the photographs.
+    scene : bool
+        Whether viser's 3D scene is served beside the page, where viser is installed.
     """
 
     def __init__(
@@ -62,9 +65,13 @@ class Session:
         device: ControlSource | None = None,
         pictures: bool = True,
         guided: bool = True,
+        scene: bool = False,
     ) -> None:
         self._parts = scenario if isinstance(scenario, Parts) else scenario.parts()
         self.seat, self.desk = Seat(device=device), Desk()
+        self._device, self._scene_wanted = device, scene
+        self._scene: Scene | None = None
+        self._fallback: str | None = None
         self.folder, self._paced, self._guided = folder, paced, guided
         self.flown: list[Path] = []
         self.flights = 0
@@ -82,6 +89,7 @@ class Session:
         self._notes: deque[Note] = deque(maxlen=_MOST_NOTES)
         self._photos, self._pictures = 0, 0
         self._silt_shown: object = None
+        self._shown_s = -np.inf
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._tend, name="session")
         self._began_s = time.monotonic()
@@ -100,6 +108,9 @@ class Session:
             self._thread.join()
         if self._camera is not None:
             self._camera.close()
+        if self._scene is not None:
+            self._scene.close()
+            self._scene = None
 
     @property
     def preparing(self) -> str | None:
@@ -122,6 +133,11 @@ class Session:
         return self._live
 
     @property
+    def lookout(self) -> Lookout | None:
+        """What that flight's thread takes down."""
+        return self._lookout
+
+    @property
     def edition(self) -> int:
         """Grows when `welcome` has something new to say."""
         return self._edition
@@ -135,7 +151,8 @@ class Session:
         }
         ranges = {name: list(ends) for name, ends in RANGES.items()} | {"mode": list(MODES), "method": list(WAYS)}
         told = nothing | self._described
-        return told | {"desk": self._desk() | {"ranges": ranges}, "scene_url": None, "preparing": self._preparing}
+        url = None if self._scene is None else self._scene.url
+        return told | {"desk": self._desk() | {"ranges": ranges}, "scene_url": url, "preparing": self._preparing}
 
     def state(self) -> dict[str, Any] | None:
         """How the flight stands; None before the first step."""
@@ -212,10 +229,10 @@ class Session:
         if live.latest is not None:
             self._say(f"first light {time.monotonic() - self._began_s:.1f} s after the start")
             self._say_preparing(None)
-            if self._guided:  # after the first light, which it would keep waiting for a second
-                self._guide = LiveGuide(self._parts)
+            self._open_scene(live)
         while live.running and not self._over.wait(TENDED_S):
             self._follow(live)
+            self._show_scene()
         live.stop()
         live.join()
         self._follow(live)
@@ -240,7 +257,10 @@ class Session:
             self.seat.flown,
             lambda: pilot.velocity_W_m_s,
         )
-        self._guide, self._photos = None, 0
+        self._photos = 0
+        if self._guided:
+            self._say_preparing("looking for views of the target")
+            self._guide = LiveGuide(parts)
         live = LiveFlight(flown, folder=self._free_folder(), paced=self._paced, watch=lookout)
         self._pilot, self._lookout, self._live = pilot, lookout, live
         self._instruments = Instruments(self._gauges, lookout)
@@ -251,11 +271,34 @@ class Session:
         assert self._pilot is not None
         for note in self._pilot.notes():
             self._notes.append(Note(text=note.text, level=note.level, time_s=note.time_s))
+        for level, text in getattr(self._device, "notes", tuple)():
+            self._say(text, level)
+        fallback = None if live.latest is None else live.latest.command.fallback
+        if fallback != self._fallback:
+            self._fallback = fallback
+            self._say(f"fallback: {fallback}" if fallback else "no fallback any more", "warn" if fallback else "info")
         exposures = live.exposures
         for exposure in exposures[self._photos :]:
             self._photos += 1
             said = self._guide.saw(exposure.X_WC_est) if self._guide is not None else None
             self._say(f"photograph {self._photos}{f': {said}' if said else ''}", time_s=exposure.time_s)
+
+    def _open_scene(self, live: LiveFlight) -> None:
+        """Serve the 3D scene, after the first light, which it would keep waiting."""
+        if self._scene_wanted and self._scene is None and self._gauges is not None:
+            self._scene = open_scene(live.parts.vehicle, self._gauges.points_W_m)
+            self._scene_wanted = self._scene is not None
+            self._edition += 1
+
+    def _show_scene(self) -> None:
+        """Bring the scene up to date now and then, while somebody looks at the page."""
+        lookout, instruments, now_s = self._lookout, self._instruments, time.monotonic()
+        if self._scene is None or lookout is None or instruments is None or lookout.now is None:
+            return
+        if now_s < self._shown_s + SCENE_EVERY_S or not lookout.looked_at:
+            return
+        self._shown_s, step = now_s, lookout.now.step
+        self._scene.show(step.estimate.X_WB, lookout.now.thrusts_N, instruments.predicted_m_s)
 
     def _close(self, live: LiveFlight) -> None:
         """Say what became of a flight."""

@@ -18,8 +18,8 @@ from wakewise.cockpit.lookout import SAMPLED_S, WINDOW_S, Lookout, Moment
 from wakewise.geometry import euler_from_quat
 from wakewise.operation import Parts
 
-POINTS_EVERY = 5
-"""States between two looks at the water of every point: twice a second."""
+POINTS_EVERY, GAUGES_EVERY = 5, 2
+"""States between two looks at the water of every point, and at D: with a current these cost the most."""
 
 
 def described(parts: Parts, gauges: Gauges) -> dict[str, Any]:
@@ -62,7 +62,7 @@ def told_scenario(parts: Parts) -> dict[str, Any]:
 
 
 class Instruments:
-    """Makes a state of a moment; one for each flight.
+    """Makes a state of a moment; one for each flight. `predicted_m_s` is the wash at the gauges' points, as last read.
 
     Parameters
     ----------
@@ -72,18 +72,21 @@ class Instruments:
 
     def __init__(self, gauges: Gauges, lookout: Lookout) -> None:
         self._gauges, self._lookout = gauges, lookout
-        self._both: deque[tuple[float, float]] = deque(maxlen=round(WINDOW_S / SAMPLED_S))
-        self._predicted: list[float | None] = []
+        self._both: deque[tuple[float, float]] = deque(maxlen=round(WINDOW_S / SAMPLED_S / GAUGES_EVERY))
+        self.predicted_m_s = np.zeros(len(gauges.points_W_m))
+        self._now = (math.nan, math.nan)
         self._count = 0
 
     def read(self, now: Moment) -> dict[str, Any]:
         """How the flight stands, but for what desk, helm, coverage and photographs add."""
         step, estimate = now.step, now.step.estimate
-        flown, direct = self._gauges.disturbances(estimate, now.thrusts_N)
-        if math.isfinite(flown + direct):
-            self._both.append((flown, direct))
+        if self._count % GAUGES_EVERY == 0:
+            self._now = self._gauges.disturbances(estimate, now.thrusts_N)
+            if math.isfinite(sum(self._now)):
+                self._both.append(self._now)
+        flown, direct = self._now
         if self._count % POINTS_EVERY == 0:
-            self._predicted = rounded(self._gauges.predicted_m_s(estimate, now.thrusts_N), 4)
+            self.predicted_m_s = self._gauges.predicted_m_s(estimate, now.thrusts_N)
         self._count += 1
         roll, pitch, heading = (math.degrees(angle) for angle in euler_from_quat(estimate.X_WB.q))
         R_BW = estimate.X_WB.R.T
@@ -96,7 +99,7 @@ class Instruments:
             "disturbance": number(flown, 8),
             "direct_disturbance": number(direct, 8),
             "saved_pct": number(self.saved_pct, 1),
-            "predicted_m_s": self._predicted,
+            "predicted_m_s": rounded(self.predicted_m_s, 4),
             "true_m_s": None if now.true_m_s is None else rounded(now.true_m_s, 4),
             "depth_m": number(float(estimate.X_WB.p_m[2]), 3),
             "roll_deg": number(roll, 2),

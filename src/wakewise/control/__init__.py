@@ -11,6 +11,7 @@ an instant). `tracker.py` and `stability.py` are the PID and its margins, `loop.
 it, `spare.py` shares a plan's wrench out anew, `thrift.py` says how much power that may cost, `posture.py` and
 `poised.py` choose the body's attitude, `pulses.py` sends thrusts that no thruster can hold as pulses, `safeguard.py`
 sees to it that something that can be flown is sent in time, `intent.py` turns an operator's stick into goals,
+`easing.py` moves what must not jump, `switching.py` changes the method in flight with what `carried.py` hands over,
 `trim.py` advises ballast for a mission, `hover_trim.py` from a hover.
 """
 

@@ -72,7 +72,8 @@ class ControlSettings(Settings):
     person: int | None = Field(
         default=None,
         ge=0,
-        description="who flies `manual` or is the pilot `human`, by number; none = the one that the trial's seed draws",
+        description="who flies `manual`, or is the pilot `human` or `assisted`, by number; none = the one whom the "
+        "trial's seed draws",
     )
 
     def without_posture(self) -> ControlSettings:

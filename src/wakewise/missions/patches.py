@@ -14,10 +14,11 @@ from scipy.spatial import KDTree
 
 from wakewise.arrays import Array, BoolArray, IntArray, freeze
 from wakewise.errors import InputError
-from wakewise.evaluation import Crop
 
 PATCHES, SAMPLES_PER_PATCH = 800, 10
 """A patch of a coral of 15 cm is then a square of 1 cm, with samples 3.5 mm apart."""
+CLEARANCE_M = 0.010
+"""What stands less than this above the bed does not count, as in evaluations: sand touches it."""
 REACH_M = 0.003
 """A place counts as in the model when the model comes as near as this: what `completeness_pct` is defined by."""
 NORMAL_SHARE = 0.15
@@ -125,7 +126,7 @@ def patches_of(
     surface : Surface
         In the world: a target's mesh where it is believed to be, or a model's.
     bed_z_m : float, optional
-        Depth of the bed; what stands less than `Crop.clearance_m` above it does not count. None: all counts.
+        Depth of the bed; what stands less than `CLEARANCE_M` above it does not count. None: all counts.
     count, per_patch : int
         Patches, and samples of each in the mean; where the surface lies patchily there are somewhat fewer.
 
@@ -140,11 +141,11 @@ def patches_of(
     corners = np.asarray(surface.vertices_m, dtype=np.float64)[np.asarray(surface.faces)]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     twice_area = np.linalg.norm(cross, axis=1)
-    counts = Crop(bed_z_m=bed_z_m).above_bed(corners.mean(axis=1))
+    counts = 1.0 if bed_z_m is None else corners[:, :, 2].mean(axis=1) < bed_z_m - CLEARANCE_M
     total = np.cumsum(twice_area * counts)
     if len(corners) == 0 or not total[-1] > 0.0:
         raise InputError(
-            f"coverage: nothing of the target is {Crop().clearance_m:g} m or more above the bed, nothing to photograph"
+            f"coverage: nothing of the target is {CLEARANCE_M:g} m or more above the bed, nothing to photograph"
         )
     n = count * per_patch
     face = np.searchsorted(total, (np.arange(n) + rng.random(n)) / n * total[-1], side="right")

@@ -24,6 +24,7 @@ from wakewise.control.switching import Switched
 from wakewise.interfaces import BodyState, Controller, Goal
 from wakewise.missions import CameraAim
 from wakewise.operation.desk import WAYS, Desk, DeskState
+from wakewise.operation.keep_off import KeepOff
 from wakewise.operation.motion import Motion
 from wakewise.operation.scanning import Mission, Scan
 from wakewise.operation.steering import BRAKING_M_S2, Sphere, steered, turned
@@ -37,6 +38,8 @@ DIAL_PER_S = 2.0
 """How fast the obedience follows its dial, in natural logarithms a second: from end to end in 2.3 s."""
 MEAN_S, LEAST_M_S = 2.0, 0.01
 """Time over which deviations are averaged, and the mean command below which there is nothing to deviate from."""
+SAID_EVERY_S = 3.0
+"""What is in the way is said no more often."""
 KEPT = 200
 """Most actions and notes that are kept for somebody to take."""
 
@@ -65,6 +68,8 @@ class AssistedPilot:
         Time between two goals.
     begin : DeskState, optional
         What the desk is set to at time zero, for flights that are to be flown again; None: it stays as it is.
+    keep_off : KeepOff, optional
+        What the sticks do not run into.
 
     Attributes
     ----------
@@ -76,6 +81,9 @@ class AssistedPilot:
         Of the estimated velocity from the one asked for, rms over the last seconds; None while none is asked for.
     trace : TraceWriter
         Hands and desk of the whole flight, to be written beside its record.
+    state : DeskState
+        What was set at the last step: the controller goes by it, so that a change from another thread in the middle of
+        a step counts for the next one, and the record of a flight gives the same flight.
     motion : Motion
     """
 
@@ -85,8 +93,10 @@ class AssistedPilot:
     target_W_m: Array
     dt_s: float
     begin: DeskState | None = None
+    keep_off: KeepOff | None = None
     controls: Controls | None = None
     trace: TraceWriter = field(default_factory=TraceWriter)
+    state: DeskState = field(init=False)
     motion: Motion = field(init=False)
     _scan: Scan = field(init=False)
     _mode: str = "hold"
@@ -95,10 +105,12 @@ class AssistedPilot:
     _asked: float = 0.0
     _missed: float = 0.0
     _there: bool = True
+    _blocked_s: float = -math.inf
     _actions: deque[str] = field(default_factory=lambda: deque(maxlen=KEPT))
     _notes: deque[Note] = field(default_factory=lambda: deque(maxlen=KEPT))
 
     def __post_init__(self) -> None:
+        self.state = self.desk.state
         self.motion, self._scan = Motion.at(self.mission.route.body(0.0, self.aim)), Scan()
 
     @property
@@ -145,7 +157,7 @@ class AssistedPilot:
                 self._actions.append(action)
             else:
                 self.desk.press(action)
-        state = self._set(time_s)
+        state = self.state = self._set(time_s)
         self.trace.take(time_s, controls, vars(state))
         self._enter(state.mode, time_s, first)
         if not first:
@@ -177,6 +189,7 @@ class AssistedPilot:
         self.motion = Motion.at(estimate, self.mission.route.tilt(0.0, self.aim)[0])
         self._scan, self._mode = Scan(), "hold"
         self._sphere, self._asked, self._missed, self._there = Sphere(), 0.0, 0.0, True
+        self._blocked_s = -math.inf
         self._dial = math.log(self.desk.state.w_track / PAPER_W_TRACK)
         self.trace = TraceWriter()
         self._actions.clear()
@@ -221,9 +234,14 @@ class AssistedPilot:
         if self._mode != "scan":
             axes = controls.axes if self._mode == "operator" else CENTRED.axes
             motion = turned(self.motion, state, axes, self.target_W_m, self.aim, self.dt_s)
+            free = self._sphere.blocked_by is None
             self.motion, self._sphere = steered(
-                motion, self._sphere, state, axes, self.target_W_m, self.aim, estimate, self.dt_s
+                motion, self._sphere, state, axes, self.target_W_m, self.aim, estimate, self.dt_s, self.keep_off
             )
+            blocks = self._sphere.blocked_by
+            if blocks is not None and free and time_s > self._blocked_s + SAID_EVERY_S:
+                self._say("warn", f"{blocks} is in the way: stopping short of it", time_s)
+                self._blocked_s = time_s
             return
         before = self._scan.mission_s
         self._scan, self.motion = self.mission.step(self._scan, self.motion, self.dt_s)
@@ -265,7 +283,7 @@ def assisted(parts: Parts, source: ControlSource, desk: Desk, begin: DeskState |
     """
     pilot = assisted_pilot(parts, source, desk, begin)
     flown = parts.replace(pilot=pilot)
-    return flown.replace(controller=heeding(flown, lambda: desk.state.method))
+    return flown.replace(controller=heeding(flown, lambda: pilot.state.method))
 
 
 def assisted_pilot(parts: Parts, source: ControlSource, desk: Desk, begin: DeskState | None = None) -> AssistedPilot:
@@ -284,6 +302,9 @@ def assisted_pilot(parts: Parts, source: ControlSource, desk: Desk, begin: DeskS
         target_W_m=parts.found_target.centre_W_m,
         dt_s=1.0 / parts.control.rate_hz,
         begin=begin,
+        keep_off=KeepOff(
+            around=parts.surroundings, half_m=0.5 * np.array(parts.vehicle.size_m), braking_m_s2=BRAKING_M_S2
+        ),
     )
 
 

@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
+
+import numpy as np
 
 from wakewise.errors import InputError
 
@@ -136,3 +139,33 @@ def pressed(state: DeskState, action: str) -> DeskState:
 def regime(w_track: float) -> str:
     """What a `w_track` is for, in the paper's words: transit above 10, delicate below 2, work between."""
     return "transit" if w_track > TRANSIT else "delicate" if w_track < DELICATE else "work"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Meaning:
+    """What a `w_track` means: its regime, and in percent how far the vehicle deviates and how much wash it saves.
+
+    The percentages are None where nobody has measured them.
+    """
+
+    regime: str
+    deviation_pct: float | None = None
+    saved_pct: float | None = None
+
+
+def meaning(w_track: float, measured: Mapping[float, tuple[float, float]] | None = None) -> Meaning:
+    """What a `w_track` means, from what was measured.
+
+    Parameters
+    ----------
+    w_track : float
+    measured : mapping, optional
+        By w_track: velocity deviation and disturbance saved against direct allocation, in percent. In between they are
+        interpolated over the logarithm, beyond they stay as at the end.
+    """
+    if not measured:
+        return Meaning(regime=regime(w_track))
+    at = sorted(measured)
+    where = np.log(at)
+    deviation, saved = (float(np.interp(math.log(w_track), where, [measured[w][k] for w in at])) for k in (0, 1))
+    return Meaning(regime=regime(w_track), deviation_pct=deviation, saved_pct=saved)

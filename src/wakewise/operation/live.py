@@ -90,6 +90,12 @@ class LiveFlight:
         self.preparing = "begins"
         self._thread.start()
 
+    def run(self) -> None:
+        """Fly in this thread, from preparation to folder; raises what ended the flight."""
+        self._run()
+        if self.fault is not None:
+            raise self.fault
+
     def capture(self) -> None:
         """Take a photograph at the next step."""
         self._shutter.ask()

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wakewise.errors import InputError
 from wakewise.interfaces import Pilot
 from wakewise.missions import RoutePilot
 from wakewise.operation.helm import HumanPilot
+from wakewise.pilot.sources import hands_from
 from wakewise.plugins import find
 
 if TYPE_CHECKING:
@@ -31,12 +33,45 @@ def human_pilot(parts: Parts) -> HumanPilot:
     )
 
 
-def operator_pilot(parts: Parts) -> Pilot:  # noqa: ARG001
-    """`operator`: a person's hands, which a scenario's file cannot hold."""
-    raise InputError("pilot: operator, flies by hand: take `wakewise cockpit`, or a recorded flight's controls")
+def operator_pilot(parts: Parts) -> Pilot:
+    """`operator`: hands at the desk's sticks, as a file tells of them.
+
+    Raises
+    ------
+    InputError
+        If the scenario names no such file: a person's own hands no scenario can hold.
+    """
+    from wakewise.operation.assisted import assisted_pilot
+    from wakewise.operation.desk import Desk
+
+    if parts.scenario.controls is None:
+        raise InputError("pilot: operator, flies by hand: take `wakewise cockpit`, or name a record in controls")
+    return assisted_pilot(parts, hands_from(Path(parts.scenario.controls)), Desk())
 
 
-PILOTS: dict[str, Callable[[Parts], Pilot]] = {"route": route_pilot, "human": human_pilot, "operator": operator_pilot}
+def assisted_person(parts: Parts) -> Pilot:
+    """`assisted`: the person of `human` at the desk's sticks, camera kept on the target, brakes and all."""
+    from wakewise.operation.assisted import assisted_pilot
+    from wakewise.operation.desk import Desk, DeskState
+    from wakewise.operation.hands import PersonsHands
+
+    hands = PersonsHands(
+        wish=route_pilot(parts),
+        X_BC=parts.vehicle.X_BC,
+        target_W_m=parts.target.centre_W_m,
+        dt_s=1.0 / parts.control.rate_hz,
+        seed=parts.control.person or 0,
+    )
+    begin = DeskState(mode="operator")
+    return assisted_pilot(parts, hands, Desk(begin), begin)
+
+
+PILOTS: dict[str, Callable[[Parts], Pilot]] = {
+    "route": route_pilot,
+    "human": human_pilot,
+    "assisted": assisted_person,
+    "operator": operator_pilot,
+}
 """Our own pilots: what makes each from the parts of a flight."""
 
 

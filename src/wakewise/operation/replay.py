@@ -14,7 +14,12 @@ from wakewise.operation.live import LiveFlight
 from wakewise.operation.parts import Parts
 from wakewise.operation.scenario import Scenario, read_scenario
 from wakewise.operation.shutter import Shutter
-from wakewise.pilot.trace import TRACE_FILE, read_trace
+from wakewise.pilot.script import Script
+from wakewise.pilot.sources import hands_from
+from wakewise.pilot.trace import TRACE_FILE, Trace, read_trace
+
+AFTER_S = 3.0
+"""How long a flight goes on after the last entry of a script; estimate: from full stick to rest takes 1.5 s."""
 
 
 class RecordedShutter(Shutter):
@@ -39,6 +44,40 @@ class RecordedShutter(Shutter):
         if number >= len(self._opened_s) or not np.isclose(self._opened_s[number], time_s, rtol=0.0, atol=0.5 * dt_s):
             return None
         return time_s
+
+
+class UntilShutter(Shutter):
+    """One that ends a flight at `end_s`, if hands did not before."""
+
+    def __init__(self, parts: Parts, end_s: float) -> None:
+        super().__init__(parts)
+        self._end_s = end_s
+
+    def heed(self) -> None:
+        """Take in what hands asked for since, and look at the clock."""
+        super().heed()
+        self.over |= self.time_s >= self._end_s - 1e-9
+
+
+def fly_hands(parts: Parts, folder: Path) -> None:
+    """Fly the hands that a scenario of the pilot `operator` names, as fast as it goes, into the folder of a trial.
+
+    A record ends with its flight, a script `AFTER_S` after its last entry, unless "stop" is pressed before.
+
+    Raises
+    ------
+    InputError
+        If it names none, or they cannot be read.
+    """
+    if parts.scenario.controls is None:
+        _ = parts.pilot  # which says so
+        return
+    hands = hands_from(Path(parts.scenario.controls))
+    end_s = hands.end_s if isinstance(hands, Trace) else 0.0
+    if isinstance(hands, Script):
+        end_s = hands.moments[-1].at_s + AFTER_S
+    flown = assisted(parts, hands, Desk())
+    LiveFlight(flown, folder=folder, paced=False, shutter=UntilShutter(flown, end_s)).run()
 
 
 def replay_of(folder: Path, out: Path | None, parts: Parts | Scenario | None = None) -> LiveFlight:

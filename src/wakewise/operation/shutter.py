@@ -27,6 +27,7 @@ class Shutter:
         self._parts = parts
         self._asked = threading.Event()
         self._last_s = -math.inf
+        self.time_s = 0.0
         self.over = False
 
     def ask(self) -> None:
@@ -46,6 +47,7 @@ class Shutter:
 
     def shutter_s(self, number: int, time_s: float, dt_s: float) -> float | None:  # noqa: ARG002
         """Now, if a photograph was asked for and the last one is long enough ago."""
+        self.time_s = time_s
         self.heed()
         if not self._asked.is_set() or time_s < self._last_s + BETWEEN_S - 1e-9:
             return None

@@ -18,6 +18,7 @@ from wakewise.interfaces import BodyState
 from wakewise.missions import CameraAim
 from wakewise.operation.assists import elevation_rad, level_frame, sphere_frame, watching
 from wakewise.operation.desk import DeskState
+from wakewise.operation.keep_off import KeepOff
 from wakewise.operation.motion import STEEPEST_RAD, Attitude, Motion, followed, tilted, tilting, turning
 
 FASTER_M_S2, BRAKING_M_S2 = 0.15, 0.2
@@ -38,12 +39,14 @@ TILT_RAD_S = math.radians(40.0)
 class Sphere:
     """The frame of the sticks, shape (3, 3), as it was a step ago, and the orbit's radius where one is kept.
 
-    `frame` is None where nobody steered before, and `orbits` tells whether it is that of an orbit.
+    `frame` is None where nobody steered before, and `orbits` tells whether it is that of an orbit. `blocked_by` is
+    what is in the way, None if nothing.
     """
 
     frame: Array | None = None
     orbits: bool = False
     range_m: float | None = None
+    blocked_by: str | None = None
 
 
 def turned(motion: Motion, state: DeskState, axes: Array, target_W_m: Array, aim: CameraAim, dt_s: float) -> Motion:
@@ -86,6 +89,7 @@ def steered(
     aim: CameraAim,
     estimate: BodyState,
     dt_s: float,
+    keep_off: KeepOff | None = None,
 ) -> tuple[Motion, Sphere]:
     """The motion with velocity and place a step on, and what the sticks go by at the next.
 
@@ -106,11 +110,16 @@ def steered(
         wish[0], range_m = _at_range(wish[0], now[0], sphere.range_m, float(np.linalg.norm(eye - target_W_m)))
     harder = BRAKING_M_S2 if np.linalg.norm(wish) < np.linalg.norm(now) else FASTER_M_S2
     velocity = frame @ slewed(now, wish, dt_s, harder) - swing
+    blocked_by = None
+    if keep_off is not None:
+        velocity, _ = keep_off.allowed(motion.X_WB, velocity, motion.omega_B_rad_s)
+        if wish.any():  # what is asked for, not what is left of it by now, is what something is in the way of
+            _, blocked_by = keep_off.allowed(motion.X_WB, frame @ wish - swing, motion.omega_B_rad_s)
     # Near the zenith the frame turns faster than a velocity may.
     velocity = slewed(motion.velocity_W_m_s, velocity, dt_s, HARDEST_M_S2)
     place = led(motion.place_W_m, 0.5 * (motion.velocity_W_m_s + velocity), estimate, dt_s)
     moved = replace(motion, place_W_m=place, velocity_W_m_s=velocity)
-    return moved, Sphere(frame=frame, orbits=state.orbit, range_m=range_m)
+    return moved, Sphere(frame=frame, orbits=state.orbit, range_m=range_m, blocked_by=blocked_by)
 
 
 def _at_range(wish: float, now: float, kept_m: float | None, range_m: float) -> tuple[float, float | None]:

@@ -10,7 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wakewise.errors import InputError
+from wakewise.errors import EnvironmentFailure, InputError
 from wakewise.files import write_text
 from wakewise.geometry import Pose
 from wakewise.operation.foreign import is_ours
@@ -37,15 +37,20 @@ def as_flown(parts: Parts) -> Scenario:
     return scenario.model_copy(update=told)
 
 
-def claim(folder: Path, scenario: Scenario) -> None:
-    """Write scenario.yaml, or check that the one in the folder is the same trial.
+def check_place(folder: Path, scenario: Scenario) -> None:
+    """Refuse a folder in which the trial cannot be, before seconds are spent on whether it can be flown.
 
     Raises
     ------
     InputError
         If the folder holds another trial, or is a file.
+    EnvironmentFailure
+        If it would lie below a file.
     """
     path = folder / "scenario.yaml"
+    above = next((place for place in folder.parents if place.exists()), None)
+    if above is not None and not above.is_dir():
+        raise EnvironmentFailure(f"{above}: Not a directory")
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--out {folder}: is a file, must be a folder or not exist")
     if path.exists():
@@ -54,6 +59,13 @@ def claim(folder: Path, scenario: Scenario) -> None:
             raise InputError(
                 f"--out {folder}: holds another trial ({'; '.join(changed[:3])}); give another --out or remove it"
             )
+
+
+def claim(folder: Path, scenario: Scenario) -> None:
+    """Write scenario.yaml, or check that the one in the folder is the same trial; raises as `check_place`."""
+    check_place(folder, scenario)
+    path = folder / "scenario.yaml"
+    if path.exists():
         return
     packages = ("wakewise", "numpy", "numba", "pycolmap", "opencv-python-headless", "embreex")
     versions = {"python": platform.python_version()} | {name: version(name) for name in packages}

@@ -3,8 +3,8 @@
 Start reading in `human.py` (what is seen late and roughly becomes pushes on two sticks); `people.py` holds the ranges
 that each seed draws a person from, with their sources; `controls.py` is what hands do, whatever they hold: a script
 (`script.py`), a record (`trace.py`), keys (`keyboard.py`), a gamepad (`gamepad.py`, the only file that knows SDL, and
-`pad_mapping.py`). What the sticks move is not known here: `manual` in `control` flies a vehicle with them, the pilot
-`human` of `operation` any method.
+`pad_mapping.py`); `sources.py` reads script and record. What the sticks move is not known here: `manual` in `control`
+flies a vehicle with them, the pilot `human` of `operation` any method.
 """
 
 from wakewise.pilot.controls import ACTIONS, CENTRED, CONTROL_AXES, Controls, ControlSource

@@ -9,6 +9,7 @@ from pathlib import Path
 from wakewise.evaluation.surface import SUCCESS_COMPLETENESS_PCT, SUCCESS_RMSE_MM
 from wakewise.files import write_text
 from wakewise.reports import figures
+from wakewise.reports.coverage import coverage_html
 from wakewise.reports.draft import Draft
 from wakewise.reports.limits import limits_section
 from wakewise.reports.looks import colours_html, film_html
@@ -51,6 +52,7 @@ def begin_report(trial: Path, draft: Draft, missing: str) -> None:
     """
     read = read_trial(trial)
     _seen_photographs(read, draft)
+    coverage_html(read, draft)
     _flown(read, draft)
     _water(read, draft)
     before_mesh(read, draft)
@@ -208,7 +210,10 @@ def _seen(trial: Trial, draft: Draft) -> str:
         "appears in the picture (variance of the Laplacian), so compare it between photographs of the same orbit."
     )
     return section(
-        "seen", "What was seen", lead, _seen_photographs(trial, draft) + draft.once("seen", lambda: colours_html(trial))
+        "seen",
+        "What was seen",
+        lead,
+        _seen_photographs(trial, draft) + coverage_html(trial, draft) + draft.once("seen", lambda: colours_html(trial)),
     )
 
 

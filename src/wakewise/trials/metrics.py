@@ -35,6 +35,14 @@ _FIGURES: dict[str, tuple[str, str, Better]] = {
                            "yields was photographed, instead of its shape at rest in still water", "less"),
     "f_score": ("%", "harmonic mean of precision and recall at 3 mm (Tanks and Temples), 0 to 100", "more"),
     **{key: (*SURFACE_DEFINITIONS[key], better) for key, better in _SURFACE_BETTER.items()},
+    "coverage_predicted_pct": ("%", "completeness_pct as the coverage guide expects it before leaving: share of the "
+                               "target, as it was surveyed, that photographs saw well from where they were estimated",
+                               "more"),
+    "coverage_sure_pct": ("%", "the same with a photograph to spare: the lower end of what is expected", "more"),
+    "coverage_agreement_pct": ("%", "share of the target's patches, of about 1 cm, of which the guide said rightly "
+                               "whether most of it is within 3 mm of the model", "more"),
+    "coverage_trivial_pct": ("%", "the same of the better of two guesses without a guide: all of it, or nothing",
+                             "none"),
     "scale_error_pct": ("%", "by how much the model is too large, less than 0: too small; from the spread of its "
                         "camera centres against the true ones", "none"),
     "rmse_scaled_mm": ("mm", "rmse_mm of the model brought to the truth's place and size by the true camera centres",

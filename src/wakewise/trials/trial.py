@@ -13,7 +13,7 @@ import numpy as np
 import polars as pl
 
 from wakewise.errors import InputError, StageError
-from wakewise.evaluation import SWAY_FIGURES, Crop, evaluate_surface, flight_figures
+from wakewise.evaluation import SWAY_FIGURES, Crop, compare_surface, evaluate_surface, flight_figures
 from wakewise.extras import need
 from wakewise.files import write_json
 from wakewise.geometry import matrix_from_quat
@@ -29,10 +29,12 @@ from wakewise.operation import (
 from wakewise.operation.flight_log import has_parts
 from wakewise.operation.flying import FLIGHT_JOBS
 from wakewise.operation.live_folder import gather
-from wakewise.operation.trial_folder import as_flown, claim, write_plan
+from wakewise.operation.replay import fly_hands
+from wakewise.operation.trial_folder import BY_HAND, as_flown, check_place, claim, write_plan
 from wakewise.processes import alone
 from wakewise.reconstruction import read_cloud, read_lens, reconstruct
 from wakewise.targets import Mesh
+from wakewise.trials.coverage import FROM_MODEL, coverage_figures
 from wakewise.trials.metrics import Figures, Gathering, comparison
 from wakewise.trials.size import SIZE_FIGURES, size_figures
 from wakewise.trials.stages import Ledger, Quiet, Watch, of_the_computer
@@ -65,6 +67,9 @@ _SURFACE_FIGURES = (
     "outside_pct",
 )
 _MODEL_FIGURES = ("reprojection_px", "cameras_rmse_mm", "features_per_image", "inlier_matches", "mapping")
+
+FEWEST_PHOTOS = 3
+"""A model is put in its place by the estimates of at least as many cameras."""
 
 REGION_SHARE = 1.25
 """What is reconstructed is a little more than the target: estimated cameras put it some millimetres off its place."""
@@ -100,6 +105,7 @@ def run_trial(
     watch = watch or Quiet()
     parts = flight if isinstance(flight, Parts) else flight.parts()
     scenario = as_flown(parts)
+    check_place(folder, scenario)
     if not is_warm(JOBS):
         with watch.stage("compile") as progress:
             warm(JOBS, progress)
@@ -151,7 +157,11 @@ def _is_flown(folder: Path) -> bool:
 
 def _fly(parts: Parts, folder: Path, darkroom: Darkroom, progress: Callable[..., None]) -> None:
     """Fly, or put together what a flight by hand left that was cut off."""
-    if not gather(parts, folder):
+    if gather(parts, folder):
+        return
+    if parts.scenario.pilot == BY_HAND and "pilot" not in parts.given:
+        fly_hands(parts, folder)
+    else:
         fly_trial(parts, folder, progress, darkroom.take)
 
 
@@ -202,6 +212,10 @@ def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None])
     photos = pl.read_csv(folder / "images.csv")
     names = photos["name"].to_list()
     centres = photos.select("est_x_m", "est_y_m", "est_z_m").to_numpy()
+    if len(names) < FEWEST_PHOTOS:
+        failure = f"{len(names)} photographs were taken, at least {FEWEST_PHOTOS} are needed"
+        write_json(folder / "model.json", {"figures": {}, "failure": failure})
+        return
     rotations = matrix_from_quat(photos.select("est_qw", "est_qx", "est_qy", "est_qz").to_numpy())
     try:
         model = reconstruct(
@@ -236,7 +250,8 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
     gathering.add(flight_figures(flown))
     gathering.missing(("exceedance_ambient_pct",), "the water is still without the vehicle")
     add_yardsticks(gathering, parts, flown)
-    solve_ms = pl.read_parquet(folder / "timings.parquet")["solve_ms"].to_numpy()[50:]
+    solve_ms = pl.read_parquet(folder / "timings.parquet")["solve_ms"].to_numpy()
+    solve_ms = solve_ms[min(50, len(solve_ms) // 2) :]  # the first ones load what later ones find loaded
     gathering.add({"solve_ms_median": float(np.median(solve_ms)), "solve_ms_p99": float(np.percentile(solve_ms, 99))})
     photos = pl.read_csv(folder / "images.csv")
     gathering.add({"images": len(photos)})
@@ -246,13 +261,14 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
     gathering.add({key: summary.get(key) for key in _MODEL_FIGURES})
     if failure is None:
         try:
-            score = evaluate_surface(
+            compared = compare_surface(
                 read_cloud(folder / "dense.ply").points_m,
                 parts.target.mesh,
                 crop=Crop(bed_z_m=parts.target.bed_z_m),
                 camera_centres_W_m=photos.select("true_x_m", "true_y_m", "true_z_m").to_numpy(),
             )
-            gathering.add({key: getattr(score, key) for key in (*_SURFACE_FIGURES, "success")})
+            gathering.add(coverage_figures(parts, photos, compared.points_W_m))
+            gathering.add({key: getattr(compared.score, key) for key in (*_SURFACE_FIGURES, "success")})
             gathering.add({"rmse_mean_shape_mm": _rmse_mean_shape_mm(parts, folder)})
             gathering.add(_size(parts, folder, photos))
         except StageError as fault:
@@ -262,8 +278,8 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
     elif failure is not None:
         gathering.missing(("rmse_mean_shape_mm",), f"no model: {failure}")
     if failure is not None:
-        gathering.add({"success": False})
-        gathering.missing((*_SURFACE_FIGURES, *_MODEL_FIGURES, *SIZE_FIGURES), f"no model: {failure}")
+        gathering.add({"success": False} | coverage_figures(parts, photos, None))
+        gathering.missing((*_SURFACE_FIGURES, *FROM_MODEL, *_MODEL_FIGURES, *SIZE_FIGURES), f"no model: {failure}")
     return {"figures": gathering.figures, "reasons": gathering.reasons}
 
 

@@ -33,8 +33,8 @@ const desk = new Desk(helm);
 const thrusts = new Thrusts($("thrusts"));
 const target = new Target($("target"), $("scale"));
 const coverage = new Coverage({ canvas: $("patches"), share: $("share"), next: $("next") });
-const disturbances = new Plot($("plot-disturbance"), [{ ink: "--s1" }, { ink: "--s2", dashed: true }], 1);
-const deviations = new Plot($("plot-deviation"), [{ ink: "--s1" }], 10);
+const disturbances = new Plot($("plot-disturbance"), [{ ink: "--s1" }, { ink: "--s2", dashed: true }], { unit: "D, mm²/s²", least: 1000, decades: 4 });
+const deviations = new Plot($("plot-deviation"), [{ ink: "--s1" }], { unit: "% of the command", least: 10, most: 100 });
 new Camera({ canvas: $("camera"), empty: $("no-picture"), late: $("late"), link });
 
 const now = { link: "connecting", said: "", mode: "hold", preparing: "" };
@@ -86,16 +86,28 @@ function changeHelm() {
 
 // ---- what comes in
 
+let shots = Infinity;
+
+/** A photograph was taken: the picture blinks. */
+function flash() {
+  const view = document.querySelector(".view");
+  view.classList.add("shot");
+  setTimeout(() => view.classList.remove("shot"), 220);
+}
+
 const takers = {
   welcome(message) {
+    // Only now is there anything to show: until the welcome, the page is connecting.
+    linked("up", "");
     helm.id = message.id ?? null;
     now.preparing = words(message.preparing);
     // While something is made there is no state to hear.
     link.expectant = !now.preparing;
+    $("no-picture").textContent = now.preparing ? `Preparing: ${now.preparing}` : "No picture yet";
     const scenario = message.scenario ?? {};
-    const world = [scenario.world, message.vehicle?.name].map((one) => words(one, 40)).filter(Boolean).join(" · ");
-    $("scenario").textContent = words(scenario.name, 40) || world || "cockpit";
-    $("scenario").title = [world, words(scenario.method, 40)].filter(Boolean).join(" · ");
+    const parts = [scenario.name, scenario.world, message.vehicle?.name].map((one) => words(one, 40)).filter(Boolean);
+    $("scenario").textContent = parts.join(" · ") || "cockpit";
+    $("scenario").title = [...parts, words(scenario.target, 40)].filter(Boolean).join(" · ");
     thrusts.place(message.vehicle?.thrusters);
     target.place(message.target);
     desk.place(message.desk);
@@ -114,6 +126,8 @@ const takers = {
     $("time").textContent = clock(message.time_s);
     const watching = finite(message.spectators);
     $("watching").textContent = watching ? `${watching} watching` : "";
+    if (finite(message.photos) > shots) flash();
+    shots = finite(message.photos) ?? shots;
     figures(message);
     thrusts.update(message.thrusts_N);
     target.update(message);
@@ -141,7 +155,6 @@ link.addEventListener("message", (event) => {
     console.warn(`${event.detail.type} could not be shown`, error);
   }
 });
-link.addEventListener("up", () => linked("up", ""));
 link.addEventListener("heard", () => linked("up", ""));
 link.addEventListener("silent", () => linked("silent", ""));
 link.addEventListener("refused", (event) => linked("refused", words(event.detail.why) || "open the address that the command printed"));
@@ -185,7 +198,10 @@ $("end").addEventListener("click", () => {
   $("end-box").returnValue = "keep";
   $("end-box").showModal();
 });
-$("end-box").addEventListener("close", () => { if ($("end-box").returnValue === "end") act("stop"); });
+$("end-box").addEventListener("close", () => {
+  if ($("end-box").returnValue === "end") act("stop");
+  if ($("end-box").returnValue === "hold") stop();
+});
 
 function openHelp() {
   sticks.cut();
@@ -251,6 +267,12 @@ $("scene-button").addEventListener("click", () => {
   $("scene-button").setAttribute("aria-pressed", String(open));
   $("scene-button").textContent = open ? "Camera" : "3D scene";
 });
+
+// A phone has no room for gain beside the modes.
+const narrow = matchMedia("(max-width: 720px)");
+const placeGain = () => (narrow.matches ? document.querySelector(".desk") : document.querySelector(".acts")).append(document.querySelector(".finer"));
+narrow.addEventListener("change", placeGain);
+placeGain();
 
 const thumbs = matchMedia("(pointer: coarse)");
 const offerThumbs = () => touch.show(asked.has("touch") || thumbs.matches);

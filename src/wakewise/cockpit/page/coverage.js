@@ -27,8 +27,7 @@ export class Coverage {
     }
     if (Array.isArray(coverage.patches)) this.#patches = numbers(coverage.patches).slice(0, 2000);
     const share = finite(coverage.share);
-    const well = this.#patches.filter((v) => v !== null && v >= 0.5).length;
-    const text = share === null ? "–" : `${shown(100 * share, 0, "%")}${this.#patches.length ? `, ${well} of ${this.#patches.length} patches` : ""}`;
+    const text = share === null ? "–" : `${shown(100 * share, 0, "%")}${this.#patches.length ? ` of ${this.#patches.length} patches` : ""}`;
     if (this.#share.textContent !== text) this.#share.textContent = text;
     const next = coverage.next;
     this.#next.hidden = !next;

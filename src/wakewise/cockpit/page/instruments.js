@@ -108,5 +108,5 @@ export function wayTo(next, state) {
   const level = Math.hypot(north, east);
   const angle_deg = (Math.atan2(east, north) * 180) / Math.PI - heading;
   const way = `${shown(Math.hypot(level, down), 2, "m")}${Math.abs(down) > 0.05 ? `, ${shown(Math.abs(down), 2, "m")} ${down > 0 ? "deeper" : "higher"}` : ""}`;
-  return { angle_deg: level > 0.03 ? angle_deg : null, said: said ? `${said} (${way})` : way };
+  return { angle_deg: level > 0.03 ? angle_deg : null, said: said || way };
 }

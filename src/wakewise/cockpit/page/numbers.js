@@ -21,6 +21,7 @@ export function brief(value, unit) {
   const number = finite(value);
   if (number === null) return UNKNOWN;
   const size = Math.abs(number);
+  if (size >= 1e4) return shown(number / 1e3, size >= 1e5 ? 0 : 1, `k${unit ? `\u202f${unit}` : ""}`).replace("\u202fk", "k");
   return shown(number, size >= 100 ? 0 : size >= 10 ? 1 : 2, unit);
 }
 

@@ -1,22 +1,22 @@
 // Lines over the last minute of the flight.
 
 import { FONT, fit, ink, soon } from "./draw.js";
-import { finite } from "./numbers.js";
+import { clip, finite } from "./numbers.js";
 
 const SPAN_S = 60;
-const LEFT = 34, BOTTOM = 17, TOP = 6, RIGHT = 6;
+const LEFT = 34, BOTTOM = 17, TOP = 15, RIGHT = 6;
 
 export class Plot {
   #canvas;
   #lines;
   #rows = [];
-  #least;
+  #axis;
 
-  /** `lines`: [{ ink, dashed }]; `least`: the axis reaches at least this far. */
-  constructor(canvas, lines, least) {
+  /** `lines`: [{ ink, dashed }]; `axis`: { unit, least, most } of its end, and `decades` for a scale by powers of ten. */
+  constructor(canvas, lines, axis) {
     this.#canvas = canvas;
     this.#lines = lines;
-    this.#least = least;
+    this.#axis = axis;
     new ResizeObserver(() => this.repaint()).observe(canvas);
   }
 
@@ -38,28 +38,43 @@ export class Plot {
     soon(this.#paint);
   }
 
+  /** Ticks from the bottom up, and the share of the height at which a value lies. */
+  #scale() {
+    const { least, most = Infinity, decades } = this.#axis;
+    const highest = Math.max(least, ...this.#rows.flatMap((row) => row.slice(1).filter((v) => v !== null)));
+    if (!decades) {
+      const top = Math.min(ceiling(highest), most);
+      return { ticks: [0, top / 2, top], share: (v) => clip(v / top, 0, 1) };
+    }
+    const top = Math.ceil(Math.log10(highest)), bottom = top - decades;
+    const ticks = Array.from({ length: decades + 1 }, (_, k) => 10 ** (bottom + k));
+    return { ticks, share: (v) => (v > 0 ? clip((Math.log10(v) - bottom) / decades, 0, 1) : 0) };
+  }
+
   #paint = () => {
     const on = fit(this.#canvas);
     if (!on) return;
     const { context, width, height } = on;
-    const top = ceiling(Math.max(this.#least, ...this.#rows.flatMap((row) => row.slice(1).filter((v) => v !== null))));
+    const { ticks, share } = this.#scale();
     const end = this.#rows.length ? this.#rows[this.#rows.length - 1][0] : 0;
     const x = (t) => LEFT + (1 + (t - end) / SPAN_S) * (width - LEFT - RIGHT);
-    const y = (v) => height - BOTTOM - (Math.max(v, 0) / top) * (height - BOTTOM - TOP);
+    const y = (v) => height - BOTTOM - share(v) * (height - BOTTOM - TOP);
     context.font = FONT;
     context.strokeStyle = ink("--line");
     context.fillStyle = ink("--muted");
     context.lineWidth = 1;
     context.textBaseline = "middle";
     context.textAlign = "right";
-    for (const v of [0, top / 2, top]) {
+    for (const v of ticks) {
       context.beginPath();
       context.moveTo(LEFT, Math.round(y(v)) + 0.5);
       context.lineTo(width - RIGHT, Math.round(y(v)) + 0.5);
       context.stroke();
-      context.fillText(String(Number(v.toPrecision(3))), LEFT - 5, y(v));
+      context.fillText(short(v), LEFT - 5, y(v));
     }
     context.textBaseline = "alphabetic";
+    context.textAlign = "left";
+    context.fillText(this.#axis.unit, LEFT + 3, TOP - 4);
     for (const [t, align] of [[-60, "left"], [-30, "center"], [0, "right"]]) {
       context.textAlign = align;
       context.fillText(t ? `−${-t} s` : "now", x(end + t), height - 3);
@@ -92,4 +107,10 @@ function ceiling(value) {
   if (!(value > 0) || !Number.isFinite(value)) return 1;
   const power = 10 ** Math.floor(Math.log10(value));
   return power * [1, 2, 5, 10].find((step) => step * power >= value * 0.999);
+}
+
+/** 10k for ten thousand: an axis has little room. */
+function short(value) {
+  for (const [size, sign] of [[1e9, "G"], [1e6, "M"], [1e3, "k"]]) if (value >= size) return `${Number((value / size).toPrecision(3))}${sign}`;
+  return String(Number(value.toPrecision(3)));
 }

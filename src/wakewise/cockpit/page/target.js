@@ -3,13 +3,18 @@
 import { FONT, blend, fit, ink, soon } from "./draw.js";
 import { numbers, point } from "./numbers.js";
 
-/** Fixed, so that a colour means the same in every flight; the root spreads out what is gentle. */
-const MOST_M_S = 0.03;
-const SPEED = [[0, [108, 146, 160]], [0.35, [226, 190, 104]], [0.65, [224, 116, 60]], [1, [178, 34, 62]]];
+/** Fixed, so that a colour means the same in every flight; a logarithm from 1 mm/s on, for gentle and rough alike. */
+const MOST_MM_S = 100;
+const SPEED = [[0, [108, 146, 160]], [0.3, [226, 190, 104]], [0.6, [224, 116, 60]], [1, [178, 34, 62]]];
 const APART = [[0, [38, 120, 178]], [0.5, [158, 168, 172]], [1, [203, 82, 40]]];
-const TICKS_MM_S = [0, 1, 3, 10, 30];
+const TICKS_MM_S = [0, 1, 3, 10, 30, 100];
 const ACROSS_MM_S = [-10, 0, 10];
 const MARGIN = 0.86;
+
+/** Where a speed lies on the scale, 0 to 1. */
+function share(mm_s) {
+  return Math.log1p(Math.max(mm_s, 0)) / Math.log1p(MOST_MM_S);
+}
 
 export class Target {
   #canvas;
@@ -71,7 +76,7 @@ export class Target {
   #colour(value) {
     if (value == null) return ink("--line");
     if (this.show === "difference") return blend(APART, 0.5 + 0.5 * (1e3 * value) / ACROSS_MM_S[2]);
-    return blend(SPEED, Math.sqrt(Math.max(value, 0) / MOST_M_S));
+    return blend(SPEED, share(1e3 * value));
   }
 
   #paint = () => {
@@ -130,9 +135,9 @@ export class Target {
     context.font = FONT;
     context.fillStyle = ink("--muted");
     for (const tick of apart ? ACROSS_MM_S : TICKS_MM_S) {
-      const share = apart ? 0.5 + 0.05 * tick : Math.sqrt(tick / (1e3 * MOST_M_S));
-      context.textAlign = share < 0.02 ? "left" : share > 0.98 ? "right" : "center";
-      context.fillText(String(tick).replace("-", "−"), share * width, 20);
+      const at = apart ? 0.5 + 0.05 * tick : share(tick);
+      context.textAlign = at < 0.02 ? "left" : at > 0.98 ? "right" : "center";
+      context.fillText(String(tick).replace("-", "−"), at * width, 20);
     }
   }
 

@@ -1,0 +1,52 @@
+"""The live picture comes from a process of its own, which may be late, and may end, without harm."""
+
+from __future__ import annotations
+
+import time
+
+import cv2
+import numpy as np
+import pytest
+
+from wakewise.cockpit.frames import LiveCamera, View
+from wakewise.errors import StageError
+from wakewise.imaging import photograph
+from wakewise.operation import Scenario
+
+WIDTH_PX, HEIGHT_PX = 160, 120
+
+
+@pytest.mark.slow
+def test_a_picture_is_the_photograph_but_for_what_is_left_out() -> None:
+    """None comes before the scene is lit; then the two differ by noise, flakes and samples: a few grey levels.
+
+    A process that was killed is told of, one that was closed is quiet.
+    """
+    scenario = Scenario.preset("quick")
+    camera = LiveCamera(scenario, width_px=WIDTH_PX)
+    parts = scenario.parts()
+    view = View(X_WC=parts.start.X_WB @ parts.vehicle.X_BC)
+    assert camera.draw(view) is None
+    camera.start()
+    try:
+        assert camera.draw(view, timeout_s=0.0) is None
+        settings = parts.scenario.imaging.model_copy(update={"width": WIDTH_PX, "height": HEIGHT_PX})
+        rng = np.random.default_rng(1)
+        photo = photograph(parts.scene, settings.camera(), (view.X_WC,), None, settings, rng).image
+        end_s = time.monotonic() + 120.0
+        while (jpeg := camera.draw(view, timeout_s=1.0)) is None:
+            assert time.monotonic() < end_s
+            time.sleep(0.1)
+        picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)[..., ::-1]
+        assert picture.shape == (HEIGHT_PX, WIDTH_PX, 3)
+        off = np.abs(picture.astype(np.float64) - photo.astype(np.float64))
+        assert float(np.median(off)) < 4.0
+        assert float(off.mean()) < 6.0
+        assert camera._process is not None
+        camera._process.kill()
+        with pytest.raises(StageError, match="has ended"):
+            for _ in range(20):
+                camera.draw(view, timeout_s=1.0)
+    finally:
+        camera.close()
+    assert camera.draw(view) is None
