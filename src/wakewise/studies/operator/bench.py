@@ -125,7 +125,7 @@ class Told:
     def table(self, method: str, w_track: float, world: str | None = None, pilot: str | None = None) -> dict[str, Any]:
         """Figures of a method against direct allocation, of all worlds and pilots or of one."""
         ours, direct = (sliced(self.of(m, w_track), world=world, pilot=pilot) for m in (method, DIRECT))
-        lost = {k: {} for k in self.lost(method, w_track)}
+        lost: dict[Known, Row] = {k: {} for k in self.lost(method, w_track)}
         return table(ours, direct, self.trims, frozenset(sliced(lost, world=world, pilot=pilot)))
 
     def grid_table(self, method: str, w_track: float, world: str) -> dict[str, Any]:
