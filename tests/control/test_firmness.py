@@ -30,7 +30,7 @@ def test_what_a_plan_means_to_make_up_for_later_counts_as_undone():
 
 
 def test_firmness_grows_within_half_a_second_and_goes_again():
-    """A plan that leaves most undone gets to the bound in six plans; one that keeps the promise gets its weights back."""
+    """A plan that leaves most undone is at the bound in six plans; one that keeps the promise gets its weights back."""
     firmness, allowed = 1.0, allowed_stray(PAPER_W_TRACK)
     for _ in range(6):
         firmness = firmer(firmness, 0.8, allowed)

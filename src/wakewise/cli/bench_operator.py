@@ -12,14 +12,14 @@ from wakewise.cli.console import print_table, shown
 
 _BARS = (
     ("velocity_deviation_pct", "velocity_deviation_interval_pct", "velocity deviation, %", "< 15"),
-    ("target_speed_reduction_pct", "target_speed_reduction_interval_pct", "less wash where direct has 10 mm/s, %", "> 60"),
+    ("target_speed_reduction_pct", "target_speed_reduction_interval_pct", "less wash in trouble, %", "> 60"),
     ("disturbance_reduction_pct", "disturbance_reduction_interval_pct", "less D, %", "> 60"),
     ("energy_ratio", "energy_ratio_interval", "energy over direct's", ""),
     ("position_ratio", "position_ratio_interval", "place error over direct's", ""),
     ("silt_lifted_ratio", "silt_lifted_ratio_interval", "silt lifted over direct's", ""),
     ("sway_wash_ratio", "sway_wash_ratio_interval", "the wash's sway over direct's", ""),
 )
-_COLUMNS = ("flights", "deviation %", "floor %", "planned %", "mm/s", "direct", "less wash", "trouble", "less D", "energy")
+_COLUMNS = ("flights", "deviation", "floor", "planned %", "mm/s", "direct", "less wash", "trouble", "less D", "energy")
 
 
 def show_operator(result: Mapping[str, Any]) -> None:

@@ -37,8 +37,7 @@ def draw_operator(result: Mapping[str, Any], path: Path) -> None:
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     lines = {name: world["w_track"] for name, world in result["worlds"].items()}
     paper = {"in front": result["paper"]["w_track"], "above": result["paper"]["w_track_over"]}
-    most = [_panel(left, lines, "in the tank's worlds", "target_speed_reduction_all_pct")]
-    most.append(_panel(right, paper, "in the paper's own water (circular)", "target_speed_reduction_pct"))
+    most = [_panel(left, lines, "in the tank's worlds"), _panel(right, paper, "in the paper's own water (circular)")]
     left.set_xlim(0.0, max(25.0, 1.08 * max(most)))
     left.set_ylim(LOWEST_PCT - 5.0, 105.0)
     left.set_ylabel("less wash at the target than direct allocation, %", fontsize=8.5, color=INK)
@@ -46,35 +45,45 @@ def draw_operator(result: Mapping[str, Any], path: Path) -> None:
         figure.savefig(temporary, dpi=150)
 
 
-def _panel(axes: Axes, lines: Mapping[str, Mapping[str, Mapping[str, Any]]], words: str, key: str) -> float:
-    """Draw one line for each world, a mark for each w_track; returns the largest deviation."""
+def _at(row: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Deviation and reduction of a row, where there was trouble if there was any; None where there is nothing."""
+    less = row["target_speed_reduction_pct"]
+    less = row.get("target_speed_reduction_all_pct") if less is None else less
+    deviation = row["velocity_deviation_pct"]
+    return None if less is None or deviation is None else (float(deviation), max(float(less), LOWEST_PCT))
+
+
+def _panel(axes: Axes, lines: Mapping[str, Mapping[str, Mapping[str, Any]]], words: str) -> float:
+    """Draw a line for each world, small marks for the w_tracks of the same flights, a large one for all at 5.
+
+    Returns the largest deviation.
+    """
     most = 0.0
-    claim = Rectangle((0.0, ASKED_REDUCTION_PCT), ASKED_DEVIATION_PCT, 100.0 - ASKED_REDUCTION_PCT, color=PALE, zorder=0)
-    axes.add_patch(claim)
-    axes.annotate("the claim, at w_track 5", (0.4, 98.0), fontsize=7.5, color=QUIET, va="top")
+    height = 100.0 - ASKED_REDUCTION_PCT
+    axes.add_patch(Rectangle((0.0, ASKED_REDUCTION_PCT), ASKED_DEVIATION_PCT, height, color=PALE, zorder=0))
+    axes.annotate("the claim, at w_track 5", (0.4, 98.5), fontsize=7.5, color=QUIET, va="top")
     axes.axhline(0.0, color=QUIET, linewidth=0.6)
     for place, (name, sweep) in enumerate(lines.items()):
         colour = COLOURS[place % len(COLOURS)]
-        points = [
-            (w_track, float(row["velocity_deviation_pct"]), max(float(row[key]), LOWEST_PCT))
-            for w_track, row in sweep.items()
-            if row["velocity_deviation_pct"] is not None and row[key] is not None
-        ]
-        if not points:
-            continue
-        x, y = [point[1] for point in points], [point[2] for point in points]
-        axes.plot(x, y, "-", color=colour, linewidth=1.0, alpha=0.5)
-        axes.plot(x, y, "o", color=colour, markersize=4, label=name)
-        for w_track, at_x, at_y in points:
-            if w_track == CLAIMED:
-                axes.plot([at_x], [at_y], "o", color=colour, markersize=9, markerfacecolor="none")
-        for w_track, at_x, at_y in (points[0], points[-1])[: len(points)]:
-            axes.annotate(w_track, (at_x, at_y), textcoords="offset points", xytext=(5, 4), fontsize=7, color=colour)
-        most = max(most, *x)
+        points = [(w, *at) for w, row in sweep.items() if (at := _at(row.get("grid", row))) is not None]
+        if points:
+            x, y = [point[1] for point in points], [point[2] for point in points]
+            axes.plot(x, y, "-o", color=colour, linewidth=1.0, markersize=3.5, alpha=0.6)
+            for w_track, at_x, at_y in {points[0], points[-1]}:
+                axes.annotate(
+                    w_track, (at_x, at_y), textcoords="offset points", xytext=(4, 4), fontsize=7, color=colour
+                )
+            most = max(most, *x)
+        whole = _at(sweep[CLAIMED]) if CLAIMED in sweep else None
+        if whole is not None:
+            axes.plot(*([value] for value in whole), "o", color=colour, markersize=9, label=name)
+            most = max(most, whole[0])
     axes.set_title(words, fontsize=9.5, loc="left", color=INK)
-    axes.set_xlabel("velocity deviation, %   (numbers: w_track, ring: 5)", fontsize=8.5, color=INK)
+    axes.set_xlabel(
+        "velocity deviation, %   (large: all flights at w_track 5; lines: by w_track)", fontsize=8.5, color=INK
+    )
     axes.tick_params(labelsize=8, colors=INK)
-    if lines:
+    if most > 0.0:
         axes.legend(fontsize=8, frameon=False, loc="lower right")
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)

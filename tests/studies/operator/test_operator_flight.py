@@ -6,14 +6,22 @@ import numpy as np
 import pytest
 
 from wakewise.control.receding import PlanState
-from wakewise.studies.operator.flight import DEVIATIONS, FIGURES, OperatorTrial, course_of, deviations, fly_trial, parts_of
+from wakewise.studies.operator.flight import (
+    DEVIATIONS,
+    FIGURES,
+    OperatorTrial,
+    course_of,
+    deviations,
+    fly_trial,
+    parts_of,
+)
 from wakewise.studies.operator.heard import Overheard, within
 
 
 def test_deviation_is_the_rms_of_what_is_missed_over_that_of_what_is_asked():
     """Of vectors; what the plan misses and what the vehicle misses of its plan beside it; nothing asked, no share."""
-    asked = np.tile([0.1, 0.0, 0.0], (4, 1))
-    told = deviations(asked, asked + [0.0, 0.01, 0.0], asked + [0.0, 0.006, 0.0], 2.0 * asked)
+    asked, off = np.tile([0.1, 0.0, 0.0], (4, 1)), np.array([0.0, 0.01, 0.0])
+    told = deviations(asked, asked + off, asked + 0.6 * off, 2.0 * asked)
     assert told["velocity_deviation_pct"] == pytest.approx(10.0)
     assert told["velocity_deviation_planned_pct"] == pytest.approx(6.0)
     assert told["velocity_deviation_behind_plan_pct"] == pytest.approx(4.0)

@@ -125,8 +125,17 @@ class Told:
     def table(self, method: str, w_track: float, world: str | None = None, pilot: str | None = None) -> dict[str, Any]:
         """Figures of a method against direct allocation, of all worlds and pilots or of one."""
         ours, direct = (sliced(self.of(m, w_track), world=world, pilot=pilot) for m in (method, DIRECT))
-        lost = {k: {} for k in self.lost(method, w_track)}
+        lost: dict[Known, Row] = {k: {} for k in self.lost(method, w_track)}
         return table(ours, direct, self.trims, frozenset(sliced(lost, world=world, pilot=pilot)))
+
+    def grid_table(self, method: str, w_track: float, world: str) -> dict[str, Any]:
+        """The same over the flights that every w_track has: the script's first seeds."""
+
+        def here(flights: Flights) -> dict[Known, Row]:
+            return {k: row for k, row in sliced(flights, world=world, pilot=PILOTS[0]).items() if k[2] <= GRID_SEEDS}
+
+        empty: dict[Known, Row] = {key: {} for key in self.lost(method, w_track)}
+        return table(here(self.of(method, w_track)), here(self.of(DIRECT)), self.trims, frozenset(here(empty)))
 
     def course_table(self, method: str, w_track: float, course: str) -> dict[str, Any]:
         """The same over the flights of a course."""
@@ -140,12 +149,16 @@ class Told:
 
 
 def world_figures(name: str, w_tracks: tuple[float, ...], told: Told) -> dict[str, Any]:
-    """Tables of one world: by w_track ours, each pilot's alone and `unaware`; the bow rule once."""
+    """Tables of one world: by w_track ours, each pilot's alone and `unaware`; the bow rule once.
+
+    `grid` is over the flights that all w_tracks have, for holding one w_track against another.
+    """
     sweep: dict[str, Any] = {}
     for w_track in w_tracks:
         row = told.table(OURS, w_track, name)
         row["pilots"] = {pilot: told.table(OURS, w_track, name, pilot) for pilot in PILOTS}
         row[UNAWARE] = told.table(UNAWARE, w_track, name)
+        row["grid"] = told.grid_table(OURS, w_track, name)
         sweep[f"{w_track:g}"] = row
     return {"title": load_world(name).file.title, "w_track": sweep, RULE: told.table(RULE, PAPER_W_TRACK, name)}
 

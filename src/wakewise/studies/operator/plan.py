@@ -84,4 +84,4 @@ def key_of(trial: OperatorTrial) -> Key:
 
 def flight_s(trial: OperatorTrial) -> float:
     """About how much CPU time a flight takes, in seconds, for saying how long a run is."""
-    return 11.0 if trial.method in PLANS else 8.0
+    return 8.0 if trial.method in PLANS else 6.0
