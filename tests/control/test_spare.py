@@ -142,7 +142,7 @@ def test_shares_leave_a_poor_minimum_within_two_seconds():
         points_W_m=np.array([[0.085, 0.14, 0.6], [-0.085, -0.14, 0.6]]), weights=np.ones(2), distance_m=np.zeros(2)
     )
     view = WakeView.of(VEHICLE, below, RoundJet())
-    spared = Respared(name="x", inner=inner, watch=watching(view, previous=100.0))
+    spared = Respared(name="x", inner=inner, watch=watching(view, previous=1e5))
     best = gentle_allocation(LAYOUT, inner.wrench, view.gram(body.X_WB), Weights(disturbance=150.0, effort=1e-3))
     poor = LAYOUT.inverse @ inner.wrench
     state = SpareState(inner=0, thrusts_N=poor, free_age_s=0.0)
