@@ -5,6 +5,10 @@ angle is that above which they rather turn aside, as jets that blow at each othe
 vectored layout cross a decimetre ahead of the bow, and what they become goes where the camera looks, although neither
 jet alone comes near the target. In the tank this was most of the water's motion at a target downstream of a hover.
 
+In a flow, a pair of which one does no more than correct is charged as if the other pushed as a thruster at rest is
+guessed to: half of what they would become each. D is of an instant, and shares that alternate between two jets that
+miss are the least that it can find; the water has both of them.
+
 As a term of D. Of jets a and b with T_a = T_b = 1 N the joined jet carries |e_a + e_b| N of momentum along
 e_a + e_b. With unequal thrusts it turns towards the stronger, and without one of them there is none; the geometric mean
 sqrt(T_a T_b) = s_a s_b vanishes in the same way and keeps D a quadratic form of s, so the exact allocators of this room
@@ -64,6 +68,7 @@ class MeetingView(WakeView):
                 return incoherent(G)
             momentum = apart.momentum * apart.strength_N
             speed = carried_velocity(self.wake, self.points_W_m, *self._jets(apart), momentum, flow)
+            # Either may push soon, and jets live for seconds: what one sends now meets what the other sends then.
             D = self._joined(apart, speed)
             np.add.at(G, (apart.first, apart.first), 0.5 * D)
             np.add.at(G, (apart.second, apart.second), 0.5 * D)
@@ -224,8 +229,8 @@ class Respared:
     """The wrench of another controller, made with the gentlest thrusts; implements `wakewise.interfaces.Controller`.
 
     The motion is the other's; what its plan does not know (jets that meet, the bed) only moves spare thrusts, by the
-    exact allocator, so it can neither slow the plan nor make it swing. Where jets go is looked up `EVERY_S`, as often as
-    plans are made; in between shares follow the wrench by the matrix of then.
+    exact allocator, so it can neither slow the plan nor make it swing. Where jets go is looked up `EVERY_S`, as often
+    as plans are made; in between shares follow the wrench by the matrix of then.
     The price on change keeps shares near to the last ones, and for good where another minimum lies apart (the load on
     one diagonal pair of verticals or the other). So every `JUMP_EVERY_S` they are sought without it, on a step of its
     own, and taken where that is better by more than `WORTH` (see `watch`). A step on which the other fell back is flown
