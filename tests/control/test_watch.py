@@ -135,9 +135,9 @@ def test_where_the_current_brings_the_wash_back_shares_are_gentler_for_knowing_i
         found = (eyes.jump(wrench, here, thrusts) if k == 0 else None) or eyes.share_out(wrench, here, thrusts)
         thrusts = found[0].thrusts_N
     cost = {name: eyes.cost(T, eyes.gram(here, T)) for name, T in (("knows", thrusts), ("does not", unknowing))}
-    assert cost["knows"] < 0.5 * cost["does not"]
+    assert cost["knows"] < 0.8 * cost["does not"]
     slow, fast = (tank_speed_m_s(T, here.current_W_m_s) for T in (thrusts, unknowing))
-    assert slow < 0.6 * fast
+    assert slow < 0.2 * fast
 
 
 @pytest.mark.parametrize("method", ["instant", "wake-aware"])

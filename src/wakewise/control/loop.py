@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wakewise.allocation import Allocation, Layout, compile_layout
-from wakewise.allocation.allocate import disturbance_of
 from wakewise.arrays import Array, freeze
 from wakewise.control.carried import Carried
 from wakewise.control.tracker import Tracker, TrackerState
@@ -90,18 +89,18 @@ class TrackingController:
         gram, age_s, since_s, found = state.gram, state.age_s + dt_s, state.since_s + dt_s, None
         if self.watch is None:
             gram = self.view.gram(estimate.X_WB)
-        else:
+        elif gram is not None and age_s + 1e-6 < EVERY_S:
             moved = self.watch.moved(wrench, state.thrusts_N)
-            if gram is not None and age_s + 1e-6 < EVERY_S and self.watch.allowed(moved):
-                found = replace(self.allocate(wrench, None, moved), thrusts_N=moved, wrench_B=wrench)
-                found = replace(found, disturbance=disturbance_of(gram, moved))
-                if since_s >= JUMP_EVERY_S and age_s + 1e-6 >= APART_S:
-                    since_s, anew = 0.0, self.watch.jump(wrench, estimate, moved)
-                    found, gram = (found, gram) if anew is None else anew
+            if since_s >= JUMP_EVERY_S and age_s + 1e-6 >= APART_S and self.watch.allowed(moved):
+                # Such a step has no time to share the change out, too.
+                since_s, anew = 0.0, self.watch.jump(wrench, estimate, moved, gram)
+                found, gram = (self.watch.as_found(wrench, gram, moved), gram) if anew is None else anew
             else:
-                shared = self.watch.share_out(wrench, estimate, state.thrusts_N)
-                found, gram = (None, None) if shared is None else shared
-                age_s = 0.0
+                found = self.allocate(wrench, gram, state.thrusts_N)
+        else:
+            shared = self.watch.share_out(wrench, estimate, state.thrusts_N)
+            found, gram = (None, None) if shared is None else shared
+            age_s = 0.0
         usable = gram is not None and bool(np.isfinite(gram).all())
         fallback = None if usable else "wake model not finite: least thrusts"
         if found is None:

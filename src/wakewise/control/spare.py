@@ -5,6 +5,10 @@ angle is that above which they rather turn aside, as jets that blow at each othe
 vectored layout cross a decimetre ahead of the bow, and what they become goes where the camera looks, although neither
 jet alone comes near the target. In the tank this was most of the water's motion at a target downstream of a hover.
 
+In a flow, a pair of which one does no more than correct is charged as if the other pushed as a thruster at rest is
+guessed to: half of what they would become each. D is of an instant, and shares that alternate between two jets that
+miss are the least that it can find; the water has both of them.
+
 As a term of D. Of jets a and b with T_a = T_b = 1 N the joined jet carries |e_a + e_b| N of momentum along
 e_a + e_b. With unequal thrusts it turns towards the stronger, and without one of them there is none; the geometric mean
 sqrt(T_a T_b) = s_a s_b vanishes in the same way and keeps D a quadratic form of s, so the exact allocators of this room
@@ -13,7 +17,7 @@ take it as it is: it is an entry of G off the diagonal. It errs on the safe side
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, cast
 
 import numpy as np
@@ -37,8 +41,10 @@ LEAST_COSINE = -0.5
 """Cosine of 120 deg: jets that cross at more turn aside rather than join."""
 HALF_WIDTH_SLOPE = 0.096
 """Half-speed radius of a round jet over the distance along it (see `wakewise.wake.RoundJet`)."""
+WEAK_SHARE = 0.25
+"""Thrusts below this share of the mean are corrections rather than jets."""
 _PARALLEL = 0.999
-_LEAST_SHARE = 1e-3
+_LEAST_SHARE, _WORTH_SHARE = 1e-3, 0.1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,30 +63,45 @@ class MeetingView(WakeView):
         """Matrix G of D = s' G s, shape (2 n, 2 n); in a flow what two jets become takes their own place."""
         origins, axes = X_WB.apply(self.positions_B_m), self.axes_B @ X_WB.R.T
         if flow is not None and isinstance(free_jet(self.wake), AxialJet):
-            velocity = self._carried(origins, axes, flow)
+            velocity, apart = self._carried(origins, axes, flow)
             G = velocity_gram(velocity, self.weights)
-            return incoherent(G) if self.superposition == "incoherent" else G
+            if self.superposition == "incoherent":
+                return incoherent(G)
+            momentum = apart.momentum * apart.strength_N
+            speed = carried_velocity(self.wake, self.points_W_m, *self._jets(apart), momentum, flow)
+            # Either may push soon, and jets live for seconds: what one sends now meets what the other sends then.
+            D = self._joined(apart, speed)
+            np.add.at(G, (apart.first, apart.first), 0.5 * D)
+            np.add.at(G, (apart.second, apart.second), 0.5 * D)
+            return G
         G = np.array(super().gram(X_WB))
         met = joined_jets(origins, axes, self.pairs)
-        if len(met.share):
-            areas = self.areas_m2[met.first % len(self.areas_m2)]
-            speed = self.wake.unit_velocity(self.points_W_m, met.origins_m, met.directions, areas)
-            D = met.momentum * met.share * np.einsum("n,inx,inx->i", self.weights, speed, speed)
-            np.add.at(G, (met.first, met.second), 0.5 * D)
-            np.add.at(G, (met.second, met.first), 0.5 * D)
+        D = self._joined(met, self.wake.unit_velocity(self.points_W_m, *self._jets(met)))
+        np.add.at(G, (met.first, met.second), 0.5 * D)
+        np.add.at(G, (met.second, met.first), 0.5 * D)
         return G
 
-    def _carried(self, origins: Array, axes: Array, flow: Flow) -> Array:
+    def _jets(self, met: JoinedJets) -> tuple[Array, Array, Array]:
+        """Origins, directions and areas of jets made of two."""
+        return met.origins_m, met.directions, self.areas_m2[met.first % len(self.areas_m2)]
+
+    def _joined(self, met: JoinedJets, speed: Array) -> Array:
+        """D of what pairs become, per newton of their geometric mean, of their speed per square root of newton."""
+        return np.asarray(met.momentum * met.share * np.einsum("n,inx,inx->i", self.weights, speed, speed))
+
+    def _carried(self, origins: Array, axes: Array, flow: Flow) -> tuple[Array, JoinedJets]:
         """Velocity per square root of newton of all slots, shape (2 m, n, 3), with jets that join at these thrusts.
 
         Of a pair a share goes on as one, the rest as if alone. The velocity of the one is counted to its two by their
-        thrusts, so that it is right where the thrusts are those reckoned from, and D stays a sum of squares.
+        thrusts, so that it is right where the thrusts are those reckoned from, and D stays a sum of squares. Pairs of
+        which one pushes no more than corrections do are told apart.
         """
         m = len(origins)
+        weak_N = WEAK_SHARE * float(np.mean(np.abs(flow.thrusts_N)))
         pushing = np.concatenate([flow.thrusts_N, -flow.thrusts_N])
-        met = joined_jets(origins, axes, self.pairs, np.maximum(pushing, 1e-9))
+        met = joined_jets(origins, axes, self.pairs, np.where(pushing > weak_N, pushing, flow.guessed))
         ends = np.tile([np.inf, 1.0], (2 * m, 1))
-        real = (pushing[met.first] > 0.0) & (pushing[met.second] > 0.0) if len(met.share) else np.zeros(0, bool)
+        real = (pushing[met.first] > weak_N) & (pushing[met.second] > weak_N)
         chosen = []
         for k in np.argsort(-met.share, kind="stable"):
             a, b = met.first[k], met.second[k]
@@ -94,12 +115,11 @@ class MeetingView(WakeView):
         if chosen:
             a, b, share = met.first[chosen], met.second[chosen], met.share[chosen]
             momentum = met.momentum[chosen] * met.strength_N[chosen]
-            jets = (met.origins_m[chosen], met.directions[chosen], self.areas_m2[a % m])
-            joined = carried_velocity(self.wake, self.points_W_m, *jets, momentum, flow)
+            joined = carried_velocity(self.wake, self.points_W_m, *self._jets(met.take(chosen)), momentum, flow)
             joined *= (share * np.sqrt(momentum) / (pushing[a] + pushing[b]))[:, None, None]
             velocity[a] += np.sqrt(pushing[a])[:, None, None] * joined
             velocity[b] += np.sqrt(pushing[b])[:, None, None] * joined
-        return velocity
+        return velocity, met.take(~real & (met.share > _WORTH_SHARE))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -120,6 +140,10 @@ class JoinedJets:
     share: Array
     strength_N: Array
     ways_m: Array
+
+    def take(self, which: Any) -> JoinedJets:
+        """Those that a mask or a list of numbers picks."""
+        return JoinedJets(**{field.name: getattr(self, field.name)[which] for field in fields(self)})
 
 
 def joined_jets(
@@ -188,13 +212,17 @@ def meeting_view(view: WakeView, layout: Layout) -> MeetingView:
 
 @dataclass(frozen=True, eq=False)
 class SpareState:
-    """The other controller's state, the thrusts last told, shape (n,), and when they were last shared out (freely)."""
+    """The other controller's state, the thrusts last told, shape (n,), and when they were last shared out (freely).
+
+    `gram`, shape (2 n, 2 n), is the matrix of the last search.
+    """
 
     inner: Any
     thrusts_N: Array
     age_s: float = np.inf
     disturbance: float | None = None
     free_age_s: float = np.inf
+    gram: Array | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -202,8 +230,8 @@ class Respared:
     """The wrench of another controller, made with the gentlest thrusts; implements `wakewise.interfaces.Controller`.
 
     The motion is the other's; what its plan does not know (jets that meet, the bed) only moves spare thrusts, by the
-    exact allocator, so it can neither slow the plan nor make it swing. Shares are found `EVERY_S`, as often as plans
-    are made; in between the wrench's change is made with the least thrusts, which leaves the spare ones as they are.
+    exact allocator, so it can neither slow the plan nor make it swing. Where jets go is looked up `EVERY_S`, as often
+    as plans are made; in between shares follow the wrench by the matrix of then.
     The price on change keeps shares near to the last ones, and for good where another minimum lies apart (the load on
     one diagonal pair of verticals or the other). So every `JUMP_EVERY_S` they are sought without it, on a step of its
     own, and taken where that is better by more than `WORTH` (see `watch`). A step on which the other fell back is flown
@@ -237,26 +265,35 @@ class Respared:
         if command.fallback is not None:
             return SpareState(inner=inner, thrusts_N=command.thrusts_N), command
         watch, wrench = self.watch, command.wrench_B
-        thrusts, since_s = watch.moved(wrench, state.thrusts_N), state.free_age_s + dt_s
-        if state.age_s + 1e-6 < EVERY_S and watch.allowed(thrusts):
-            held = replace(state, thrusts_N=thrusts, age_s=state.age_s + dt_s, free_age_s=since_s)
-            if state.free_age_s + 1e-6 >= JUMP_EVERY_S and state.age_s + 1e-6 >= APART_S:
-                anew = watch.jump(wrench, estimate, thrusts)
-                held = replace(held, free_age_s=dt_s)
-                if anew is not None:
-                    held = replace(held, thrusts_N=anew[0].thrusts_N, disturbance=anew[0].disturbance)
+        if state.gram is not None and state.age_s + 1e-6 < EVERY_S:
+            moved = watch.moved(wrench, state.thrusts_N)
+            due = state.free_age_s + 1e-6 >= JUMP_EVERY_S and state.age_s + 1e-6 >= APART_S
+            if due and watch.allowed(moved):
+                # Such a step has no time to share the change out, too.
+                held = self._jumped(replace(state, thrusts_N=moved, free_age_s=0.0), wrench, estimate)
+            else:
+                held = replace(state, thrusts_N=watch.follow(wrench, state.gram, state.thrusts_N))
+            held = replace(held, age_s=held.age_s + dt_s, free_age_s=held.free_age_s + dt_s)
             held = replace(held, inner=self._told(inner, held.thrusts_N, dt_s))
             return held, replace(command, thrusts_N=held.thrusts_N, disturbance=held.disturbance)
         shared = watch.share_out(wrench, estimate, state.thrusts_N)
         if shared is None:
             words = "wake model not finite: thrusts of the plan"
             return SpareState(inner=inner, thrusts_N=command.thrusts_N), replace(command, fallback=words)
-        found, _ = shared
+        found, gram = shared
         # The first search is made with the first plan, the next ones between two plans.
         age_s = dt_s if np.isfinite(state.age_s) else EVERY_S - APART_S + dt_s
         told = self._told(inner, found.thrusts_N, dt_s)
-        new = SpareState(told, found.thrusts_N, age_s, found.disturbance, since_s)
+        new = SpareState(told, found.thrusts_N, age_s, found.disturbance, state.free_age_s + dt_s, gram)
         return new, replace(command, thrusts_N=found.thrusts_N, disturbance=found.disturbance)
+
+    def _jumped(self, state: SpareState, wrench_B: Array, estimate: BodyState) -> SpareState:
+        """The state with better shares from elsewhere, if there are any."""
+        anew = self.watch.jump(wrench_B, estimate, state.thrusts_N, state.gram)
+        if anew is None:
+            return state
+        found, gram = anew
+        return replace(state, thrusts_N=found.thrusts_N, disturbance=found.disturbance, gram=gram)
 
     def _told(self, inner: Any, thrusts_N: Array, dt_s: float) -> Any:
         """The other controller's state, told what was flown in place of its thrusts, if it can be told."""

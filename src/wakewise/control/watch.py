@@ -21,10 +21,13 @@ from wakewise.interfaces import BodyState
 from wakewise.wake.carried import Flow
 from wakewise.wake.view import WakeView
 
-UNSURE = 0.2
-"""Standard deviation of each component of the current along a jet's way over its speed at the vehicle, beside what the
-estimator is unsure of: from the bed's own layer, where a current falls to a half, and eddies of a tenth to a fifth
-(I. Nezu and H. Nakagawa, Turbulence in Open-Channel Flows, 1993)."""
+UNSURE = 0.55
+"""Standard deviation of how far the current takes a jet's water over what is reckoned, beside what the estimator is
+unsure of. Of this 0.2 is the current's own, along the way: from the bed's layer, where it falls to a half, and eddies
+of a tenth to a fifth (I. Nezu and H. Nakagawa, Turbulence in Open-Channel Flows, 1993). The rest is time: what a
+controller sends is pushes of a second as often as jets, and a push needs longer. Its front goes as t^(1/4) once it is
+cut off (J. M. Richards, Int. J. Mech. Sci. 7 (1965) 61), a jet's as t^(1/2), so it is on its way once to twice as long,
+half as long again in the mean, give or take half."""
 
 WORTH = 0.05
 """Share of the cost that a jump must save: less is within what a wake model may claim to know."""
@@ -100,20 +103,42 @@ class Watch:
         if self.allowed(moved):
             stays = self.cost(moved, before, previous_N)
             if not self.cost(found.thrusts_N, after, previous_N) < stays:
-                same = replace(found, thrusts_N=moved, wrench_B=self.layout.B @ moved)
-                return replace(same, disturbance=disturbance_of(before, moved)), before
+                return self.as_found(wrench_B, before, moved), before
         if not np.isfinite(after).all():
             return None
         return replace(found, disturbance=disturbance_of(after, found.thrusts_N)), after
 
-    def jump(self, wrench_B: Array, estimate: BodyState, present_N: Array) -> tuple[Allocation, Array] | None:
+    def follow(self, wrench_B: Array, gram: Array, previous_N: Array) -> Array:
+        """Thrusts, shape (n,), of a wrench that has changed since the last search, by that search's matrix.
+
+        Least changes would send the noise of the wrench through thrusters that rest because they blow at the target.
+        """
+        return self.sharer.shares(wrench_B, gram, self.weights, self.view.total_weight, previous_N).thrusts_N
+
+    def as_found(self, wrench_B: Array, gram: Array, thrusts_N: Array) -> Allocation:
+        """Thrusts within limits that make the wrench, shape (n,), as if they had been looked for."""
+        return Allocation(
+            thrusts_N=thrusts_N,
+            wrench_B=self.layout.B @ thrusts_N,
+            requested_B=wrench_B,
+            disturbance=disturbance_of(gram, thrusts_N),
+            method="moved",
+            gap=0.0,
+            scale=1.0,
+        )
+
+    def jump(
+        self, wrench_B: Array, estimate: BodyState, present_N: Array, present_gram: Array | None = None
+    ) -> tuple[Allocation, Array] | None:
         """Other thrusts for a wrench, better by more than `WORTH` than those that make it now; None if there are none.
 
         Without a price on change, from the least thrusts on: the price keeps shares near to the last ones, and for good
-        where another minimum lies apart. `present_N`, shape (n,), must make the wrench.
+        where another minimum lies apart. `present_N`, shape (n,), must make the wrench; `present_gram` is their matrix,
+        where it is known from the last search.
         """
         least = least_thrusts(self.layout, wrench_B)
-        first, there = (self.gram(estimate, thrusts) for thrusts in (present_N, least.thrusts_N))
+        first = self.gram(estimate, present_N) if present_gram is None else present_gram
+        there = self.gram(estimate, least.thrusts_N)
         if not (np.isfinite(first).all() and np.isfinite(there).all()):
             return None
         free = replace(self.weights, previous=0.0)

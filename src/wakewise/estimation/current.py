@@ -4,11 +4,17 @@ At rest a current shows itself as a force that the model does not explain, and s
 straight up or down, so the level part of the force is the current's if no cable is out: its drag, by the vehicle's own
 nominal drag, is turned round for a level current. Nothing is said of a current that rises or sinks, which trim cannot
 be told from. A level pull that is no drag, such as a cable's, is taken for a current: 0.3 N look like some 4 cm/s on a
-small vehicle. How sure it is follows from the covariance of the force, in which the thrusters' gains are, and from the
-spread of drag.
+small vehicle.
+
+How sure it is follows from the covariance of the force, in which the thrusters' gains are, and from what drag may be.
+That is most of it: published sets of drag for one vehicle (its `drag_cases`) differ by their linear part, which is all
+that counts below a decimetre a second. What pulls like 1.5 cm/s by one set is 4 cm/s by another. So each set tells its
+own current; the mean of them is told, and their spread is in its covariance.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -79,29 +85,34 @@ def current_of_force(packed: Array, q: Array, north_N: float, east_N: float) -> 
 
 
 def told_current(
-    packed: Array, rest_q: Array, force_W_N: Array, force_covariance: Array, drag_std: float
+    sets: Sequence[Array], rest_q: Array, force_W_N: Array, force_covariance: Array, drag_std: float
 ) -> tuple[Array, Array] | None:
     """Level current and its covariance, shapes (3,) and (3, 3), or None while it is not known to `KNOWN_M_S`.
 
     Parameters
     ----------
-    packed : ndarray
-        The nominal vehicle's numbers.
+    sets : sequence of ndarray
+        Numbers of the vehicle with each drag that it may have, each alike; the nominal one first.
     rest_q : ndarray, shape (4,)
         Attitude that the force is told for.
     force_W_N, force_covariance : ndarray, shape (3,) and (3, 3)
         Force at rest that the model does not explain, and how sure that is.
     drag_std : float
-        Relative error of the drag.
+        Relative error of each drag.
     """
-    found = current_of_force(packed, rest_q, float(force_W_N[0]), float(force_W_N[1]))
-    if not np.isfinite(found).all():
+    force, around = force_W_N[:2], force_covariance[:2, :2]
+    if not np.isfinite(force.sum() + around.sum()):
         return None
-    level, slope = found[:2], np.linalg.inv(found[2:].reshape(2, 2))
-    spread = slope @ force_covariance[:2, :2] @ slope.T
-    if not 0.5 * float(np.trace(spread)) <= KNOWN_M_S**2:
+    # Drag without a linear part has no slope at rest: its current is told from four forces about the one found, whose
+    # mean and covariance are right (S. J. Julier and J. K. Uhlmann, Proc. IEEE 92 (2004) 401).
+    values, axes = np.linalg.eigh(around)
+    reach = (axes * np.sqrt(2.0 * np.maximum(values, 0.0))).T
+    forces = force + np.concatenate([reach, -reach])
+    told = np.array([current_of_force(packed, rest_q, float(f[0]), float(f[1]))[:2] for packed in sets for f in forces])
+    if not (np.isfinite(told).all() and 0.5 * float(told[: len(forces)].var(axis=0).sum()) <= KNOWN_M_S**2):
         return None
+    level = told.mean(axis=0)
     current, covariance = np.zeros(3), np.zeros((3, 3))
     current[:2] = level
-    covariance[:2, :2] = spread + drag_std**2 * np.outer(level, level)
+    covariance[:2, :2] = (told - level).T @ (told - level) / len(told) + drag_std**2 * np.outer(level, level)
     return current, covariance

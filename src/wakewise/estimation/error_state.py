@@ -53,7 +53,7 @@ from wakewise.estimation.settings import FilterSettings, Priors
 from wakewise.geometry import Pose, matrix_from_quat
 from wakewise.interfaces import BodyState, Measurement
 from wakewise.physics import GRAVITY_M_S2
-from wakewise.vehicles import Vehicle, compile_body
+from wakewise.vehicles import Vehicle, compile_body, with_each_drag
 
 _TICK_S = 1e-9
 _MEMORY = 15  # poses that the mean of innovations goes back, a quarter of a second at 62 Hz
@@ -129,6 +129,7 @@ class ErrorStateFilter:
         self._start_s = start_s
         self._body = compile_body(vehicle)
         self._packed = self._body.packed
+        self._drags = tuple(compile_body(other).packed for other in with_each_drag(vehicle))
         self._B = vehicle.allocation_matrix
         self._lag_s = np.maximum(vehicle.time_constants_s, 1e-9)
         self._noise = np.array(
@@ -230,7 +231,7 @@ class ErrorStateFilter:
         mean = walk.mean
         load_B = unexplained(self._packed, self._B, mean, walk.thrusts_N, walk.rest_q)
         force_W_N, around = mean[13:16], walk.P[FORCE : FORCE + 3, FORCE : FORCE + 3]
-        water = told_current(self._packed, walk.rest_q, force_W_N, around, self.priors.drag_std)
+        water = told_current(self._drags, walk.rest_q, force_W_N, around, self.priors.drag_std)
         current, spread = (None, None) if water is None else water
         return BodyState(
             X_WB=Pose(mean[:3], mean[3:7]),

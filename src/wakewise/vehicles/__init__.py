@@ -22,7 +22,7 @@ from wakewise.vehicles.check import (
 )
 from wakewise.vehicles.describe import check_report, describe, summary_line
 from wakewise.vehicles.draft import ThrusterDraft, VehicleDraft
-from wakewise.vehicles.drag import drag_coefficients, possible_drags, with_drag
+from wakewise.vehicles.drag import drag_coefficients, possible_drags, with_drag, with_each_drag
 from wakewise.vehicles.dynamics import (
     RigidBody,
     acceleration,
@@ -93,4 +93,5 @@ __all__ = [
     "summary_line",
     "vehicle_names",
     "with_drag",
+    "with_each_drag",
 ]

@@ -47,6 +47,11 @@ def with_drag(vehicle: Vehicle, case: str, rng: np.random.Generator | None = Non
     return replace(vehicle, hydrodynamics=water)
 
 
+def with_each_drag(vehicle: Vehicle) -> tuple[Vehicle, ...]:
+    """The vehicle with each set of drag that it may have, the believed one first."""
+    return tuple(with_drag(vehicle, case) for case in possible_drags(vehicle, DRAWN))
+
+
 def drag_coefficients(vehicle: Vehicle, speed_m_s: float) -> Array:
     """Drag in surge, sway and heave at a speed over 1/2 rho u^2 times the frontal area of the box, shape (3,).
 
