@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from wakewise.cli.bench_gentle import show_gentle
+from wakewise.cli.bench_operator import show_operator
 from wakewise.cli.bench_worlds import show_worlds
 from wakewise.cli.console import Bars, print_json, shown
 from wakewise.cli.options import Json
@@ -31,8 +32,8 @@ Methods = Annotated[
 Worlds = Annotated[
     str,
     typer.Option(
-        help="operator, worlds: which, with commas between; all if not given, of operator those with trouble and a calm "
-        "one.",
+        help="operator, worlds: which, with commas between; operator flies those with trouble and a calm one, worlds "
+        "all of them, if not given.",
         show_default=False,
     ),
 ]
@@ -144,6 +145,8 @@ def bench(
         typer.echo(f"\n{each}: {BENCHES[each]}")
         if each == "gentle":
             show_gentle(result)
+        elif each == "operator":
+            show_operator(result)
         elif each == "worlds":
             show_worlds(result)
         else:

@@ -18,8 +18,8 @@ from wakewise.cockpit.lookout import SAMPLED_S, WINDOW_S, Lookout, Moment
 from wakewise.geometry import euler_from_quat
 from wakewise.operation import Parts
 
-POINTS_EVERY = 5
-"""States between two looks at the water of every point: twice a second."""
+POINTS_EVERY, GAUGES_EVERY = 5, 2
+"""States between two looks at the water of every point, and at D: with a current these cost the most."""
 
 
 def described(parts: Parts, gauges: Gauges) -> dict[str, Any]:
@@ -72,16 +72,19 @@ class Instruments:
 
     def __init__(self, gauges: Gauges, lookout: Lookout) -> None:
         self._gauges, self._lookout = gauges, lookout
-        self._both: deque[tuple[float, float]] = deque(maxlen=round(WINDOW_S / SAMPLED_S))
+        self._both: deque[tuple[float, float]] = deque(maxlen=round(WINDOW_S / SAMPLED_S / GAUGES_EVERY))
         self.predicted_m_s = np.zeros(len(gauges.points_W_m))
+        self._now = (math.nan, math.nan)
         self._count = 0
 
     def read(self, now: Moment) -> dict[str, Any]:
         """How the flight stands, but for what desk, helm, coverage and photographs add."""
         step, estimate = now.step, now.step.estimate
-        flown, direct = self._gauges.disturbances(estimate, now.thrusts_N)
-        if math.isfinite(flown + direct):
-            self._both.append((flown, direct))
+        if self._count % GAUGES_EVERY == 0:
+            self._now = self._gauges.disturbances(estimate, now.thrusts_N)
+            if math.isfinite(sum(self._now)):
+                self._both.append(self._now)
+        flown, direct = self._now
         if self._count % POINTS_EVERY == 0:
             self.predicted_m_s = self._gauges.predicted_m_s(estimate, now.thrusts_N)
         self._count += 1

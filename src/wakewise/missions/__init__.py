@@ -4,7 +4,7 @@ Start reading in `route.py` (legs, shutter, the pilot that follows them) and `or
 hemispheres), `order.py` (which of them is the first); `aim.py` is what points the camera there (pitch, tilt joint or
 both), `clearance.py` refuses what would touch and tilts that the joint cannot follow, `settings.py` is what a user may
 say. `coverage.py` says what of the target photographs have seen well (`patches.py`, `sight.py`) and where to go next
-(`reach.py`), `missed.py` why a part was not seen.
+(`within_reach.py`), `missed.py` why a part was not seen.
 """
 
 from wakewise.missions.aim import CameraAim, aim_of
@@ -13,10 +13,10 @@ from wakewise.missions.coverage import Coverage
 from wakewise.missions.missed import Missed, missed
 from wakewise.missions.orbit import Orbit, layered_orbits
 from wakewise.missions.patches import Patches, patches_of
-from wakewise.missions.reach import Views, reachable_views
 from wakewise.missions.route import SETTLING, Leg, Route, RoutePilot, open_route, plan_route
 from wakewise.missions.settings import MissionSettings
 from wakewise.missions.sight import Need
+from wakewise.missions.within_reach import Views, reachable_views
 
 __all__ = [
     "SETTLING",

@@ -20,8 +20,8 @@ from wakewise.compiled import njit
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.missions.patches import Patches
-from wakewise.missions.reach import Views, way_words
 from wakewise.missions.sight import Lens, Need, well_shown
+from wakewise.missions.within_reach import Views, way_words
 
 Counts = NDArray[np.uint8]
 
@@ -157,6 +157,17 @@ class Coverage:
     def share(self) -> float:
         """Share of the surface that is seen well, 0 to 1: the completeness that the model is expected to have."""
         return float(self.covered.mean())
+
+    @property
+    def sure(self) -> float:
+        """Share that is seen well with a photograph to spare, 0 to 1, at most `share`.
+
+        Where photographs overlap no more than they must, thin or rough parts may come out worse than expected: of ten
+        models, each had what lies between the two, to two points (docs/decisions/0046).
+        """
+        if len(self.partners) == 0:
+            return 0.0
+        return float(self.patches.spread(self.partners.max(axis=0) >= WELL).mean())
 
     @cached_property
     def covered(self) -> BoolArray:

@@ -53,7 +53,8 @@ def _made(trial: Trial) -> str:
     ]
     text = (
         "What the coverage guide expects of the model, from the estimated places of the photographs alone: "
-        f"{100.0 * coverage.share:.0f} % of the target is seen well"
+        f"{100.0 * coverage.share:.0f} % of the target is seen well, "
+        f"{100.0 * coverage.sure:.0f} % with a photograph to spare"
         + (f"; {'; '.join(why)}" if why else "")
         + f". {_compared(trial)}{_blurred(coverage)}"
     )

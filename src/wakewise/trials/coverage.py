@@ -28,8 +28,8 @@ from wakewise.operation import Parts, read_scenario
 from wakewise.reconstruction import read_cloud
 from wakewise.targets import Target
 
-COVERAGE_FIGURES = ("coverage_predicted_pct", "coverage_agreement_pct", "coverage_trivial_pct")
-FROM_MODEL = COVERAGE_FIGURES[1:]
+FROM_MODEL = ("coverage_agreement_pct", "coverage_trivial_pct")
+"""Figures of the guide that need a model to be held against."""
 Shot = tuple[Pose, float | None]
 
 
@@ -132,12 +132,13 @@ def agreement_with(coverage: Coverage, parts: Parts, cloud_W_m: Array) -> Agreem
 
 
 def coverage_figures(parts: Parts, photos: pl.DataFrame, cloud_W_m: Array | None) -> dict[str, float]:
-    """`coverage_predicted_pct`, and where there is a model, in the truth's frame, how far the two agree."""
+    """What the guide expects of the model, and where there is one, in the truth's frame, how far the two agree."""
     coverage = coverage_of(parts.found_target, parts.camera, shots_of(photos))
+    figures = {"coverage_predicted_pct": 100.0 * coverage.share, "coverage_sure_pct": 100.0 * coverage.sure}
     if cloud_W_m is None:
-        return {"coverage_predicted_pct": 100.0 * coverage.share}
+        return figures
     both = agreement_with(coverage, parts, cloud_W_m)
-    return dict(zip(COVERAGE_FIGURES, (both.predicted_pct, both.agreement_pct, both.trivial_pct), strict=True))
+    return figures | dict(zip(FROM_MODEL, (both.agreement_pct, both.trivial_pct), strict=True))
 
 
 def measure_coverage(folder: Path) -> dict[str, Any]:
@@ -146,9 +147,9 @@ def measure_coverage(folder: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        coverage_predicted_pct, completeness_pct, coverage_agreement_pct, coverage_trivial_pct (agreement of the better
-        of "all" and "nothing"), coverage_ms_per_photo (thread CPU, median; the first photograph, which loads kernels,
-        left out), coverage_ms_per_photo_max, photos, blurred.
+        coverage_predicted_pct, coverage_sure_pct, completeness_pct, coverage_agreement_pct, coverage_trivial_pct
+        (agreement of the better of "all" and "nothing"), coverage_ms_per_photo (thread CPU, median; the first
+        photograph, which loads kernels, left out), coverage_ms_per_photo_max, photos, blurred.
 
     Raises
     ------
@@ -168,6 +169,7 @@ def measure_coverage(folder: Path) -> dict[str, Any]:
     later_ms = spent_ms[1:] or spent_ms
     return {
         "coverage_predicted_pct": both.predicted_pct,
+        "coverage_sure_pct": 100.0 * coverage.sure,
         "completeness_pct": both.completeness_pct,
         "coverage_agreement_pct": both.agreement_pct,
         "coverage_trivial_pct": both.trivial_pct,
@@ -175,4 +177,31 @@ def measure_coverage(folder: Path) -> dict[str, Any]:
         "coverage_ms_per_photo_max": float(np.max(later_ms)),
         "photos": coverage.photos,
         "blurred": coverage.blurred,
+    }
+
+
+def measure_cost(parts: Parts) -> dict[str, float]:
+    """What the guide costs on a mission's own viewpoints, for benches without a trial: no flight, no photograph.
+
+    Returns
+    -------
+    dict
+        coverage_predicted_pct of the planned viewpoints, coverage_ms_per_photo and coverage_ms_per_photo_max (thread
+        CPU; the first, which loads kernels, left out).
+
+    Raises
+    ------
+    InputError
+        If the mission plans no photograph.
+    """
+    spent_ms: list[float] = []
+    shots: list[Shot] = [(X_WC, None) for X_WC in parts.route.X_WC_planned]
+    coverage = coverage_of(parts.found_target, parts.camera, shots, spent_ms)
+    later_ms = spent_ms[1:] or spent_ms
+    if not later_ms:
+        raise InputError("mission: plans no photograph, the guide needs at least one")
+    return {
+        "coverage_predicted_pct": 100.0 * coverage.share,
+        "coverage_ms_per_photo": float(np.median(later_ms)),
+        "coverage_ms_per_photo_max": float(np.max(later_ms)),
     }

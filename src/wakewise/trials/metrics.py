@@ -38,6 +38,7 @@ _FIGURES: dict[str, tuple[str, str, Better]] = {
     "coverage_predicted_pct": ("%", "completeness_pct as the coverage guide expects it before leaving: share of the "
                                "target, as it was surveyed, that photographs saw well from where they were estimated",
                                "more"),
+    "coverage_sure_pct": ("%", "the same with a photograph to spare: the lower end of what is expected", "more"),
     "coverage_agreement_pct": ("%", "share of the target's patches, of about 1 cm, of which the guide said rightly "
                                "whether most of it is within 3 mm of the model", "more"),
     "coverage_trivial_pct": ("%", "the same of the better of two guesses without a guide: all of it, or nothing",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from wakewise.control.intent import PAPER_W_TRACK
 from wakewise.errors import InputError
+from wakewise.operation.desk import RANGES
 from wakewise.operation.worlds.library import world_names
 from wakewise.studies.operator.flight import PILOTS, OperatorTrial
 from wakewise.studies.operator.waters import CONTROL, TROUBLE
@@ -38,11 +39,12 @@ def wished_w_tracks(wished: tuple[float, ...] | None) -> tuple[float, ...]:
     Raises
     ------
     InputError
-        If one is not more than 0, or no more than 1000.
+        If one is beyond what the desk's dial has.
     """
+    least, most = RANGES["w_track"]
     for value in wished or ():
-        if not 0.0 < value <= 1000.0:
-            raise InputError(f"w_tracks: {value:g}, must be more than 0 and at most 1000")
+        if not least <= value <= most:
+            raise InputError(f"w_tracks: {value:g}, must be from {least:g} to {most:g}")
     return W_TRACKS if wished is None else tuple(sorted(set(wished)))
 
 

@@ -11,6 +11,7 @@ from wakewise.trials.coverage import (
     agreement_with,
     coverage_figures,
     coverage_of,
+    measure_cost,
     measure_coverage,
     shots_of,
 )
@@ -76,7 +77,8 @@ def test_what_was_not_photographed_and_is_not_there_agrees(parts: Parts, photos:
 def test_figures_without_a_model_are_the_prediction_alone(parts: Parts, photos: pl.DataFrame) -> None:
     """What the guide expects does not hang on a model; how far that agrees does."""
     alone = coverage_figures(parts, photos, None)
-    assert set(alone) == {"coverage_predicted_pct"}
+    assert set(alone) == {"coverage_predicted_pct", "coverage_sure_pct"}
+    assert alone["coverage_sure_pct"] <= alone["coverage_predicted_pct"]
     figures = coverage_figures(parts, photos, surface_of(parts.target))
     assert figures["coverage_predicted_pct"] == alone["coverage_predicted_pct"] > 90.0
     assert figures["coverage_agreement_pct"] > 90.0
@@ -86,3 +88,10 @@ def test_what_is_no_trial_with_a_model_is_refused(tmp_path) -> None:
     """The file that is missing is named."""
     with pytest.raises(InputError, match=r"has no scenario\.yaml"):
         measure_coverage(tmp_path)
+
+
+def test_a_photograph_costs_the_guide_little(parts: Parts) -> None:
+    """Thread CPU of a photograph stays under 20 ms, with the mission's own viewpoints, which cover nine tenths."""
+    cost = measure_cost(parts)
+    assert cost["coverage_predicted_pct"] > 90.0
+    assert cost["coverage_ms_per_photo"] < 20.0

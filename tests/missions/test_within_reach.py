@@ -12,7 +12,7 @@ from wakewise.imaging import PinholeCamera
 from wakewise.missions import CameraAim, TankBounds, Views, patches_of, reachable_views
 from wakewise.missions.clearance import gaps_of
 from wakewise.missions.orbit import camera_pose
-from wakewise.missions.reach import place_of, way_words
+from wakewise.missions.within_reach import place_of, way_words
 from wakewise.targets import Mesh
 
 CAMERA = PinholeCamera(640, 480, math.radians(80.0))
