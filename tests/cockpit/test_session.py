@@ -61,7 +61,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Session, H
     assert session.welcome()["preparing"]
     session.start()
     hands = Hands(session)
-    hands.until(lambda: session.flying)
+    hands.until(lambda: session.flying, within_s=300.0)  # kernels may be cold
     yield session, hands, folder
     session.stop()
     assert not session.running
