@@ -61,7 +61,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Session, H
     assert session.welcome()["preparing"]
     session.start()
     hands = Hands(session)
-    hands.until(lambda: session.flying)
+    hands.until(lambda: session.flying, within_s=300.0)  # kernels may be cold
     yield session, hands, folder
     session.stop()
     assert not session.running
@@ -82,15 +82,6 @@ def test_a_state_has_all_that_the_wire_promises(flown: tuple[Session, Hands, Pat
     assert welcome["preparing"] is None
     assert welcome["desk"]["ranges"]["w_track"] == [0.5, 50.0]
     json.dumps(welcome, allow_nan=False)
-
-
-def test_in_the_papers_water_the_prediction_is_the_truth(flown: tuple[Session, Hands, Path]) -> None:
-    """There the water is the planner's own law at the survey's place, so that both washes are of one size."""
-    _, hands, _ = flown
-    hands.until(lambda: len(hands.state.get("true_m_s") or ()) > 0)
-    hands.until(lambda: hands.state["time_s"] > 2.0)
-    state = hands.state
-    assert 0.1 < (np.mean(state["predicted_m_s"]) + 1e-5) / (np.mean(state["true_m_s"]) + 1e-5) < 10.0
 
 
 def test_sticks_move_the_vehicle_and_the_deviation_is_told(flown: tuple[Session, Hands, Path]) -> None:
