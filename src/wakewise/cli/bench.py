@@ -132,6 +132,10 @@ def bench(
                 store=store,
             )
             results[each] = run_bench(each, options)
+            if each == "operator":
+                from wakewise.cli.bench_cockpit import add_cockpit
+
+                add_cockpit(results[each], options)
     if plot is not None:
         from wakewise.reports.gentle import draw_gentle
         from wakewise.reports.operator import draw_operator

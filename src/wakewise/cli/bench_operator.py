@@ -54,12 +54,30 @@ def show_operator(result: Mapping[str, Any]) -> None:
                 f"D less by {reduction(row['disturbance_reduction_pct'])}, "
                 f"wash by {reduction(row['target_speed_reduction_pct'])}"
             )
+    _show_cockpit(result)
     typer.echo(
         f"{result['flown']} flights flown, {result['flights'] - result['flown'] - result['failed']} known, "
         f"{result['failed']} failed"
     )
     for failure in result["failures"]:
         typer.echo(f"failed: {failure['flow']}, {failure['name']}, seed {failure['seed']}: {failure['reason']}")
+
+
+def _show_cockpit(result: Mapping[str, Any]) -> None:
+    for name, one in (result.get("cockpit") or {}).items():
+        typer.echo(
+            f"cockpit, cores {name}: stick to thrust {one['latency_ms_p50']:.0f} ms, p99 {one['latency_ms_p99']:.0f} "
+            f"(< 120); {one['pictures_per_s']:.1f} pictures a second; first light {one['first_light_s']:.1f} s"
+        )
+    for name, one in (result.get("coverage") or {}).items():
+        typer.echo(
+            f"coverage, {name.replace('_', ' ')}, {one['photos']} photographs: right of "
+            f"{one['coverage_agreement_pct']:.1f} % of the target (a trivial guess {one['coverage_trivial_pct']:.1f}), "
+            f"{one['coverage_ms_per_photo']:.1f} ms each"
+        )
+    for key in ("latency_ms_p99", "coverage_agreement_pct"):
+        if key in result["why"]:
+            typer.echo(f"{key}: not measured: {result['why'][key]}")
 
 
 def _cells(row: Mapping[str, Any]) -> list[str]:

@@ -8,15 +8,14 @@ pilot who is a person), `instant_water.py` and `lattice_water.py` worlds other t
 of target and camera beforehand; `surroundings.py` is what a planner is told to keep clear of, `preflight.py` refuses
 what does not fit, `switches.py` says what is set and cannot act, `foreign.py` guards what comes from outside;
 `flying.py` flies, `recorder.py` and `telemetry.py` keep what was, `flight_trim.py` reads from it what ballast is
-lacking, `photography.py` renders what the camera saw,
-`darkroom.py` while the flight goes on.
+lacking, `photography.py` renders what the camera saw, `darkroom.py` while the flight goes on, `guide.py` begins the
+guide of what photographs have seen.
 
 By hand: `desk.py` is what an operator has set, `assisted.py` the pilot between hands and goals; `motion.py` is the one
 smooth goal that all share, `steering.py` moves it by sticks and `assists.py`, `keep_off.py` off what is solid,
-`scanning.py` along a mission that waits; `hands.py` is a person at these sticks.
-`live.py` flies without an end, by the clock of `pace.py`, and photographs when `shutter.py` is asked; what was lies in
-the parts of `flight_log.py` until `live_folder.py` makes them a trial's folder (`trial_folder.py`, `exposures.py`), and
-`replay.py` flies its hands again.
+`scanning.py` along a mission that waits; `hands.py` is a person at these sticks. `live.py` flies without an end, by the
+clock of `pace.py`, and photographs when `shutter.py` is asked; what was lies in the parts of `flight_log.py` until
+`live_folder.py` makes them a trial's folder (`trial_folder.py`, `exposures.py`), and `replay.py` flies its hands again.
 """
 
 from typing import TYPE_CHECKING

@@ -66,12 +66,8 @@ class Scenario(Settings):
     draws: dict[str, Draw] = Field(
         default={}, description="fields that the seed draws, by dotted name: two numbers, or in_log, any_of, level"
     )
-    pilot: str = Field(
-        "route", description="where goals come from: route, human, assisted, operator, package.module:make"
-    )
-    controls: str | None = Field(
-        None, description="hands that the pilot `operator` flies: a flight's controls.parquet, a .csv, a script's .yaml"
-    )
+    pilot: str = Field("route", description="who leads: route, human, assisted, operator, package.module:make")
+    controls: str | None = Field(None, description="hands of the pilot `operator`: controls.parquet, .csv, .yaml")
     target: TargetSettings = TargetSettings()
     survey: SurveySettings = SurveySettings()
     mission: MissionSettings = MissionSettings()

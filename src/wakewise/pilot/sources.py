@@ -8,13 +8,20 @@ from pathlib import Path
 from wakewise.errors import InputError
 from wakewise.pilot.controls import ControlSource
 from wakewise.pilot.script import load_script
-from wakewise.pilot.trace import read_trace
+
+
+def _record(path: Path) -> ControlSource:
+    """The record of a flight; tables are imported where one is read, since every scenario knows of this file."""
+    from wakewise.pilot.trace import read_trace
+
+    return read_trace(path)
+
 
 READERS: dict[str, Callable[[Path], ControlSource]] = {
     ".yaml": load_script,
     ".yml": load_script,
-    ".parquet": read_trace,
-    ".csv": read_trace,
+    ".parquet": _record,
+    ".csv": _record,
 }
 
 

@@ -4,8 +4,8 @@ Start reading in `report.py` (a trial's page, part by part; `model.py` is the pa
 is made early) and `compare.py` (trials side by side). `trial.py` reads a trial's folder, `words.py` and `yardstick.py`
 say figures in words, `page.py` is HTML with its style and script, `figures.py`, `views.py`, `photos.py`, `errors.py`,
 `looks.py` and `scene3d.py` are the pictures, `ink.py` their colours, `limits.py` what the water gets wrong, `trim.py`
-what ballast the flight lacked. Studies have pages of their own: `wake.py` with `wake_plots.py`, `target.py`,
-`gentle.py`, `operator.py`, `degradation.py`; `vehicle/` is a vehicle's.
+what ballast the flight lacked, `coverage.py` what its photographs saw. Studies have pages of their own: `wake.py` with
+`wake_plots.py`, `target.py`, `gentle.py`, `operator.py`, `degradation.py`; `vehicle/` is a vehicle's.
 """
 
 from typing import TYPE_CHECKING
