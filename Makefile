@@ -10,7 +10,7 @@ unexport PYTHONDONTWRITEBYTECODE
 .PHONY: help setup scan test check bench docs lock clean
 
 help:
-	@echo "make setup   virtual environment in .venv: core, extras photos, reports, logs, cockpit, gamepad (LGPL) and piv (GPL), tools for tests"
+	@echo "make setup   virtual environment in .venv: core, extras photos, reports, logs, cockpit, ros, gamepad and links (LGPL), piv (GPL), tools for tests"
 	@echo "make scan    fly, photograph, reconstruct and judge a coral; leaves runs/quick/report.html"
 	@echo "make test    ruff, mypy, the import contract and the tests"
 	@echo "make check   the same without the tests"
@@ -60,7 +60,7 @@ docs: setup
 
 lock:
 	$(BIN)/python -m pip install --quiet uv
-	$(BIN)/uv pip compile pyproject.toml --extra all --extra piv --extra gamepad --group dev --universal --python-version 3.11 --generate-hashes --no-header --no-annotate -o requirements.lock
+	$(BIN)/uv pip compile pyproject.toml --extra all --extra piv --extra gamepad --extra links --extra ros --group dev --universal --python-version 3.11 --generate-hashes --no-header --no-annotate -o requirements.lock
 
 clean:
 	rm -rf $(VENV) runs dist

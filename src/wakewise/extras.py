@@ -20,6 +20,8 @@ EXTRAS: dict[str, dict[str, str]] = {
     "reports": {"matplotlib": "matplotlib", "viser": "viser", "cv2": "opencv-python-headless", "PIL": "pillow"},
     "cockpit": {"websockets": "websockets", "cv2": "opencv-python-headless", "embreex": "embreex"},
     "gamepad": {"pygame": "pygame-ce"},
+    "links": {"pymavlink": "pymavlink", "mcap": "mcap"},
+    "ros": {"rosbags": "rosbags"},
     "logs": {"foxglove": "foxglove-sdk"},
     "piv": {"openpiv": "openpiv", "cv2": "opencv-python-headless"},
     "nerf": {"torch": "torch"},
