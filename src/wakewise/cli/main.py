@@ -22,6 +22,7 @@ from wakewise.cli import (
     compare,
     degrade,
     evaluate,
+    export,
     film,
     nerf,
     reconstruct,
@@ -51,6 +52,7 @@ app.command("evaluate")(evaluate.evaluate)
 app.command("calibrate")(calibrate.calibrate)
 app.command("degrade")(degrade.degrade)
 app.command("film")(film.film)
+app.command("export")(export.export)
 app.command("colour")(colour.colour)
 app.command("nerf")(nerf.nerf)
 app.command("allocate")(allocate.allocate)

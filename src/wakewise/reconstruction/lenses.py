@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError, StageError
-from wakewise.reconstruction.colmap import pycolmap
+
+if TYPE_CHECKING:  # cameras.txt is read without COLMAP, too
+    from wakewise.reconstruction.colmap import pycolmap
 
 # Which parameters of COLMAP's models are fx, fy, cx, cy, k1, k2, p1, p2; -1 is a zero.
 LAYOUTS = {

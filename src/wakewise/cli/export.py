@@ -1,0 +1,106 @@
+"""`wakewise export`: a trial, or a vehicle's allocation matrix, as files that other tools open."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wakewise.cli.console import print_json
+from wakewise.cli.options import Json
+from wakewise.errors import InputError
+
+Trial = Annotated[
+    Path | None, typer.Argument(metavar="trial", help="Folder of a trial that was flown.", show_default=False)
+]
+To = Annotated[str, typer.Option("--to", help="nerfstudio, colmap, tum, rosbag2, qgc-plan; auv_controllers.")]
+VehicleName = Annotated[
+    str | None,
+    typer.Option("--vehicle", help="auv_controllers: library name or vehicle YAML file.", show_default=False),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        help="New folder to write (qgc-plan, auv_controllers: file). In the trial's folder, export/, or "
+        "NAME-auv_controllers.yaml, if not given.",
+        show_default=False,
+    ),
+]
+Poses = Annotated[
+    str,
+    typer.Option("--poses", help="nerfstudio, colmap: true poses and camera, or estimated ones as the crew has them."),
+]
+Frame = Annotated[
+    str,
+    typer.Option(
+        "--frame", help="auv_controllers: flu, for wrenches as ROS has them, or fsd, for its own controllers."
+    ),
+]
+At = Annotated[
+    str | None,
+    typer.Option("--origin", metavar="LAT,LON", help="qgc-plan: the world's origin in degrees.", show_default=False),
+]
+
+
+def export(
+    trial: Trial = None,
+    to: To = "",
+    vehicle: VehicleName = None,
+    out: Out = None,
+    poses: Poses = "true",
+    origin: At = None,
+    frame: Frame = "flu",
+    json: Json = False,
+) -> None:
+    """Export a trial to other tools: trainers of splats and NeRFs, COLMAP, evo, ROS 2, QGroundControl.
+
+    Frames become those of the tool: OpenGL cameras and z up for nerfstudio, ENU and FLU in bags; COLMAP and TUM keep
+    north-east-down. A plan has a waypoint per photograph at its depth; satellites place none of them to a decimetre.
+    With --vehicle, write its allocation matrix as ROS 2's auv_controllers take it.
+    """
+    if to == "auv_controllers":
+        if vehicle is None or trial is not None:
+            raise InputError("export --to auv_controllers: give --vehicle NAME and no trial")
+        if origin is not None:
+            raise InputError("--origin: goes with --to qgc-plan only, not with auv_controllers")
+        path, holds = _allocation(vehicle, out, frame)
+    else:
+        if trial is None or vehicle is not None:
+            raise InputError(
+                f"export --to {to or 'FORMAT'}: give the folder of a trial; --vehicle is for auv_controllers"
+            )
+        from wakewise.links.exports import Origin
+        from wakewise.trials.export import export_trial
+
+        place = None if origin is None else Origin(*_two(origin))
+        done = export_trial(trial, to, out=out, poses=poses, origin=place)
+        path, holds = done.path, done.holds
+    if json:
+        print_json({"to": to, "path": str(path), **holds})
+        return
+    told = ", ".join(f"{count} {what.replace('_', ' ')}" for what, count in holds.items())
+    typer.echo(f"{path}: {told}")
+
+
+def _allocation(vehicle: str, out: Path | None, frame: str) -> tuple[Path, dict[str, int]]:
+    from wakewise.files import write_text
+    from wakewise.links.exports import tam_yaml
+    from wakewise.vehicles import load_draft
+
+    draft = load_draft(vehicle)
+    path = out or Path(f"{Path(draft.name).name}-auv_controllers.yaml")
+    if path.is_dir():
+        raise InputError(f"--out {path}: is a folder, must be a file")
+    text = tam_yaml(draft.name, draft.thruster_names, draft.allocation_matrix, draft.thrust_limits_N, frame)
+    write_text(path, text)
+    return path, {"thrusters": len(draft.thruster_names)}
+
+
+def _two(text: str) -> tuple[float, float]:
+    try:
+        lat, lon = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"--origin: '{text}', must be LAT,LON in degrees, such as 36.52,-6.28") from None
+    return lat, lon
