@@ -38,7 +38,8 @@ import wakewise.allocation, wakewise.control, wakewise.estimation, wakewise.impo
 import wakewise.missions, wakewise.planning, wakewise.tank, wakewise.targets, wakewise.thrusters, wakewise.wake
 import wakewise.api, wakewise.operation.parts, wakewise.operation.flying, wakewise.operation.recorder
 import wakewise.studies.gentle.flight, wakewise.studies.wake_validation, wakewise.benches
-import wakewise.reports.vehicle, wakewise.reconstruction.nerf
+import wakewise.reports.vehicle, wakewise.reconstruction.nerf, wakewise.reconstruction.lenses
+import wakewise.trials.export
 from wakewise.evaluation import flight_figures, umeyama
 from wakewise.imaging import ImagingSettings
 from wakewise.operation import load_scenario
@@ -115,6 +116,7 @@ print(json.dumps(answers))
         ("reconstruct . --out runs/x", "photos"),
         ("evaluate cloud.ply --reference cloud.ply", "photos"),
         ("film runs/x", "photos,reports"),
+        ("export runs/x --to rosbag2", "ros"),
         ("degrade --out runs/x", "photos,reports"),
         ("calibrate .", "photos"),
         ("colour . --out runs/x", "photos"),

@@ -103,6 +103,18 @@ def test_times_run_forward_through_all_topics(track: Track, tmp_path: Path) -> N
     assert times == sorted(times)
 
 
+def test_foxgloves_reader_opens_it(track: Track, tmp_path: Path) -> None:
+    """The `mcap` library, which knows nothing of rosbags, finds all messages, their types and definitions."""
+    reader = pytest.importorskip("mcap.reader")
+    written = write_bag(tmp_path / "bag", {"true": track}, TELEMETRY)
+    with (tmp_path / "bag" / "bag.mcap").open("rb") as file:
+        rows = list(reader.make_reader(file, validate_crcs=True).iter_messages())
+    assert len(rows) == written
+    kinds = {channel.topic: (schema.name, schema.encoding, channel.message_encoding) for schema, channel, _ in rows}
+    assert kinds["/true/pose"] == ("geometry_msgs/msg/PoseStamped", "ros2msg", "cdr")
+    assert kinds["/thrusts"] == ("std_msgs/msg/Float64MultiArray", "ros2msg", "cdr")
+
+
 def test_a_time_below_zero_is_refused(tmp_path: Path) -> None:
     """ROS's time holds none."""
     early = Track(times_s=np.array([-1.0]), p_W_m=np.zeros((1, 3)), q=np.array([[1.0, 0, 0, 0]]))
