@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wakewise.control.intent import LEASH_M, Intent, goal_of, moved_on, obeying, slewed
+from wakewise.control.intent import LEASH_M, Intent, goal_of, moved_on, obeying, shaped, slewed
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_from_euler
 from wakewise.interfaces import BodyState
@@ -65,3 +65,27 @@ def test_the_commanded_place_waits_for_a_vehicle_that_is_held_up():
     for _ in range(200):
         place = moved_on(place, velocity, HERE, 0.02)
     assert np.linalg.norm(place - HERE.X_WB.p_m) == pytest.approx(LEASH_M)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_shaped_velocity_keeps_both_bounds_and_arrives(seed):
+    """Wishes that change at random: acceleration and jerk stay within bounds, and a wish that stays is reached."""
+    rng, dt_s, hardest, jerk = np.random.default_rng(seed), 0.02, 0.2, 0.8
+    v, a, wished = np.zeros(3), np.zeros(3), np.zeros(3)
+    for k in range(600):
+        if k < 300 and k % 15 == 0:
+            wished = rng.uniform(-0.3, 0.3, 3)
+        before, (v, new) = v, shaped(v, a, wished, dt_s, hardest, jerk)
+        assert np.linalg.norm(v - before) <= hardest * dt_s * (1.0 + 1e-9)
+        assert np.linalg.norm(new - a) <= jerk * dt_s * (1.0 + 1e-6)
+        a = new
+    assert np.array_equal(v, wished) and not a.any()
+
+
+def test_a_shaped_velocity_does_not_overshoot():
+    """From rest to 0.1 m/s it grows and stays there, but for the twentieth of a millimetre a second of a last step."""
+    v, a, wished, way = np.zeros(3), np.zeros(3), np.array([0.1, 0.0, 0.0]), [0.0]
+    for _ in range(60):
+        v, a = shaped(v, a, wished, 0.02, 0.2, 0.8)
+        way.append(v[0])
+    assert np.all(np.diff(way) > -5e-5) and max(way) < 0.1 + 5e-5 and way[-1] == 0.1

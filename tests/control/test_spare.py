@@ -185,6 +185,19 @@ def test_a_bow_jet_is_charged_for_the_one_it_would_meet():
     assert charge[0] == pytest.approx(both[0, 1], rel=0.02)
 
 
+def test_as_sent_a_pair_that_rests_leaves_nothing_and_both_leave_what_they_become():
+    """The matrix that the bound on power asks: one bow jet alone is not charged, both are as much as by `gram`."""
+    flow = Flow(
+        current_W_m_s=np.array([0.0, 1e-9, 0.0]), unsure_m_s=0.0, thrusts_N=np.array([0, 0, -1.0, -1, 0, 0, 0, 0])
+    )
+    plain = WakeView.of(VEHICLE, AHEAD, RoundJet())
+    seen = meeting_view(plain, LAYOUT).seen(Pose(np.zeros(3)), flow)
+    one, both = np.array([1.0, 0, 0, 0, 0, 0, 0, 0]), np.array([1.0, 1, 0, 0, 0, 0, 0, 0])
+    alone = disturbance(plain.gram(Pose(np.zeros(3)), flow), one)
+    assert disturbance(seen.sent, one) == pytest.approx(alone) and disturbance(seen.gram, one) > 2.0 * alone
+    assert disturbance(seen.sent, both) == pytest.approx(disturbance(seen.gram, both))
+
+
 @pytest.mark.parametrize("method", ["instant", "wake-aware"])
 def test_the_noise_of_a_wrench_does_not_blow_ahead(method):
     """Astern push with noise of 0.1 N, a slow current ahead: the bow pair blows ahead with less than 3 mN in the mean.

@@ -10,6 +10,7 @@ from wakewise.geometry import Pose
 from wakewise.thrusters import electrical_power_W
 from wakewise.vehicles import load_vehicle
 from wakewise.wake import RoundJet, WakeView
+from wakewise.wake.view import Seen
 
 VEHICLE = load_vehicle("paper")
 LAYOUT, LAW = vehicle_layout(VEHICLE), power_law(VEHICLE)
@@ -46,9 +47,21 @@ def test_shares_keep_the_bound_that_the_water_asks_for(scale, most):
     G = scale * VIEW.gram(Pose(np.zeros(3)))
     sharer = Sharer(layout=LAYOUT, law=LAW)
     weights = Weights(disturbance=150.0 / 3.0 / scale, effort=1e-3)
-    found, least = sharer.shares(wrench, G, weights, 3.0), least_thrusts(LAYOUT, wrench, G)
-    free = Sharer(layout=LAYOUT).shares(wrench, G, weights, 3.0)
+    seen = Seen(gram=G, sent=G)
+    found, least = sharer.shares(wrench, seen, weights, 3.0), least_thrusts(LAYOUT, wrench, G)
+    free = Sharer(layout=LAYOUT).shares(wrench, seen, weights, 3.0)
     ratio = float(LAW.power_W(found.thrusts_N) / LAW.power_W(least.thrusts_N))
     assert float(LAW.power_W(free.thrusts_N) / LAW.power_W(least.thrusts_N)) > TROUBLE
     assert ratio <= most + 1e-9 and ratio > 0.95 * most
     assert free.disturbance < found.disturbance < least.disturbance
+
+
+def test_what_may_join_a_jet_opens_no_bound():
+    """Shares are chosen by the one matrix; what they may cost goes with what the least thrusts do by the other."""
+    wrench = np.array([-4.0, 0.0, 1.0, 0.0, 0.05, 0.0])
+    G = VIEW.gram(Pose(np.zeros(3)))
+    found = Sharer(layout=LAYOUT, law=LAW).shares(
+        wrench, Seen(gram=G, sent=1e-5 * G), Weights(disturbance=50.0, effort=1e-3), 3.0
+    )
+    least = LAW.power_W(least_thrusts(LAYOUT, wrench).thrusts_N)
+    assert 1.0 < float(LAW.power_W(found.thrusts_N) / least) <= CALM + 1e-9

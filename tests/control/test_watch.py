@@ -62,10 +62,12 @@ def test_shares_make_the_wrench_and_are_never_worse_than_those_of_before_by_thei
         here = estimate(0.09 * np.cos(angle), 0.09 * np.sin(angle), 0.0)
         wrench = np.array([-2.6, 0.9, -3.3, 0.0, -0.3, 0.0]) + 0.1 * rng.normal(size=6)
         before = least_thrusts(layout, wrench).thrusts_N
-        found, G = eyes.share_out(wrench, here, before)
+        found, seen = eyes.share_out(wrench, here, before)
         np.testing.assert_allclose(layout.B @ found.thrusts_N, wrench, atol=1e-9)
-        np.testing.assert_allclose(G, eyes.gram(here, found.thrusts_N), atol=1e-15)
-        assert eyes.cost(found.thrusts_N, G, before) <= eyes.cost(before, eyes.gram(here, before)) * (1.0 + 1e-9)
+        np.testing.assert_allclose(seen.gram, eyes.gram(here, found.thrusts_N), atol=1e-15)
+        assert eyes.cost(found.thrusts_N, seen.gram, before) <= eyes.cost(before, eyes.gram(here, before)) * (
+            1.0 + 1e-9
+        )
 
 
 def test_a_jump_is_worth_it_or_not_made():
@@ -79,11 +81,11 @@ def test_a_jump_is_worth_it_or_not_made():
         anew = eyes.jump(wrench, here, present)
         if anew is None:
             continue
-        found, G = anew
+        found, seen = anew
         made += 1
         np.testing.assert_allclose(layout.B @ found.thrusts_N, wrench, atol=1e-9)
-        np.testing.assert_allclose(G, eyes.gram(here, found.thrusts_N), atol=1e-15)
-        assert eyes.cost(found.thrusts_N, G) < (1.0 - WORTH) * eyes.cost(present, eyes.gram(here, present))
+        np.testing.assert_allclose(seen.gram, eyes.gram(here, found.thrusts_N), atol=1e-15)
+        assert eyes.cost(found.thrusts_N, seen.gram) < (1.0 - WORTH) * eyes.cost(present, eyes.gram(here, present))
         assert eyes.jump(wrench, here, found.thrusts_N) is None
     assert made >= 2
 

@@ -23,10 +23,10 @@ def flown(parts, n=600, lag=25):
 
 
 def test_a_person_flies_the_route_through_the_same_sticks(parts):
-    """The goals stay within 0.25 m of the route by sticks alone."""
+    """By sticks alone the goals stay within 0.3 m of the route, though the vehicle is half a second behind them."""
     goals, axes = flown(parts)
     off = [np.linalg.norm(g.X_WB.p_m - parts.route.body(0.02 * k, parts.aim).X_WB.p_m) for k, g in enumerate(goals)]
-    assert max(off) < 0.25 and np.abs(axes).max() <= 1.0 and axes.any() and not axes[:, 4].any()
+    assert max(off) < 0.3 and np.abs(axes).max() <= 1.0 and axes.any() and not axes[:, 4].any()
 
 
 def test_a_flight_begun_again_is_the_same_and_another_persons_is_not(parts):

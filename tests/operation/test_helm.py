@@ -41,6 +41,15 @@ def test_a_flight_begun_again_is_the_same(parts):
     assert any(not np.array_equal(a.X_WB.p_m, b.X_WB.p_m) for a, b in zip(first, third, strict=True))
 
 
+def test_the_goals_move_as_a_vehicle_can(parts):
+    """However the thumbs jump, the goals' velocity changes by at most 0.3 m/s2 and their turn by 0.8 rad/s2."""
+    found = goals(parts.pilot, parts.route, parts.vehicle.X_BC)
+    v = np.array([goal.X_WB.R @ goal.nu_B[:3] for goal in found])
+    turn = np.array([(goal.X_WB.R @ goal.nu_B[3:])[2] for goal in found])
+    assert np.linalg.norm(np.diff(v, axis=0), axis=1).max() < 0.3 * 0.02 and np.ptp(v) > 0.05
+    assert np.abs(np.diff(turn)).max() < 0.8 * 0.02 + 1e-9
+
+
 @pytest.mark.slow
 def test_any_method_is_flown_by_a_person(parts):
     """`dp` follows the goals within millimetres, and so comes centimetres off the route."""

@@ -20,7 +20,7 @@ from wakewise.planning.surroundings import around_target
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
 from wakewise.wake import bed_of
-from wakewise.wake.view import WakeView
+from wakewise.wake.view import Seen, WakeView
 
 
 def instant_allocator(
@@ -39,7 +39,7 @@ def instant_allocator(
     def allocate(wrench_B: Array, gram: Array | None, previous_N: Array) -> Allocation:
         if gram is None or weights.disturbance == 0.0:
             return least_thrusts(layout, wrench_B, gram)
-        return sharer.shares(wrench_B, gram, weights, view.total_weight, previous_N)
+        return sharer.shares(wrench_B, Seen(gram=gram, sent=gram), weights, view.total_weight, previous_N)
 
     return TrackingController(
         name="instant",

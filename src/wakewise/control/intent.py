@@ -110,3 +110,27 @@ def slewed(velocity_m_s: Array, wished_m_s: Array, dt_s: float, acceleration_m_s
     size = float(np.linalg.norm(step))
     most = acceleration_m_s2 * dt_s
     return np.asarray(wished_m_s if size <= most else velocity_m_s + step * (most / size), dtype=np.float64)
+
+
+def shaped(
+    velocity_m_s: Array,
+    acceleration_m_s2: Array,
+    wished_m_s: Array,
+    dt_s: float,
+    hardest_m_s2: float,
+    jerk_m_s3: float,
+) -> tuple[Array, Array]:
+    """Velocity and acceleration after dt_s on the way to a wished velocity, shape (3,) each, both bounds kept.
+
+    The acceleration aimed at is the one that can just fade, at this jerk, until the wished velocity is there (the law
+    of `easing.eased`, for vectors). So that is reached in finite time and, from rest, overshot by no more than
+    jerk dt^2 / 8, a matter of whole steps.
+    """
+    left = np.asarray(wished_m_s) - velocity_m_s
+    size, most = float(np.linalg.norm(left)), jerk_m_s3 * dt_s
+    if size <= most * dt_s and float(np.linalg.norm(acceleration_m_s2)) <= most * (1.0 + 1e-9):
+        return np.array(wished_m_s, dtype=np.float64), np.zeros(3)
+    fades = math.sqrt(0.25 * most**2 + 2.0 * jerk_m_s3 * size) - 0.5 * most
+    aimed = left * (min(hardest_m_s2, fades, size / dt_s) / max(size, 1e-12))
+    acceleration = slewed(acceleration_m_s2, aimed, dt_s, jerk_m_s3)
+    return velocity_m_s + dt_s * acceleration, acceleration

@@ -14,7 +14,7 @@ from wakewise.control.tracker import Tracker, TrackerState
 from wakewise.control.watch import APART_S, EVERY_S, FULL, JUMP_EVERY_S, Watch
 from wakewise.interfaces import BodyState, Command, Goal
 from wakewise.vehicles import Vehicle
-from wakewise.wake.view import WakeView
+from wakewise.wake.view import Seen, WakeView
 
 Allocate = Callable[[Array, Array | None, Array], Allocation]
 """`(wrench_B, gram or None, thrusts before) -> Allocation`; the Gram matrix is None if the wake model gave nonsense."""
@@ -35,13 +35,13 @@ class ControllerState:
     """What a controller remembers between steps.
 
     The tracker's integral, the thrusts last asked for, shape (n,), and the share of the last wrench that they made;
-    with a `watch`, its Gram matrix, shape (2 n, 2 n), how old that is, and how long ago a jump was looked for.
+    with a `watch`, what it has seen, how old that is, and how long ago a jump was looked for.
     """
 
     tracker: TrackerState
     thrusts_N: Array
     share: float = 1.0
-    gram: Array | None = None
+    seen: Seen | None = None
     age_s: float = np.inf
     since_s: float = np.inf
 
@@ -86,31 +86,31 @@ class TrackingController:
         tracker_state, wrench = self.tracker.wrench(state.tracker, dt_s, estimate, goal, saturated=state.share < FULL)
         if not np.isfinite(wrench.sum()):
             return self._hold(state, dt_s, "wrench not finite: holding the last thrusts, fading")
-        gram, age_s, since_s, found = state.gram, state.age_s + dt_s, state.since_s + dt_s, None
+        seen, age_s, since_s, found = state.seen, state.age_s + dt_s, state.since_s + dt_s, None
         if self.watch is None:
-            gram = self.view.gram(estimate.X_WB)
-        elif gram is not None and age_s + 1e-6 < EVERY_S:
+            seen = self.view.seen(estimate.X_WB)
+        elif seen is not None and age_s + 1e-6 < EVERY_S:
             moved = self.watch.moved(wrench, state.thrusts_N)
             if since_s >= JUMP_EVERY_S and age_s + 1e-6 >= APART_S and self.watch.allowed(moved):
                 # Such a step has no time to share the change out, too.
-                since_s, anew = 0.0, self.watch.jump(wrench, estimate, moved, gram)
-                found, gram = (self.watch.as_found(wrench, gram, moved), gram) if anew is None else anew
+                since_s, anew = 0.0, self.watch.jump(wrench, estimate, moved, seen)
+                found, seen = (self.watch.as_found(wrench, seen, moved), seen) if anew is None else anew
             else:
-                found = self.allocate(wrench, gram, state.thrusts_N)
+                found = self.watch.follow(wrench, seen, state.thrusts_N)
         else:
             shared = self.watch.share_out(wrench, estimate, state.thrusts_N)
-            found, gram = (None, None) if shared is None else shared
+            found, seen = (None, None) if shared is None else shared
             age_s = 0.0
-        usable = gram is not None and bool(np.isfinite(gram).all())
+        usable = seen is not None and bool(np.isfinite(seen.gram).all())
         fallback = None if usable else "wake model not finite: least thrusts"
         if found is None:
-            found = self.allocate(wrench, gram if usable else None, state.thrusts_N)
+            found = self.allocate(wrench, seen.gram if seen is not None and usable else None, state.thrusts_N)
         if found.scale < FULL and fallback is None:
             fallback = f"thrusters saturated: {100.0 * found.scale:.0f} % of the wrench"
         command = Command(thrusts_N=found.thrusts_N, wrench_B=wrench, disturbance=found.disturbance, fallback=fallback)
-        kept = gram if self.watch is not None and usable else None
+        kept = seen if self.watch is not None and usable else None
         after = ControllerState(
-            tracker=tracker_state, thrusts_N=found.thrusts_N, share=found.scale, gram=kept, age_s=age_s, since_s=since_s
+            tracker=tracker_state, thrusts_N=found.thrusts_N, share=found.scale, seen=kept, age_s=age_s, since_s=since_s
         )
         return after, command
 

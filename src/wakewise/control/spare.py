@@ -7,7 +7,8 @@ jet alone comes near the target. In the tank this was most of the water's motion
 
 In a flow, a pair of which one does no more than correct is charged as if the other pushed as a thruster at rest is
 guessed to: half of what they would become each. D is of an instant, and shares that alternate between two jets that
-miss are the least that it can find; the water has both of them.
+miss are the least that it can find; the water has both of them. That is a charge, not what is in the water: thrusts
+that leave one of the two at rest leave nothing of it, so the bound on power (`thrift`) asks what they do as sent.
 
 As a term of D. Of jets a and b with T_a = T_b = 1 N the joined jet carries |e_a + e_b| N of momentum along
 e_a + e_b. With unequal thrusts it turns towards the stronger, and without one of them there is none; the geometric mean
@@ -35,7 +36,7 @@ from wakewise.vehicles import Vehicle
 from wakewise.wake import AxialJet, free_jet
 from wakewise.wake.carried import Flow
 from wakewise.wake.disturbance import carried_velocity, incoherent, velocity_gram
-from wakewise.wake.view import WakeView
+from wakewise.wake.view import Seen, WakeView
 
 LEAST_COSINE = -0.5
 """Cosine of 120 deg: jets that cross at more turn aside rather than join."""
@@ -61,25 +62,30 @@ class MeetingView(WakeView):
 
     def gram(self, X_WB: Pose, flow: Flow | None = None) -> Array:
         """Matrix G of D = s' G s, shape (2 n, 2 n); in a flow what two jets become takes their own place."""
+        return self.seen(X_WB, flow).gram
+
+    def seen(self, X_WB: Pose, flow: Flow | None = None) -> Seen:
+        """Matrices of D: with the charge for a pair of which one rests, and with what it becomes where both push."""
         origins, axes = X_WB.apply(self.positions_B_m), self.axes_B @ X_WB.R.T
         if flow is not None and isinstance(free_jet(self.wake), AxialJet):
             velocity, apart = self._carried(origins, axes, flow)
             G = velocity_gram(velocity, self.weights)
             if self.superposition == "incoherent":
-                return incoherent(G)
+                G = incoherent(G)
+                return Seen(gram=G, sent=G)
             momentum = apart.momentum * apart.strength_N
             speed = carried_velocity(self.wake, self.points_W_m, *self._jets(apart), momentum, flow)
             # Either may push soon, and jets live for seconds: what one sends now meets what the other sends then.
             D = self._joined(apart, speed)
-            np.add.at(G, (apart.first, apart.first), 0.5 * D)
-            np.add.at(G, (apart.second, apart.second), 0.5 * D)
-            return G
+            charged = G.copy()
+            np.add.at(charged, (apart.first, apart.first), 0.5 * D)
+            np.add.at(charged, (apart.second, apart.second), 0.5 * D)
+            return Seen(gram=charged, sent=_with_pairs(G, apart, D))
         G = np.array(super().gram(X_WB))
         met = joined_jets(origins, axes, self.pairs)
         D = self._joined(met, self.wake.unit_velocity(self.points_W_m, *self._jets(met)))
-        np.add.at(G, (met.first, met.second), 0.5 * D)
-        np.add.at(G, (met.second, met.first), 0.5 * D)
-        return G
+        G = _with_pairs(G, met, D)
+        return Seen(gram=G, sent=G)
 
     def _jets(self, met: JoinedJets) -> tuple[Array, Array, Array]:
         """Origins, directions and areas of jets made of two."""
@@ -144,6 +150,13 @@ class JoinedJets:
     def take(self, which: Any) -> JoinedJets:
         """Those that a mask or a list of numbers picks."""
         return JoinedJets(**{field.name: getattr(self, field.name)[which] for field in fields(self)})
+
+
+def _with_pairs(G: Array, met: JoinedJets, D: Array) -> Array:
+    """The matrix, in place, with D of what pairs become, per newton of their geometric mean."""
+    np.add.at(G, (met.first, met.second), 0.5 * D)
+    np.add.at(G, (met.second, met.first), 0.5 * D)
+    return G
 
 
 def joined_jets(
@@ -214,7 +227,7 @@ def meeting_view(view: WakeView, layout: Layout) -> MeetingView:
 class SpareState:
     """The other controller's state, the thrusts last told, shape (n,), and when they were last shared out (freely).
 
-    `gram`, shape (2 n, 2 n), is the matrix of the last search.
+    `seen` are the matrices of the last search.
     """
 
     inner: Any
@@ -222,7 +235,7 @@ class SpareState:
     age_s: float = np.inf
     disturbance: float | None = None
     free_age_s: float = np.inf
-    gram: Array | None = None
+    seen: Seen | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -265,14 +278,14 @@ class Respared:
         if command.fallback is not None:
             return SpareState(inner=inner, thrusts_N=command.thrusts_N), command
         watch, wrench = self.watch, command.wrench_B
-        if state.gram is not None and state.age_s + 1e-6 < EVERY_S:
+        if state.seen is not None and state.age_s + 1e-6 < EVERY_S:
             moved = watch.moved(wrench, state.thrusts_N)
             due = state.free_age_s + 1e-6 >= JUMP_EVERY_S and state.age_s + 1e-6 >= APART_S
             if due and watch.allowed(moved):
                 # Such a step has no time to share the change out, too.
                 held = self._jumped(replace(state, thrusts_N=moved, free_age_s=0.0), wrench, estimate)
             else:
-                held = replace(state, thrusts_N=watch.follow(wrench, state.gram, state.thrusts_N))
+                held = replace(state, thrusts_N=watch.follow(wrench, state.seen, state.thrusts_N).thrusts_N)
             held = replace(held, age_s=held.age_s + dt_s, free_age_s=held.free_age_s + dt_s)
             held = replace(held, inner=self._told(inner, held.thrusts_N, dt_s))
             return held, replace(command, thrusts_N=held.thrusts_N, disturbance=held.disturbance)
@@ -280,20 +293,20 @@ class Respared:
         if shared is None:
             words = "wake model not finite: thrusts of the plan"
             return SpareState(inner=inner, thrusts_N=command.thrusts_N), replace(command, fallback=words)
-        found, gram = shared
+        found, seen = shared
         # The first search is made with the first plan, the next ones between two plans.
         age_s = dt_s if np.isfinite(state.age_s) else EVERY_S - APART_S + dt_s
         told = self._told(inner, found.thrusts_N, dt_s)
-        new = SpareState(told, found.thrusts_N, age_s, found.disturbance, state.free_age_s + dt_s, gram)
+        new = SpareState(told, found.thrusts_N, age_s, found.disturbance, state.free_age_s + dt_s, seen)
         return new, replace(command, thrusts_N=found.thrusts_N, disturbance=found.disturbance)
 
     def _jumped(self, state: SpareState, wrench_B: Array, estimate: BodyState) -> SpareState:
         """The state with better shares from elsewhere, if there are any."""
-        anew = self.watch.jump(wrench_B, estimate, state.thrusts_N, state.gram)
+        anew = self.watch.jump(wrench_B, estimate, state.thrusts_N, state.seen)
         if anew is None:
             return state
-        found, gram = anew
-        return replace(state, thrusts_N=found.thrusts_N, disturbance=found.disturbance, gram=gram)
+        found, seen = anew
+        return replace(state, thrusts_N=found.thrusts_N, disturbance=found.disturbance, seen=seen)
 
     def _told(self, inner: Any, thrusts_N: Array, dt_s: float) -> Any:
         """The other controller's state, told what was flown in place of its thrusts, if it can be told."""

@@ -29,6 +29,7 @@ from wakewise.arrays import Array
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
 from wakewise.thrusters import electrical_power_W
 from wakewise.vehicles import Vehicle
+from wakewise.wake.view import Seen
 
 KEPT = 0.95
 """Share of the extra power of a whole flight that the bound of an instant hands out: with a bound of 1.3 two flights
@@ -67,16 +68,19 @@ class Sharer:
     law: PowerLaw | None = None
 
     def shares(
-        self, wrench_B: Array, gram: Array, weights: Weights, total_weight: float, previous_N: Array | None = None
+        self, wrench_B: Array, seen: Seen, weights: Weights, total_weight: float, previous_N: Array | None = None
     ) -> Allocation:
-        """Thrusts of least cost; arguments as for `gentle_allocation`, `total_weight` that of the points behind D."""
-        found = gentle_allocation(self.layout, wrench_B, gram, weights, previous_N)
+        """Thrusts of least cost; arguments as for `gentle_allocation`, `total_weight` that of the points behind D.
+
+        Shares are chosen by `seen.gram`; the bound asks what the least thrusts do as they are sent.
+        """
+        found = gentle_allocation(self.layout, wrench_B, seen.gram, weights, previous_N)
         if self.law is None:
             return found
-        least = least_thrusts(self.layout, wrench_B, gram)
+        least = least_thrusts(self.layout, wrench_B, seen.sent)
         speed_m_s = float(np.sqrt(max(least.disturbance or 0.0, 0.0) / total_weight)) / TOO_FAST
         most_W = allowed(speed_m_s) * float(self.law.power_W(least.thrusts_N))
-        return within_power(self.layout, found, least.thrusts_N, self.law, most_W, gram, weights, previous_N)
+        return within_power(self.layout, found, least.thrusts_N, self.law, most_W, seen.gram, weights, previous_N)
 
 
 def sharer_of(vehicle: Vehicle, settings: ControlSettings) -> Sharer:

@@ -19,7 +19,7 @@ from wakewise.control.levers import LeverSettings
 from wakewise.control.thrift import Sharer
 from wakewise.interfaces import BodyState
 from wakewise.wake.carried import Flow
-from wakewise.wake.view import WakeView
+from wakewise.wake.view import Seen, WakeView
 
 UNSURE = 0.55
 """Standard deviation of how far the current takes a jet's water over what is reckoned, beside what the estimator is
@@ -57,7 +57,11 @@ class Watch:
 
     def gram(self, estimate: BodyState, thrusts_N: Array) -> Array:
         """Matrix G of D = s' G s at an estimate, shape (2 n, 2 n), in the flow that it tells of."""
-        return self.view.gram(estimate.X_WB, self.flow(estimate, thrusts_N))
+        return self.seen(estimate, thrusts_N).gram
+
+    def seen(self, estimate: BodyState, thrusts_N: Array) -> Seen:
+        """Matrices of D at an estimate, in the flow that it tells of: to choose shares by, and of thrusts as sent."""
+        return self.view.seen(estimate.X_WB, self.flow(estimate, thrusts_N))
 
     def flow(self, estimate: BodyState, thrusts_N: Array) -> Flow | None:
         """The current to reckon with and the thrusts, shape (n,), to reckon from; None where it does not count.
@@ -86,68 +90,70 @@ class Watch:
         """Whether thrusts, shape (n,), are within the limits."""
         return bool(np.all((thrusts_N >= self.layout.lower_N) & (thrusts_N <= self.layout.upper_N)))
 
-    def share_out(self, wrench_B: Array, estimate: BodyState, previous_N: Array) -> tuple[Allocation, Array] | None:
-        """Gentle thrusts for a wrench, near those of before, and the Gram matrix that says so, shape (2 n, 2 n).
+    def share_out(self, wrench_B: Array, estimate: BodyState, previous_N: Array) -> tuple[Allocation, Seen] | None:
+        """Gentle thrusts for a wrench, near those of before, and the matrices that say so.
 
         The gentler of two: those of before, `previous_N`, shape (n,), with the least change, and what the exact
         allocator makes of their matrix. None if the wake model gives what is not finite.
         """
         moved = self.moved(wrench_B, previous_N)
-        before = self.gram(estimate, moved)
-        if not np.isfinite(before).all():
+        before = self.seen(estimate, moved)
+        if not np.isfinite(before.gram).all():
             return None
-        found = self.sharer.shares(wrench_B, before, self.weights, self.view.total_weight, previous_N)
+        found = self.follow(wrench_B, before, previous_N)
         if self.flow(estimate, previous_N) is None:
             return found, before
-        after = self.gram(estimate, found.thrusts_N)
+        after = self.seen(estimate, found.thrusts_N)
         if self.allowed(moved):
-            stays = self.cost(moved, before, previous_N)
-            if not self.cost(found.thrusts_N, after, previous_N) < stays:
+            stays = self.cost(moved, before.gram, previous_N)
+            if not self.cost(found.thrusts_N, after.gram, previous_N) < stays:
                 return self.as_found(wrench_B, before, moved), before
-        if not np.isfinite(after).all():
+        if not np.isfinite(after.gram).all():
             return None
-        return replace(found, disturbance=disturbance_of(after, found.thrusts_N)), after
+        return replace(found, disturbance=disturbance_of(after.gram, found.thrusts_N)), after
 
-    def follow(self, wrench_B: Array, gram: Array, previous_N: Array) -> Array:
-        """Thrusts, shape (n,), of a wrench that has changed since the last search, by that search's matrix.
+    def follow(self, wrench_B: Array, seen: Seen, previous_N: Array) -> Allocation:
+        """Gentle thrusts for a wrench that may have changed since the matrices were made.
 
         Least changes would send the noise of the wrench through thrusters that rest because they blow at the target.
         """
-        return self.sharer.shares(wrench_B, gram, self.weights, self.view.total_weight, previous_N).thrusts_N
+        return self.sharer.shares(wrench_B, seen, self.weights, self.view.total_weight, previous_N)
 
-    def as_found(self, wrench_B: Array, gram: Array, thrusts_N: Array) -> Allocation:
+    def as_found(self, wrench_B: Array, seen: Seen, thrusts_N: Array) -> Allocation:
         """Thrusts within limits that make the wrench, shape (n,), as if they had been looked for."""
         return Allocation(
             thrusts_N=thrusts_N,
             wrench_B=self.layout.B @ thrusts_N,
             requested_B=wrench_B,
-            disturbance=disturbance_of(gram, thrusts_N),
+            disturbance=disturbance_of(seen.gram, thrusts_N),
             method="moved",
             gap=0.0,
             scale=1.0,
         )
 
     def jump(
-        self, wrench_B: Array, estimate: BodyState, present_N: Array, present_gram: Array | None = None
-    ) -> tuple[Allocation, Array] | None:
+        self, wrench_B: Array, estimate: BodyState, present_N: Array, present: Seen | None = None
+    ) -> tuple[Allocation, Seen] | None:
         """Other thrusts for a wrench, better by more than `WORTH` than those that make it now; None if there are none.
 
         Without a price on change, from the least thrusts on: the price keeps shares near to the last ones, and for good
-        where another minimum lies apart. `present_N`, shape (n,), must make the wrench; `present_gram` is their matrix,
-        where it is known from the last search.
+        where another minimum lies apart. `present_N`, shape (n,), must make the wrench; `present` are their matrices,
+        where known from the last search.
         """
         least = least_thrusts(self.layout, wrench_B)
-        first = self.gram(estimate, present_N) if present_gram is None else present_gram
-        there = self.gram(estimate, least.thrusts_N)
-        if not (np.isfinite(first).all() and np.isfinite(there).all()):
+        first = self.seen(estimate, present_N) if present is None else present
+        there = self.seen(estimate, least.thrusts_N)
+        if not (np.isfinite(first.gram).all() and np.isfinite(there.gram).all()):
             return None
         free = replace(self.weights, previous=0.0)
         found = self.sharer.shares(wrench_B, there, free, self.view.total_weight)
-        own = there if self.flow(estimate, present_N) is None else self.gram(estimate, found.thrusts_N)
-        best, G = min(((least, there), (found, own)), key=lambda pair: self.cost(pair[0].thrusts_N, pair[1]))
-        if best.scale < FULL or not self.cost(best.thrusts_N, G) < (1.0 - WORTH) * self.cost(present_N, first):
+        own = there if self.flow(estimate, present_N) is None else self.seen(estimate, found.thrusts_N)
+        best, seen = min(((least, there), (found, own)), key=lambda pair: self.cost(pair[0].thrusts_N, pair[1].gram))
+        if best.scale < FULL or not self.cost(best.thrusts_N, seen.gram) < (1.0 - WORTH) * self.cost(
+            present_N, first.gram
+        ):
             return None
-        return replace(best, disturbance=disturbance_of(G, best.thrusts_N)), G
+        return replace(best, disturbance=disturbance_of(seen.gram, best.thrusts_N)), seen
 
     def _believed(self, estimate: BodyState) -> tuple[Array | None, Array | None]:
         """The current, shape (3,), and its covariance, shape (3, 3), None each where nothing is known or sure."""

@@ -76,7 +76,7 @@ class AssistedPilot:
     controls : Controls or None
         As last read.
     velocity_W_m_s : ndarray, shape (3,)
-        Asked for, as slewed.
+        Asked for, as shaped.
     deviation_pct : float or None
         Of the estimated velocity from the one asked for, rms over the last seconds; None while none is asked for.
     trace : TraceWriter
@@ -120,7 +120,7 @@ class AssistedPilot:
 
     @property
     def velocity_W_m_s(self) -> Array:
-        """Asked for, as slewed, shape (3,)."""
+        """Asked for, as shaped, shape (3,)."""
         return self.motion.velocity_W_m_s
 
     @property

@@ -8,12 +8,12 @@ held goes on along a circle.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.control.intent import FULL_M_S, FULL_RAD_S, HIGHEST_RAD, moved_on, slewed
+from wakewise.control.intent import FULL_M_S, FULL_RAD_S, HIGHEST_RAD, moved_on, shaped, slewed
 from wakewise.interfaces import BodyState
 from wakewise.missions import CameraAim
 from wakewise.operation.assists import elevation_rad, level_frame, sphere_frame, watching
@@ -22,9 +22,24 @@ from wakewise.operation.keep_off import KeepOff
 from wakewise.operation.motion import STEEPEST_RAD, Attitude, Motion, followed, tilted, tilting, turning
 
 FASTER_M_S2, BRAKING_M_S2 = 0.15, 0.2
-"""How fast a commanded velocity grows and falls; from 0.3 m/s to rest it takes 1.5 s and 0.23 m."""
+"""How fast a commanded velocity grows and falls on average; from 0.3 m/s to rest it takes 1.5 s and 0.23 m."""
+JERK_M_S3 = 0.8
+"""Fastest change of its acceleration: 0 to 0.2 m/s2 in a quarter of a second. That is what a vehicle answers in (lag of
+a thruster 0.1 s, age of a plan up to 0.1 s, delay of an estimate 0.08 s), and no more than a person's own delay."""
+EVEN_M_S = 0.3
+"""Speed at which a change that begins and ends gently takes as long as one of steady acceleration would."""
 PULL_M_S = 0.5
 """Fastest that the leash pulls the commanded place towards a vehicle that is held up or far off."""
+
+
+def _peak(mean_m_s2: float) -> float:
+    """Largest acceleration of a change by `EVEN_M_S` that takes v / mean in all: v / a + a / jerk of time."""
+    takes_s = EVEN_M_S / mean_m_s2
+    return 0.5 * JERK_M_S3 * (takes_s - math.sqrt(takes_s**2 - 4.0 * EVEN_M_S / JERK_M_S3))
+
+
+FASTER_PEAK_M_S2, BRAKING_PEAK_M_S2 = _peak(FASTER_M_S2), _peak(BRAKING_M_S2)
+"""0.17 and 0.25 m/s2."""
 RANGE_PER_S, RANGE_M_S = 1.0, 0.05
 """How an orbit keeps its range: speed per distance, and at most."""
 SLOW_M_S = 0.01
@@ -39,11 +54,12 @@ TILT_RAD_S = math.radians(40.0)
 class Sphere:
     """The frame of the sticks, shape (3, 3), as it was a step ago, and the orbit's radius where one is kept.
 
-    `frame` is None where nobody steered before, and `orbits` tells whether it is that of an orbit. `blocked_by` is
-    what is in the way, None if nothing.
+    `frame` is None where nobody steered before, and `orbits` tells whether it is that of an orbit. `change_m_s2`, shape
+    (3,), is how fast the velocity changes in that frame. `blocked_by` is what is in the way, None if nothing.
     """
 
     frame: Array | None = None
+    change_m_s2: Array = field(default_factory=lambda: np.zeros(3))
     orbits: bool = False
     range_m: float | None = None
     blocked_by: str | None = None
@@ -108,18 +124,30 @@ def steered(
     range_m = None
     if state.orbit:
         wish[0], range_m = _at_range(wish[0], now[0], sphere.range_m, float(np.linalg.norm(eye - target_W_m)))
-    harder = BRAKING_M_S2 if np.linalg.norm(wish) < np.linalg.norm(now) else FASTER_M_S2
-    velocity = frame @ slewed(now, wish, dt_s, harder) - swing
+    answer, change = answered(now, sphere.change_m_s2, wish, dt_s)
+    velocity = frame @ answer - swing
     blocked_by = None
     if keep_off is not None:
+        free = velocity
         velocity, _ = keep_off.allowed(motion.X_WB, velocity, motion.omega_B_rad_s)
+        if not np.array_equal(velocity, free):
+            change = np.zeros(3)  # what stops it now is not the sticks' doing, and is not to go on after it
         if wish.any():  # what is asked for, not what is left of it by now, is what something is in the way of
             _, blocked_by = keep_off.allowed(motion.X_WB, frame @ wish - swing, motion.omega_B_rad_s)
     # Near the zenith the frame turns faster than a velocity may.
     velocity = slewed(motion.velocity_W_m_s, velocity, dt_s, HARDEST_M_S2)
     place = led(motion.place_W_m, 0.5 * (motion.velocity_W_m_s + velocity), estimate, dt_s)
     moved = replace(motion, place_W_m=place, velocity_W_m_s=velocity)
-    return moved, Sphere(frame=frame, orbits=state.orbit, range_m=range_m, blocked_by=blocked_by)
+    return moved, Sphere(frame=frame, change_m_s2=change, orbits=state.orbit, range_m=range_m, blocked_by=blocked_by)
+
+
+def answered(now_m_s: Array, change_m_s2: Array, wish_m_s: Array, dt_s: float) -> tuple[Array, Array]:
+    """What sticks lead a commanded velocity to, and how fast that changes, a step on; shape (3,) each, in their frame.
+
+    A change that comes as fast as a hand moves no vehicle can make, and what it misses it makes up for with thrust.
+    """
+    slower = np.linalg.norm(wish_m_s) < np.linalg.norm(now_m_s)
+    return shaped(now_m_s, change_m_s2, wish_m_s, dt_s, BRAKING_PEAK_M_S2 if slower else FASTER_PEAK_M_S2, JERK_M_S3)
 
 
 def _at_range(wish: float, now: float, kept_m: float | None, range_m: float) -> tuple[float, float | None]:

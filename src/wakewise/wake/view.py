@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,16 @@ from wakewise.vehicles import Vehicle
 from wakewise.wake.carried import Flow
 from wakewise.wake.disturbance import gram
 from wakewise.wake.gradients import Superposition
+
+
+class Seen(NamedTuple):
+    """Matrices of D, shape (2 n, 2 n) each: `gram`, by which shares are chosen, and `sent`, of what thrusts do as sent.
+
+    They are one unless `gram` also charges thrusts for others that may join them (`wakewise.control.spare`).
+    """
+
+    gram: Array
+    sent: Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,6 +72,11 @@ class WakeView:
         origins_W, axes_W = _placed(X_WB.p_m, X_WB.q, self.positions_B_m, self.axes_B)
         place = (self.points_W_m, self.weights, origins_W, axes_W, self.areas_m2)
         return gram(self.wake, *place, superposition=self.superposition, flow=flow)
+
+    def seen(self, X_WB: Pose, flow: Flow | None = None) -> Seen:
+        """Matrices of D: what to choose shares by, and what thrusts do as sent."""
+        G = self.gram(X_WB, flow)
+        return Seen(gram=G, sent=G)
 
 
 @njit

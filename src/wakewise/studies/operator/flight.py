@@ -166,7 +166,7 @@ def deviations(
 ) -> dict[str, float | None]:
     """Rms of differences over the rms of what was asked, in percent; shape (steps, 3) each, in W.
 
-    `asked` is the command, slewed; `sticks` what the sticks point at. None where nothing was asked.
+    `asked` is the command, shaped; `sticks` what the sticks point at. None where nothing was asked.
     """
 
     def rms(values: Array) -> float:
