@@ -37,6 +37,9 @@ def test_the_projects_own_matrix_is_forward_starboard_down() -> None:
     tam = told["thruster_allocation_matrix_controller"]["ros__parameters"]["tam"]
     for row, values in theirs.items():
         np.testing.assert_allclose(tam[row][:4], values, atol=1e-3)
+    flu = yaml.safe_load(tam_yaml("heavy", draft.thruster_names, draft.allocation_matrix))
+    mirrored = flu["thruster_allocation_matrix_controller"]["ros__parameters"]["tam"]
+    np.testing.assert_allclose(mirrored["y"][:4], -np.array(theirs["y"]), atol=1e-3)
 
 
 def test_small_and_odd_numbers_are_numbers_in_yaml() -> None:
