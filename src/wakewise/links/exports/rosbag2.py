@@ -4,7 +4,8 @@ Topics: `/true/pose`, `/estimated/pose` (geometry_msgs/PoseStamped in `map`), `/
 `base_link_true`, `camera_optical` and `camera_optical_true`), `/thrusts` (std_msgs/Float64MultiArray, N, forward is
 positive), `/wrench` (geometry_msgs/WrenchStamped in `base_link`), `/camera/image/compressed`
 (sensor_msgs/CompressedImage, the files as they are) and `/camera/camera_info` (plumb_bob; ROS counts pixel centres from
-0, so the principal point lies half a pixel lower than ours). Metadata are of version 8, the older of the two that rosbags writes.
+0, so the principal point lies half a pixel lower than ours). Metadata are of version 8, the older
+of the two that rosbags writes.
 """
 
 from __future__ import annotations
