@@ -35,7 +35,7 @@ Poses = Annotated[
 Frame = Annotated[
     str,
     typer.Option(
-        "--frame", help="auv_controllers: flu, for wrenches as ROS has them, or fsd, for its own controllers."
+        "--frame", help="auv_controllers: fsd, for its own controllers, or flu, for wrenches as ROS has them."
     ),
 ]
 At = Annotated[
@@ -51,7 +51,7 @@ def export(
     out: Out = None,
     poses: Poses = "true",
     origin: At = None,
-    frame: Frame = "flu",
+    frame: Frame = "fsd",
     json: Json = False,
 ) -> None:
     """Export a trial to other tools: trainers of splats and NeRFs, COLMAP, evo, ROS 2, QGroundControl.

@@ -37,7 +37,7 @@ def test_the_projects_own_matrix_is_forward_starboard_down() -> None:
     tam = told["thruster_allocation_matrix_controller"]["ros__parameters"]["tam"]
     for row, values in theirs.items():
         np.testing.assert_allclose(tam[row][:4], values, atol=1e-3)
-    flu = yaml.safe_load(tam_yaml("heavy", draft.thruster_names, draft.allocation_matrix))
+    flu = yaml.safe_load(tam_yaml("heavy", draft.thruster_names, draft.allocation_matrix, frame="flu"))
     mirrored = flu["thruster_allocation_matrix_controller"]["ros__parameters"]["tam"]
     np.testing.assert_allclose(mirrored["y"][:4], -np.array(theirs["y"]), atol=1e-3)
 
@@ -46,7 +46,7 @@ def test_small_and_odd_numbers_are_numbers_in_yaml() -> None:
     """1e-05 without a point would be a string to YAML 1.1; no zero is negative; names do not break lines."""
     matrix = np.zeros((6, 2))
     matrix[0], matrix[1, 0] = 1e-05, -3e-17
-    text = tam_yaml("a\nb: c", ("top: left\n#1", "2"), matrix)
+    text = tam_yaml("a\nb: c", ("top: left\n#1", "2"), matrix, frame="flu")
     tam = yaml.safe_load(text)["thruster_allocation_matrix_controller"]["ros__parameters"]["tam"]
     assert tam["x"] == [1e-05, 1e-05]
     assert tam["y"][0] == 3e-17

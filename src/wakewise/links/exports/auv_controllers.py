@@ -20,14 +20,14 @@ from wakewise.errors import InputError
 from wakewise.links.exports.frames import flu_of
 
 FRAMES = {
-    "flu": "forward, left, up (FLU), as a wrench of ROS; for auv_controllers' own controllers give --frame fsd",
-    "fsd": "forward, starboard, down (FSD), as auv_controllers' own controllers send wrenches; not ROS's FLU",
+    "flu": "forward, left, up (FLU), as a wrench of ROS; auv_controllers' own controllers want --frame fsd",
+    "fsd": "forward, starboard, down (FSD), as auv_controllers' own controllers have it; ROS's is --frame flu",
 }
 ROWS = ("x", "y", "z", "rx", "ry", "rz")
 
 
 def tam_yaml(
-    vehicle: str, names: Sequence[str], matrix_B: Array, limits_N: tuple[Array, Array] | None = None, frame: str = "flu"
+    vehicle: str, names: Sequence[str], matrix_B: Array, limits_N: tuple[Array, Array] | None = None, frame: str = "fsd"
 ) -> str:
     """Text of the parameter file.
 
