@@ -186,7 +186,7 @@ def _name_modes(axes: Axes, rows: pl.DataFrame, time_s: Array) -> None:
     for start, stop, mode in _runs(rows["mode"].to_list()):
         if not mode:
             continue
-        if start:
+        if start and rows["mode"][start - 1] is not None:
             axes.axvline(time_s[start], color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
         share = (time_s[stop] - time_s[start]) / whole
         if share * axes.figure.get_figwidth() > 0.11 * len(str(mode)):  # type: ignore[union-attr]

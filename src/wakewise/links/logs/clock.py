@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-BACK_S, AHEAD_S = 0.5, 10.0
+BACK_S, AHEAD_S = 0.5, 3.0
 """Steps from one record to the next beyond these are questioned."""
 LONGEST_PAUSE_S = 3600.0
 """Longest pause that is believed where no second clock tells of it."""
@@ -35,6 +35,7 @@ class Clock:
         self._now_s = 0.0
         self._boot: tuple[float, float] | None = None
         self._open: tuple[float, float] | None = None
+        self._ahead_s = 0.0
         self._stray: tuple[float, int] | None = None
 
     def at(self, stamp_s: float, boot_s: float | None = None) -> float:
@@ -50,12 +51,19 @@ class Clock:
                 step, self._open = stamp_s - before_s, None
                 del self.jumps[told:]
         last_s, self._stamp_s = self._stamp_s, stamp_s
-        if -BACK_S <= step <= AHEAD_S:
-            self._now_s += max(step, 0.0)
-        else:
-            self._settle(None)
+        if self._open is not None and not -BACK_S <= step <= AHEAD_S:
+            # Several steps with nothing to judge them by between count as one.
+            at_s, before = self._open
+            step, self._open = before + step, None
+            if not -BACK_S <= step <= AHEAD_S:
+                self._open = (at_s, step)
+        elif not -BACK_S <= step <= AHEAD_S:
             self._open = (self._now_s, step)
             self._stray = (last_s, len(self.jumps))
+        if -BACK_S <= step <= AHEAD_S:
+            held = min(max(step, 0.0), self._ahead_s)
+            self._ahead_s -= held
+            self._now_s += max(step, 0.0) - held
         if boot_s is not None:
             if self._open is not None:
                 self._settle(boot_s)
@@ -73,7 +81,10 @@ class Clock:
         (at_s, step), self._open = self._open, None
         gap = None
         if boot_s is not None and self._boot is not None and boot_s >= self._boot[0]:
-            gap = max((boot_s - self._boot[0]) - (self._now_s - self._boot[1]), 0.0)
+            late = (boot_s - self._boot[0]) - (self._now_s - self._boot[1])
+            gap = max(late, 0.0)
+            # A clock that never runs back stands still where it went too far.
+            self._ahead_s = max(-late, 0.0)
         if gap is None or gap > LONGEST_PAUSE_S:
             gap = step if 0.0 < step <= LONGEST_PAUSE_S else 0.0
         self._now_s += gap
