@@ -9,6 +9,7 @@ import typer
 
 from wakewise.cli.console import print_json, print_table, shown
 from wakewise.cli.options import Json
+from wakewise.cli.points import read_points
 
 if TYPE_CHECKING:
     from wakewise.allocation import Allocation
@@ -99,7 +100,7 @@ def allocate(
         raise InputError(f"--sum {sum_}: unknown, allowed: coherent, incoherent")
     superposition: Literal["coherent", "incoherent"] = "coherent" if sum_ == "coherent" else "incoherent"
     model = wake.wake_model(wake_model)
-    places, weights = _points(points, chosen, X_WB)
+    places, weights = read_points(points, chosen, X_WB)
     before = None if previous is None else _thrusts(previous, len(chosen.thrusters))
     lower, upper = chosen.thrust_lower_N.copy(), chosen.thrust_upper_N.copy()
     dead = sorted({_thruster(name, chosen) for name in failed or []})
@@ -235,44 +236,3 @@ def _thrusts(text: str, count: int) -> Array:
     if len(thrusts) != count or not np.all(np.isfinite(thrusts)):
         raise InputError(f"--previous {text}: {len(thrusts)} numbers, allowed: {count} finite ones, one per thruster")
     return thrusts
-
-
-def _points(path: Path, vehicle: Vehicle, X_WB: Pose) -> tuple[Array, Array]:
-    """Points, shape (n, 3), and weights, shape (n,), of a CSV file; refuses points inside the vehicle's box."""
-    import csv
-
-    import numpy as np
-
-    from wakewise.errors import InputError
-
-    columns = ("x_m", "y_m", "z_m", "weight")
-    try:
-        rows = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines(), strict=True))
-    except (OSError, UnicodeDecodeError, csv.Error) as fault:
-        raise InputError(f"--points {path}: cannot be read as CSV, {fault}") from None
-    head = [name.strip() for name in rows[0]] if rows else []
-    if sorted(head) != sorted(columns):
-        raise InputError(f"--points {path}: columns {', '.join(head) or 'none'}, allowed: {', '.join(columns)}")
-    values = []
-    for line, row in enumerate(rows[1:], start=2):
-        if not any(cell.strip() for cell in row):
-            continue
-        try:
-            values.append([float(row[head.index(name)]) for name in columns])
-        except (ValueError, IndexError):
-            raise InputError(f"--points {path}: line {line} '{','.join(row)}', four numbers are needed") from None
-        if len(row) != len(columns) or not np.all(np.isfinite(values[-1])):
-            raise InputError(f"--points {path}: line {line} '{','.join(row)}', four finite numbers are needed")
-        if values[-1][3] < 0.0:
-            raise InputError(f"--points {path}: line {line} has weight {values[-1][3]:g}, must not be negative")
-    table = np.array(values).reshape(-1, 4)
-    if not np.sum(table[:, 3]) > 0.0:
-        what = "holds no points" if not len(table) else "all weights are 0, at least one must be more"
-        raise InputError(f"--points {path}: {what}")
-    inside = np.all(np.abs(X_WB.inverse().apply(table[:, :3])) < 0.5 * vehicle.size_m, axis=1)
-    if np.any(inside):
-        raise InputError(
-            f"--points {path}: {int(inside.sum())} of {len(table)} points lie inside the vehicle's box "
-            f"({_words(tuple(vehicle.size_m))} m), the target must be outside"
-        )
-    return table[:, :3], table[:, 3]

@@ -24,6 +24,7 @@ from wakewise.cli import (
     evaluate,
     export,
     film,
+    link,
     nerf,
     reconstruct,
     scan,
@@ -63,6 +64,7 @@ app.add_typer(tank.app, name="tank")
 app.add_typer(target.app, name="target")
 app.add_typer(wake.app, name="wake")
 app.add_typer(world.app, name="world")
+app.add_typer(link.app, name="link")
 
 _INTERRUPTED = 130
 _TERMINATED = 143

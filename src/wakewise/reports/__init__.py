@@ -5,7 +5,8 @@ is made early) and `compare.py` (trials side by side). `trial.py` reads a trial'
 say figures in words, `page.py` is HTML with its style and script, `figures.py`, `views.py`, `photos.py`, `errors.py`,
 `looks.py` and `scene3d.py` are the pictures, `ink.py` their colours, `limits.py` what the water gets wrong, `trim.py`
 what ballast the flight lacked, `coverage.py` what its photographs saw. Studies have pages of their own: `wake.py` with
-`wake_plots.py`, `target.py`, `gentle.py`, `operator.py`, `degradation.py`; `vehicle/` is a vehicle's.
+`wake_plots.py`, `target.py`, `gentle.py`, `operator.py`, `degradation.py`; `vehicle/` is a vehicle's, `log.py` with
+`log_plots.py` a real vehicle's log's.
 """
 
 from typing import TYPE_CHECKING

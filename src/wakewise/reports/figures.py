@@ -35,12 +35,12 @@ from wakewise.reports.trial import Trial
 
 WIDTH_IN, NARROW_IN = 10.2, 4.0
 """Widths of a figure on a page and on a phone, where panels stand one below the other."""
-# Opaque at full thrust, clear at none, so that the strip sits on light and dark pages alike.
 _REVERSE, _FORWARD = (0.05, 0.42, 0.62), (0.85, 0.38, 0.12)
-_THRUSTS = LinearSegmentedColormap.from_list(
+THRUSTS = LinearSegmentedColormap.from_list(
     "thrust",
     [(0.0, (*_REVERSE, 1.0)), (0.5, (*_REVERSE, 0.0)), (0.5, (*_FORWARD, 0.0)), (1.0, (*_FORWARD, 1.0))],
 )
+"""Opaque at full thrust, clear at none, so that a strip sits on light and dark pages alike."""
 
 
 def legs(trial: Trial) -> Iterator[tuple[str, float, float]]:
@@ -234,7 +234,7 @@ def thrust_strip(trial: Trial, names_of: Sequence[str] = (), narrow: bool = Fals
     dress(strip, x="time (s)", y="" if named else "thruster", grid="")
     dress(bars, x="rms (N)", grid="x")
     image = strip.imshow(
-        shown, aspect="auto", cmap=_THRUSTS, vmin=-limit, vmax=limit, interpolation="nearest",
+        shown, aspect="auto", cmap=THRUSTS, vmin=-limit, vmax=limit, interpolation="nearest",
         extent=(float(time_s[0]), float(time_s[-1]), len(names) + 0.5, 0.5),
     )  # fmt: skip
     for row in range(1, len(names)):

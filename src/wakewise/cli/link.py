@@ -1,0 +1,174 @@
+"""`wakewise link`: real vehicles and what they recorded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from wakewise.cli.console import Bars, print_json, shown
+from wakewise.cli.options import Json
+
+if TYPE_CHECKING:
+    from wakewise.links.logs.gather import VehicleLog
+    from wakewise.links.logs.hindsight import Hindsight
+    from wakewise.links.logs.table import LogTable
+    from wakewise.targets import Region
+    from wakewise.vehicles import Vehicle
+
+app = typer.Typer(help="Real vehicles and what they recorded.", rich_markup_mode=None)
+
+DEFAULT_VEHICLE = "bluerov2-heavy"
+
+LogFile = Annotated[
+    Path, typer.Argument(help="A telemetry log (.tlog), the autopilot's own (.BIN) or BlueOS's recording (.mcap).")
+]
+Flown = Annotated[
+    str | None,
+    typer.Option(
+        "--vehicle",
+        help="Library name or vehicle YAML file of the vehicle that was flown; bluerov2-heavy if not given.",
+        show_default=False,
+    ),
+]
+Ahead = Annotated[
+    float,
+    typer.Option(
+        "--ahead",
+        metavar="M",
+        help="From the bow to the middle of a ball of 0.5 m across, which stands for the target.",
+    ),
+]
+Points = Annotated[
+    Path | None,
+    typer.Option(
+        "--points",
+        help="CSV with x_m, y_m, z_m from the middle of the vehicle (forward, right, down) and weight: what to spare "
+        "instead.",
+        show_default=False,
+    ),
+]
+WakeModelName = Annotated[
+    str, typer.Option("--wake-model", help="paper, paper-calibrated, fitted, linear, jet or jet-fitted.")
+]
+Out = Annotated[
+    Path | None, typer.Option("--out", help="Folder for table, figures and page; runs/log-NAME if not given.")
+]
+
+
+@app.command("log")
+def log(
+    file: LogFile,
+    vehicle: Flown = None,
+    ahead: Ahead = 0.4,
+    points: Points = None,
+    wake_model: WakeModelName = "jet",
+    out: Out = None,
+    json: Json = False,
+) -> None:
+    """Read a vehicle's log, however damaged, and say what gentler thrusts would have spared at each instant.
+
+    Leaves steps.parquet (sticks, servo outputs, depth, attitude, thrusts, D on one clock), log.json, parameters.csv
+    and report.html. A bad record is a packet with a wrong checksum, or a stretch of bytes that is no record.
+    """
+    from wakewise.errors import InputError
+    from wakewise.extras import has
+    from wakewise.links.logs.folder import log_facts, write_folder
+    from wakewise.links.logs.read import read_log
+    from wakewise.links.logs.table import tabulate
+    from wakewise.vehicles import load_vehicle
+
+    chosen = load_vehicle(vehicle or DEFAULT_VEHICLE)
+    region = _region(chosen, ahead, points)
+    folder = out or Path("runs") / f"log-{file.stem}"
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"--out {folder}: a file is there, a folder is needed")
+    bars = Bars()
+    with bars.stage("reading"):
+        found = read_log(file)
+        table = tabulate(found)
+    with bars.stage("hindsight"):
+        looked, why_not = _hindsight(found, table, chosen, region, wake_model, named=vehicle is not None)
+    facts = {
+        "vehicle": chosen.name,
+        "wake_model": wake_model,
+        "points": str(points) if points else f"of a ball {ahead:g} m ahead of the bow",
+        **log_facts(found, table, looked, why_not),
+    }
+    write_folder(folder, found, table, looked, facts)
+    facts["folder"] = str(folder)
+    page = has("reports")
+    if page:
+        from wakewise.reports.log import write_log_page
+
+        with bars.stage("page"):
+            write_log_page(folder, [thruster.name for thruster in chosen.thrusters])
+    if json:
+        print_json(facts)
+    else:
+        _show(facts, folder, page)
+
+
+def _region(vehicle: Vehicle, ahead: float, points: Path | None) -> Region:
+    import numpy as np
+
+    from wakewise.cli.points import read_points
+    from wakewise.geometry import Pose
+    from wakewise.links.logs.hindsight import bow_points
+    from wakewise.targets import Region
+
+    if points is None:
+        return bow_points(vehicle, ahead)
+    places, weights = read_points(points, vehicle, Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])))
+    return Region(points_W_m=places, weights=weights, distance_m=np.zeros(len(places)))
+
+
+def _hindsight(
+    found: VehicleLog, table: LogTable, vehicle: Vehicle, region: Region, wake_model: str, *, named: bool
+) -> tuple[Hindsight | None, str | None]:
+    """Flown thrusts against others, or why there is none; a vehicle that was named must fit, the default may not."""
+    from wakewise import wake
+    from wakewise.errors import InputError
+    from wakewise.links.logs.hindsight import hindsight
+
+    model = wake.wake_model(wake_model)
+    if "servo" not in found.series:
+        return None, "the log holds no servo outputs"
+    try:
+        return hindsight(table.rows, found.parameters, vehicle, region, model), None
+    except InputError as fault:
+        if named:
+            raise
+        return None, str(fault)
+
+
+def _show(facts: dict[str, Any], folder: Path, page: bool) -> None:
+    reasons = ", ".join(f"{count} {reason}" for reason, count in facts["bad_by_reason"].items())
+    bad = f"{facts['bad_records']} bad" + (f" ({reasons}; {facts['bad_bytes']} bytes)" if reasons else "")
+    cut = "; the file ends within a record" if facts["cut_short"] else ""
+    typer.echo(f"{facts['file']}: {facts['format']}, {facts['records']} records, {bad}{cut}")
+    for jump in facts["clock_jumps"][:5]:
+        typer.echo(f"clock           jumped by {jump['step_s']:+.1f} s at {jump['time_s']:.1f} s; taken out")
+    if len(facts["clock_jumps"]) > 5:
+        typer.echo(f"                and {len(facts['clock_jumps']) - 5} more jumps")
+    if facts["other_systems"]:
+        typer.echo(f"vehicle         system {facts['system']}; others left aside: {facts['other_systems']}")
+    modes = ", ".join(f"{mode} {seconds:.0f} s" for mode, seconds in facts["modes"].items())
+    typer.echo(
+        f"time            {facts['duration_s']:.0f} s, armed {facts['armed_s']:.0f} s; {modes or 'no mode said'}"
+    )
+    typer.echo(f"depth           {shown(facts['depth_max_m'])} m at most, from {facts['depth_from'] or 'nothing'}")
+    if "why_no_hindsight" in facts:
+        typer.echo(f"thrusters       {facts['why_no_hindsight']}")
+    elif not facts["running_s"]:
+        typer.echo("thrusters       none ran, so there is nothing to spare")
+    else:
+        flown, least, gentle = (shown(facts[f"disturbance_{k}"]) for k in ("flown", "least", "gentle"))
+        typer.echo(f"thrusters       ran {facts['running_s']:.0f} s as {facts['vehicle']}'s")
+        typer.echo(f"mean D          {flown} (m/s)^2 as flown, {least} with least thrusts, {gentle} with gentle ones")
+        if facts["saved_pct"] is not None:
+            typer.echo(f"saved           {facts['saved_pct']:.1f} % of D as flown, at points {facts['points']}")
+        else:
+            typer.echo(f"saved           nothing to: no jet moves the points by 0.1 mm/s ({facts['points']})")
+    typer.echo(f"written to      {folder}" + ("" if page else " (no page: pip install 'wakewise[reports]')"))
