@@ -83,7 +83,8 @@ def test_masses_of_parts_in_yaml_are_not_the_vehicles(tmp_path: Path) -> None:
 
 def test_two_plugins_of_one_thruster_count_once_and_idle_propellers_are_questioned(tmp_path: Path) -> None:
     """As files for two simulators have it; a joint that is called a thruster and has no plugin is named."""
-    plugin = '<gazebo><plugin name="thruster" filename="libgz-sim-thruster-system.so"><joint_name>{}</joint_name></plugin></gazebo>'
+    name = 'name="thruster" filename="libgz-sim-thruster-system.so"'
+    plugin = f"<gazebo><plugin {name}><joint_name>{{}}</joint_name></plugin></gazebo>"
     joints = joint("j1", "base_link", "thruster_1", "continuous", "1 0 0") + joint(
         "j2", "base_link", "thruster_2", "continuous", "0 1 0"
     )

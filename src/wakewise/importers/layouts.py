@@ -147,7 +147,7 @@ def _columns(positions: Item, directions: Item, key: str, found: Found) -> tuple
     elif len(ways) > 1 and not units[0] and units[1]:
         chosen = 1
         found.notes.append(f"{key}: three numbers per thruster, since only so every direction has length 1")
-    elif len(ways) > 1 and all(units) and not (np.array_equal(*ways) and (len(places) == 1 or np.array_equal(*places))):
+    elif len(ways) > 1 and all(units) and not (np.array_equal(ways[0], ways[1]) and (len(places) == 1 or np.array_equal(places[0], places[1]))):
         if not flat:
             raise PlacedError(
                 f"{directions.place}: {key} are 3 x 3 and read both ways, by rows and by columns; write one "
