@@ -65,9 +65,20 @@ def test_an_arms_mass_is_not_the_vehicles(tmp_path: Path) -> None:
     """Where the hull states none, the vehicle's is not known; where it does, what moves is said."""
     thruster = joint("t1", "base_link", "thruster_1", "fixed", "1 0 0")
     bare = imported(tmp_path, ARM + thruster, '<link name="base_link"/>')
-    assert bare.mass_kg is None and any("only links that move" in note for note in bare.notes)
+    assert bare.mass_kg is None and any("only links of parts or that move" in note for note in bare.notes)
     whole = imported(tmp_path, ARM + thruster)
     assert whole.mass_kg == 12.5 and any("2.5 kg of it move on joints (arm)" in note for note in whole.notes)
+
+
+def test_a_link_called_arm_base_link_is_not_the_vehicles_base(tmp_path: Path) -> None:
+    """Neither its frame nor its mass is taken, fixed or not."""
+    arm = ARM.replace('"arm"', '"arm_base_link"').replace("revolute", "fixed")
+    thruster = joint("t1", "base_link", "thruster_1", "fixed", "1 0 0")
+    for base in ("base_link", "hull"):
+        text = (arm.replace("</joint>", '<origin xyz="1 0 0"/></joint>') + thruster).replace('"base_link"', f'"{base}"')
+        draft = imported(tmp_path, text, f'<link name="{base}"/>')
+        assert draft.mass_kg is None
+        assert draft.thrusters[0].p_BT_m.tolist() == [1.0, 0.0, 0.0]
 
 
 def test_masses_of_parts_in_yaml_are_not_the_vehicles(tmp_path: Path) -> None:

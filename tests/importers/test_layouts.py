@@ -93,6 +93,12 @@ def test_poses_and_angles_of_a_list_are_all_read(tmp_path: Path, second: str) ->
     np.testing.assert_allclose([t.p_BT_m for t in draft.thrusters], [[1, 0, 0], [-1, 0, 0]])
 
 
+def test_numbered_tables_beside_one_another_are_thrusters(tmp_path: Path) -> None:
+    draft = imported(tmp_path, "thruster_1: {pose: [1,0,0,0,0,45]}\nthruster_2: {pose: [-1,0,0,0,0,-45]}\nmass: 3")
+    np.testing.assert_allclose([t.axis_B for t in draft.thrusters], [[C, C, 0], [C, -C, 0]], atol=1e-12)
+    assert [t.name for t in draft.thrusters] == ["thruster_1", "thruster_2"]
+
+
 def test_rows_of_poses_are_read(tmp_path: Path) -> None:
     draft = imported(tmp_path, "thruster_poses: [[1,0,0,0,0,45],[-1,0,0,0,0,-45]]")
     np.testing.assert_allclose([t.axis_B for t in draft.thrusters], [[C, C, 0], [C, -C, 0]], atol=1e-12)

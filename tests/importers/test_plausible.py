@@ -47,6 +47,13 @@ def test_a_matrix_that_reads_both_ways_is_decided_by_its_moments_or_questioned(t
     np.testing.assert_array_equal(draft.allocation_matrix, matrix)
 
 
+def test_a_matrix_of_named_columns_is_read_and_one_of_tables_is_questioned(tmp_path: Path) -> None:
+    draft = imported(tmp_path, f"{DOWN}tam: {{port: [1,0,0,0,0,0.2], starboard: [1,0,0,0,0,-0.2]}}\nmass: 3")
+    np.testing.assert_array_equal(draft.allocation_matrix, np.array([[1, 0, 0, 0, 0, 0.2], [1, 0, 0, 0, 0, -0.2]]).T)
+    odd = imported(tmp_path, "tam: [{name: a, wrench: [1,0,0,0,0,0.2]}]\nmass: 3")
+    assert odd.shipped_matrix is None and any("QUESTIONED: tam is not read" in note for note in odd.notes)
+
+
 @pytest.mark.parametrize(
     ("matrix", "match"),
     [

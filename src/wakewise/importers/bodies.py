@@ -15,6 +15,13 @@ from wakewise.importers.xml import Element, Place, PlacedError, number, numbers
 IDENTITY = Pose(np.zeros(3))
 
 THRUSTER_NAME = re.compile(r"thrust|propell|prop(?:\d|_|$)|t200|rotor", re.IGNORECASE)
+PART_NAME = re.compile(
+    r"(^|[_/: ])(arm|manipulator|gripper|payload|tether|umbilical|cable|tool|camera|sensor|dvl|imu|battery|thruster|"
+    r"propeller|rotor|joint|finger|jaw|wrist|elbow|shoulder|forearm|ballast)s?\d*([_/: ]|$)",
+    re.IGNORECASE,
+)
+"""Names of parts that a vehicle carries: their masses and frames are not the vehicle's."""
+
 _MOVING = frozenset(
     {"revolute", "continuous", "prismatic", "revolute2", "universal", "ball", "screw", "planar", "floating"}
 )
@@ -160,9 +167,9 @@ def read_mass(bodies: Bodies, found: Found) -> None:
     if not weighed:
         return
     moving = _moving_parts(bodies)
-    if all(link.name in moving for link in weighed):
+    if all(link.name in moving or PART_NAME.search(link.name) for link in weighed):
         names = ", ".join(link.name for link in weighed[:4])
-        found.notes.append(f"mass: only links that move on the vehicle state one ({names}), so it is not taken")
+        found.notes.append(f"mass: only links of parts or that move state one ({names}), so it is not taken")
         return
     total = sum(link.mass_kg or 0.0 for link in weighed)
     heaviest = max(weighed, key=lambda link: link.mass_kg or 0.0)

@@ -27,6 +27,7 @@ _ANGLES = re.compile(
 )
 _POSES = re.compile(r"^(thrusters?_)?poses?(_(deg|rad)\w*)?$", re.IGNORECASE)
 _BARE = re.compile(r"^thrusters?(_list)?$", re.IGNORECASE)
+_NUMBERED = re.compile(r"^thruster_?\d+$", re.IGNORECASE)
 _POSITION_KEYS = ("position", "xyz", "pos", "location", "p", "translation")
 _DIRECTION_KEYS = ("direction", "axis", "force_direction", "thrust_direction", "dir")
 _ANGLE_KEY = re.compile(r"^(rpy|euler|euler_angles|angles|orientation|rotation)(_(deg|rad)\w*)?$", re.IGNORECASE)
@@ -50,7 +51,7 @@ def read_geometry(entries: Entries, found: Found) -> bool:
     if positions is not None and directions is not None:
         _from_matrices(positions, directions, key, entries, found)
     elif not _from_poses(entries, found):
-        _listed(entries, found)
+        _listed([*entries, *_numbered(entries)], found)
     if not found.thrusters:
         if positions is not None:
             raise PlacedError(f"{positions.place}: thruster positions without directions, which are needed too")
@@ -147,7 +148,11 @@ def _columns(positions: Item, directions: Item, key: str, found: Found) -> tuple
     elif len(ways) > 1 and not units[0] and units[1]:
         chosen = 1
         found.notes.append(f"{key}: three numbers per thruster, since only so every direction has length 1")
-    elif len(ways) > 1 and all(units) and not (np.array_equal(ways[0], ways[1]) and (len(places) == 1 or np.array_equal(places[0], places[1]))):
+    elif (
+        len(ways) > 1
+        and all(units)
+        and not (np.array_equal(ways[0], ways[1]) and (len(places) == 1 or np.array_equal(places[0], places[1])))
+    ):
         if not flat:
             raise PlacedError(
                 f"{directions.place}: {key} are 3 x 3 and read both ways, by rows and by columns; write one "
@@ -261,6 +266,15 @@ def _listed(entries: Entries, found: Found) -> None:
         if any(t.R_BT is not None for t in found.thrusters):
             found.thrust_rule = _TURN_RULE
         return
+
+
+def _numbered(entries: Entries) -> Entries:
+    """Tables `thruster_1`, `thruster_2` ... beside one another, as if they stood below `thrusters`."""
+    groups: dict[tuple[str, ...], dict[str, Item]] = {}
+    for path, item in entries:
+        if _NUMBERED.match(path[-1]) and item.table():
+            groups.setdefault(path[:-1], {})[path[-1]] = item
+    return [((*path, "thrusters"), Item(group, next(iter(group.values())).place)) for path, group in groups.items()]
 
 
 def _require_all_placed(

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from wakewise.importers.found import Found, Frame
+from wakewise.importers.found import QUESTION, Found, Frame
 from wakewise.importers.layouts import read_geometry
 from wakewise.importers.plausible import claims_in, require_count, require_same_count, upright
 from wakewise.importers.xml import PlacedError
@@ -102,7 +102,15 @@ def _matrix(entries: Entries, found: Found) -> bool:
             if len(flat) % 6:
                 raise PlacedError(f"{item.place}: {key} has {len(flat)} numbers, must be 6 rows")
             matrix = upright(flat.reshape(6, -1), flat.reshape(-1, 6).T, key, found.notes)
+        elif item.table() and all(len(column.items()) == 6 and column.is_numbers() for column in item.table().values()):
+            matrix = np.stack([column.numbers(f"{name} of {key}", 6) for name, column in item.table().items()], axis=1)
+            found.notes.append(f"{key}: a column for each of {', '.join(item.table())[:120]}")
         else:
+            if item.items():
+                found.notes.append(
+                    f"{QUESTION}{key} is not read, neither rows nor columns of numbers ({item.place.file.name}:"
+                    f"{item.place.line})"
+                )
             continue
         if matrix.shape[0] != 6 and matrix.shape[1] == 6:
             found.notes.append(f"{key}: {matrix.shape[0]} rows of 6 are taken for its transpose")

@@ -6,7 +6,16 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.geometry import Pose
-from wakewise.importers.bodies import Bodies, Joint, Link, Shape, checked_mass, geometry_volume, inertia_matrix
+from wakewise.importers.bodies import (
+    PART_NAME,
+    Bodies,
+    Joint,
+    Link,
+    Shape,
+    checked_mass,
+    geometry_volume,
+    inertia_matrix,
+)
 from wakewise.importers.packages import Folders
 from wakewise.importers.urdf import CAMERA_TYPES, camera, pose_element
 from wakewise.importers.xml import Element, PlacedError, number, numbers, parse_xml, read_text
@@ -147,16 +156,17 @@ class _Reader:
             self._collect(model, scope if merged else f"{key}::", depth + 1)
 
     def _base(self) -> str:
-        named = [key for key in self.links if key.rpartition("::")[2].rpartition("/")[2] == "base_link"]
+        own = {key: link for key, link in self.links.items() if not PART_NAME.search(key)} or self.links
+        named = [key for key in own if key.rpartition("::")[2].rpartition("/")[2] == "base_link"]
         told = self.model.attributes.get("canonical_link")
         if named:
             return min(named, key=len)
         if told in self.links:
             return str(told)
-        ending = [key for key in self.links if key.endswith("base_link")]
+        ending = [key for key in own if key.endswith("base_link")]
         if ending:
             return ending[0]
-        return max(self.links, key=lambda key: _mass_for_choice(self.links[key]))
+        return max(own, key=lambda key: _mass_for_choice(own[key]))
 
     def _pose(self, key: str, through: tuple[str, ...]) -> Pose:
         """Pose of a link, joint or frame in the model."""

@@ -9,6 +9,7 @@ from wakewise.geometry import Pose
 from wakewise.importers.angles import require_radians
 from wakewise.importers.bodies import (
     IDENTITY,
+    PART_NAME,
     Bodies,
     Camera,
     Joint,
@@ -119,10 +120,11 @@ def _parents(joints: list[tuple[str, Element]], links: dict[str, Link]) -> dict[
 
 
 def _base_link(links: dict[str, Link], parents: dict[str, str]) -> str:
-    for name in links:
+    own = [name for name in links if not PART_NAME.search(name)]
+    for name in [*own, *links]:
         if name.replace("::", "/").rpartition("/")[2] == "base_link":
             return name
-    bases = [name for name in links if name.endswith("base_link")]
+    bases = [name for name in own if name.endswith("base_link")]
     if bases:
         return bases[0]
     roots = [name for name in links if name not in parents]

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.importers.bodies import inertia_matrix
+from wakewise.importers.bodies import PART_NAME, inertia_matrix
 from wakewise.importers.found import Found
 from wakewise.importers.water import store
 from wakewise.importers.xml import PlacedError
 from wakewise.importers.yamls import Item
 from wakewise.physics import GRAVITY_M_S2
-
-_PART = re.compile(
-    r"(^|[_/ ])(arm|manipulator|gripper|payload|tether|umbilical|cable|tool|camera|sensor|dvl|imu|battery|thruster|"
-    r"propeller|rotor|joint|finger|jaw|wrist|elbow|shoulder|forearm|ballast)s?\d*([_/ ]|$)",
-    re.IGNORECASE,
-)
 
 Entries = list[tuple[tuple[str, ...], Item]]
 """Every item of a file with the keys that lead to it."""
@@ -96,9 +89,9 @@ def _of_the_vehicle(entries: Entries, found: Found) -> Entries:
     InputError
         If two masses stand at one depth that may both be the vehicle's.
     """
-    whole = [(path, item) for path, item in entries if not any(_PART.search(key) for key in path[:-1])]
+    whole = [(path, item) for path, item in entries if not any(PART_NAME.search(key) for key in path[:-1])]
     masses = [(path, item) for path, item in whole if path[-1] == "mass" and isinstance(item.value, str)]
-    parts = [path for path, item in entries if path[-1] == "mass" and any(_PART.search(key) for key in path[:-1])]
+    parts = [path for path, item in entries if path[-1] == "mass" and any(PART_NAME.search(key) for key in path[:-1])]
     if parts:
         said = ", ".join(dict.fromkeys("/".join(path[:-1]) for path in parts[:6]))
         found.notes.append(f"mass: that of {said} is of a part and is not taken for the vehicle's")
