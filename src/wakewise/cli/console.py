@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
 
 @cache
@@ -77,6 +78,13 @@ def print_table(table: Table) -> None:
     console = Console(highlight=False)
     # A pipe or a file has no width to fit into.
     Console(highlight=False, width=console.width if console.is_terminal else 140).print(table)
+
+
+def plain(words: str) -> Text:
+    """Words of a file as they stand: what looks like markup in them is none."""
+    from rich.text import Text
+
+    return Text(words)
 
 
 def shown(value: Any) -> str:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from wakewise.cli import vehicle_import, vehicle_thruster, vehicle_trim
-from wakewise.cli.console import print_json, print_table, shown
+from wakewise.cli.console import plain, print_json, print_table, shown
 from wakewise.cli.options import Json
+
+if TYPE_CHECKING:
+    from wakewise.vehicles import VehicleDraft
 
 app = typer.Typer(
     help="Vehicles: list, show, check, import; their thrusters.", no_args_is_help=False, rich_markup_mode=None
@@ -74,19 +77,24 @@ def show(
     vehicle: Name = "paper",
     out: Out = None,
     drawing: Drawing = None,
+    frame: vehicle_import.Frame = "auto",
+    thrust_direction: vehicle_import.Thrust = "auto",
     package: Packages = None,
+    arg: vehicle_import.Arguments = None,
     skip_missing: SkipMissing = False,
     json: Json = False,
 ) -> None:
     """Show a vehicle: thrusters, rank, what redundancy it has, limits, where the figures are from."""
     from wakewise.errors import InputError
     from wakewise.files import write_text
-    from wakewise.importers import find_vehicle
     from wakewise.reports.vehicle import drawing_svg, vehicle_page
     from wakewise.vehicles import describe, parameters
 
-    draft = find_vehicle(vehicle, packages=_folders(package), skip_missing=skip_missing)
+    draft = _found(vehicle, frame, thrust_direction, package, arg, skip_missing=skip_missing)
     facts = describe(draft)
+    for option, path in (("--out", out), ("--drawing", drawing)):
+        if path is not None and path.is_dir():
+            raise InputError(f"{option} {path}: is a folder, must be a file")
     if out is not None:
         if out.suffix not in (".svg", ".html"):
             raise InputError(f"--out {out}: allowed are files that end in .svg or .html")
@@ -115,15 +123,18 @@ def show(
 def check(
     vehicle: Name,
     matrix: Matrix = None,
+    frame: vehicle_import.Frame = "auto",
+    thrust_direction: vehicle_import.Thrust = "auto",
     package: Packages = None,
+    arg: vehicle_import.Arguments = None,
     skip_missing: SkipMissing = False,
     json: Json = False,
 ) -> None:
     """Check a vehicle's thrusters: rank, null space, achievable wrench, single failures, stated matrix."""
-    from wakewise.importers import compare_with, find_vehicle
+    from wakewise.importers import compare_with
     from wakewise.vehicles import check_report
 
-    draft = find_vehicle(vehicle, packages=_folders(package), skip_missing=skip_missing)
+    draft = _found(vehicle, frame, thrust_direction, package, arg, skip_missing=skip_missing)
     facts = check_report(draft, None if matrix is None else compare_with(draft, matrix))
     if json:
         print_json(facts)
@@ -192,8 +203,29 @@ def _print_rows(title: str, columns: list[str], rows: list[list[Any]], left: int
     for index, column in enumerate(columns):
         table.add_column(column, justify="left" if index < left or column in ("unit", "force axis") else "right")
     for row in rows:
-        table.add_row(*(str(value) for value in row))
+        table.add_row(*(plain(str(value)) for value in row))
     print_table(table)
+
+
+def _found(
+    vehicle: str,
+    frame: str,
+    thrust_direction: str,
+    package: list[str] | None,
+    arg: list[str] | None,
+    *,
+    skip_missing: bool,
+) -> VehicleDraft:
+    from wakewise.importers import find_vehicle
+
+    return find_vehicle(
+        vehicle,
+        convention=frame,
+        thrust=thrust_direction,
+        packages=_folders(package),
+        arguments=vehicle_import.pairs(arg, ":=", "--arg NAME:=VALUE"),
+        skip_missing=skip_missing,
+    )
 
 
 def _folders(packages: list[str] | None) -> dict[str, Path]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.cli.console import print_json, print_table, shown
+from wakewise.cli.console import plain, print_json, print_table, shown
 from wakewise.cli.options import Json
 from wakewise.errors import InputError
 
@@ -55,13 +55,15 @@ def import_file(
     from wakewise.vehicles import draft_yaml
     from wakewise.vehicles.mixing import compare_matrix
 
+    if out is not None and out.is_dir():
+        raise InputError(f"--out {out}: is a folder, must be a file")
     draft = import_vehicle(
         file,
         convention=frame,
         thrust=thrust_direction,
         matrix=matrix,
-        packages={name: Path(folder) for name, folder in _pairs(package, "=", "--package NAME=DIR").items()},
-        arguments=_pairs(arg, ":=", "--arg NAME:=VALUE"),
+        packages={name: Path(folder) for name, folder in pairs(package, "=", "--package NAME=DIR").items()},
+        arguments=pairs(arg, ":=", "--arg NAME:=VALUE"),
         skip_missing=skip_missing,
     )
     comparison = None
@@ -75,7 +77,14 @@ def import_file(
         _tell(draft, comparison, out)
 
 
-def _pairs(given: list[str] | None, mark: str, form: str) -> dict[str, str]:
+def pairs(given: list[str] | None, mark: str, form: str) -> dict[str, str]:
+    """Names and values of a repeated option.
+
+    Raises
+    ------
+    InputError
+        If one has no name or no mark between the two.
+    """
     pairs: dict[str, str] = {}
     for text in given or []:
         name, found, value = text.partition(mark)
@@ -173,7 +182,7 @@ def _tell(draft: VehicleDraft, comparison: Comparison | None, out: Path | None) 
         for t in draft.thrusters:
             axis = " ".join(f"{value:+.3f}" for value in t.axis_B)
             limits = (t.max_forward_N, t.max_reverse_N, t.disk_area_m2, t.time_constant_s)
-            table.add_row(t.name, *(f"{v:.3f}" for v in t.p_BT_m), axis, *(shown(v) for v in limits))
+            table.add_row(plain(t.name), *(f"{v:.3f}" for v in t.p_BT_m), axis, *(shown(v) for v in limits))
         print_table(table)
     for note in draft.notes:
         typer.echo(f"  {note}")

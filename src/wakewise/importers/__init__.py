@@ -6,7 +6,8 @@ never guessed.
 Start reading in `read.py` (`import_vehicle`: which reader takes a file) and `find.py` (a vehicle by library name, by
 path, by format). Readers: `urdf.py`, `sdf.py`, `stonefish.py`, `matrices.py` and `yamls.py` with
 `yaml_parameters.py`; formats from outside are found through the entry points `wakewise.vehicle_formats`. Their
-helpers: `xacro*.py`, `expressions.py` and `scopes.py` expand macros, `xml.py` and `packages.py` find files,
+helpers: `layouts.py` (thrusters in lists, with `angles.py`) and `plausible.py` (what any vehicle must fulfil),
+`xacro*.py`, `expressions.py` and `scopes.py` expand macros, `xml.py` and `packages.py` find files,
 `bodies.py`, `plugins.py`, `water.py` and `found.py` put a vehicle together, `stated_matrix.py` reads the matrix that
 a file states, to be held against its geometry.
 """

@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.geometry import Pose, quat_from_euler
-from wakewise.importers.found import R_LINK_CAMERA, Found
+from wakewise.importers.found import QUESTION, R_LINK_CAMERA, Found
 from wakewise.importers.xml import Element, Place, PlacedError, number, numbers
 
 IDENTITY = Pose(np.zeros(3))
+
+THRUSTER_NAME = re.compile(r"thrust|propell|prop(?:\d|_|$)|t200|rotor", re.IGNORECASE)
+PART_NAME = re.compile(
+    r"(^|[_/: ])(arm|manipulator|gripper|payload|tether|umbilical|cable|tool|camera|sensor|dvl|imu|battery|thruster|"
+    r"propeller|rotor|joint|finger|jaw|wrist|elbow|shoulder|forearm|ballast)s?\d*([_/: ]|$)",
+    re.IGNORECASE,
+)
+"""Names of parts that a vehicle carries: their masses and frames are not the vehicle's."""
+
+_MOVING = frozenset(
+    {"revolute", "continuous", "prismatic", "revolute2", "universal", "ball", "screw", "planar", "floating"}
+)
 
 
 @dataclass(eq=False)
@@ -38,7 +51,7 @@ class Link:
 
 @dataclass(eq=False)
 class Joint:
-    """A joint: its child link, and its axis in body axes (None if the joint has none)."""
+    """A joint: its child and its parent link, and its axis in body axes (None if the joint has none)."""
 
     name: str
     kind: str
@@ -46,6 +59,7 @@ class Joint:
     X_BJ: Pose
     axis: Array | None
     place: Place
+    parent: str = ""
 
 
 @dataclass(eq=False)
@@ -152,6 +166,11 @@ def read_mass(bodies: Bodies, found: Found) -> None:
     weighed = [link for link in bodies.links.values() if link.mass_kg is not None]
     if not weighed:
         return
+    moving = _moving_parts(bodies)
+    if all(link.name in moving or PART_NAME.search(link.name) for link in weighed):
+        names = ", ".join(link.name for link in weighed[:4])
+        found.notes.append(f"mass: only links of parts or that move state one ({names}), so it is not taken")
+        return
     total = sum(link.mass_kg or 0.0 for link in weighed)
     heaviest = max(weighed, key=lambda link: link.mass_kg or 0.0)
     if total <= 0.0:
@@ -175,10 +194,39 @@ def read_mass(bodies: Bodies, found: Found) -> None:
             f"mass: link {heaviest.name} {heaviest.mass_kg:g} kg and {len(others)} further links, together "
             f"{sum(link.mass_kg or 0.0 for link in others):g} kg, are counted as one rigid body"
         )
+    arms = [link for link in weighed if link.name in moving and (link.mass_kg or 0.0) > 0.02 * total]
+    if arms:
+        found.notes.append(
+            f"{QUESTION}mass: {sum(link.mass_kg or 0.0 for link in arms):g} kg of it move on joints "
+            f"({', '.join(link.name for link in arms[:4])}), as an arm does; they are held where the file has them"
+        )
     where = f"{heaviest.place.file.name}:{heaviest.place.line}"
     found.derived["body"] = found.derived["inertia"] = (
         f"{found.kind} {where}: link {heaviest.name} and all others as one body"
     )
+
+
+def _moving_parts(bodies: Bodies) -> set[str]:
+    """Links beyond a joint that moves, thrusters' own apart: an arm, not the hull."""
+    edges: dict[str, list[tuple[str, bool]]] = {}
+    for joint in bodies.joints.values():
+        parent, child = (link.name if (link := bodies.link(end)) else end for end in (joint.parent, joint.child))
+        moves = joint.kind in _MOVING and not THRUSTER_NAME.search(joint.child + " " + joint.name)
+        edges.setdefault(parent, []).append((child, moves))
+        edges.setdefault(child, []).append((parent, moves))
+    still, waiting = {bodies.base}, [bodies.base]
+    while waiting:
+        for there, moves in edges.get(waiting.pop(), []):
+            if not moves and there not in still:
+                still.add(there)
+                waiting.append(there)
+    reached, waiting = set(still), list(still)
+    while waiting:
+        for there, _ in edges.get(waiting.pop(), []):
+            if there not in reached:
+                reached.add(there)
+                waiting.append(there)
+    return reached - still
 
 
 def _require_inertia(link: Link) -> None:

@@ -71,7 +71,7 @@ _CONSTANTS: dict[str, Any] = {
     "false": False,
     "None": None,
 }
-_TEXT_METHODS = frozenset({"lower", "upper", "strip", "startswith", "endswith", "split", "replace", "title"})
+_TEXT_METHODS = frozenset({"lower", "upper", "strip", "startswith", "endswith", "split", "replace", "title", "join"})
 _PREFIXES = ("math.", "python.", "xacro.", "python.math.")
 
 
@@ -147,12 +147,20 @@ class _Evaluator:
                 return self.value(body) if self.value(test) else self.value(orelse)
             case ast.List(elts=elements) | ast.Tuple(elts=elements):
                 return [self.value(element) for element in elements]
+            case ast.Subscript(value=table, slice=ast.Slice() as part):
+                return self._sliced(self.value(table), part)
             case ast.Subscript(value=table, slice=index):
                 return self._indexed(self.value(table), self.value(index))
             case ast.Attribute():
                 return self._attribute(node)
+            case ast.Call(func=ast.Name(id="dict"), args=[], keywords=named):
+                if any(word.arg is None for word in named):
+                    raise InputError("dict(**table) is not part of the expressions that are read")
+                return {word.arg: self.value(word.value) for word in named}
             case ast.Call(func=function, args=arguments, keywords=[]):
                 return self._called(function, arguments)
+            case ast.ListComp() | ast.SetComp() | ast.DictComp() | ast.GeneratorExp():
+                raise InputError("[... for ... in ...] is not part of the expressions that are read")
             case _:
                 raise InputError(f"{type(node).__name__} is not part of the expressions that are read")
 
@@ -165,12 +173,12 @@ class _Evaluator:
             raise
 
     def _binary(self, node: ast.BinOp) -> Any:
+        if type(node.op) not in _BINARY:
+            raise InputError(f"{type(node.op).__name__} is not part of the expressions that are read")
         left, right = self.value(node.left), self.value(node.right)
         if isinstance(node.op, ast.Add) and isinstance(left, str) and isinstance(right, str):
             return left + right
         left, right = _numeric(left), _numeric(right)
-        if type(node.op) not in _BINARY:
-            raise InputError(f"{type(node.op).__name__} is not part of the expressions that are read")
         return _numeric(_BINARY[type(node.op)](left, right))
 
     def _joined(self, values: list[ast.expr], *, until: bool) -> Any:
@@ -189,6 +197,14 @@ class _Evaluator:
                 return False
             before = after
         return True
+
+    def _sliced(self, table: Any, part: ast.Slice) -> Any:
+        if not isinstance(table, list | str):
+            raise InputError("only lists and words can be sliced")
+        bounds = [None if node is None else self.value(node) for node in (part.lower, part.upper, part.step)]
+        if not all(bound is None or (isinstance(bound, int) and not isinstance(bound, bool)) for bound in bounds):
+            raise InputError("the bounds of a slice must be whole numbers")
+        return table[slice(*bounds)]
 
     def _indexed(self, table: Any, index: Any) -> Any:
         if isinstance(table, dict):
@@ -232,6 +248,13 @@ class _Evaluator:
     def _text_method(self, function: ast.Attribute, nodes: list[ast.expr]) -> Any:
         text = self.value(function.value)
         arguments = [self.value(node) for node in nodes]
+        if function.attr == "join" and isinstance(text, str) and len(arguments) == 1:
+            words = arguments[0]
+            if not isinstance(words, list) or not all(isinstance(word, str) for word in words):
+                raise InputError(".join() is for words only")
+            if sum(len(word) + len(text) for word in words) > MAX_TEXT:
+                raise InputError("a text too long")
+            return text.join(words)
         if not isinstance(text, str) or not all(isinstance(value, str) for value in arguments):
             raise InputError(f".{function.attr}() is for words only")
         if function.attr == "replace" and len(text) * max(1, len(arguments[-1])) > MAX_TEXT:

@@ -20,26 +20,49 @@ _OURS = re.compile(r"^(does_not_claim|thruster_layout):", re.MULTILINE)
 
 
 def find_vehicle(
-    name_or_path: str, *, packages: Mapping[str, Path] | None = None, skip_missing: bool = False
+    name_or_path: str,
+    *,
+    convention: str = "auto",
+    thrust: str = "auto",
+    packages: Mapping[str, Path] | None = None,
+    arguments: Mapping[str, str] | None = None,
+    skip_missing: bool = False,
 ) -> VehicleDraft:
     """Read a vehicle of the library, a vehicle file, or any file of another project that can be imported.
 
-    `packages` and `skip_missing` are those of `importers.import_vehicle`; only files of other projects use them.
+    The options are those of `importers.import_vehicle`; they speak of files of other projects only.
 
     Raises
     ------
     InputError
-        If there is no such vehicle or file, or it cannot be read as a vehicle.
+        If there is no such vehicle or file, it cannot be read as a vehicle, or an option does not apply to it.
     """
     path = Path(name_or_path)
+    told = {"frame": convention != "auto", "thrust direction": thrust != "auto", "arguments": bool(arguments)}
+    useless = ", ".join(word for word, given in told.items() if given)
+    try:
+        is_file, is_folder = path.is_file(), path.is_dir()
+    except (OSError, ValueError) as fault:
+        raise InputError(f"vehicle {name_or_path[:80]!r}: no name of a file ({type(fault).__name__})") from fault
+    if name_or_path and is_folder and name_or_path not in draft_names():
+        raise InputError(f"vehicle {name_or_path}: is a folder, name the vehicle's file in it")
     reader = _reader_from_outside(path)
-    if reader is not None:
-        return reader(path)
-    if name_or_path in draft_names() or not path.is_file() or _is_ours(path):
-        return load_draft(name_or_path)
+    if reader is not None or name_or_path in draft_names() or not is_file or _is_ours(path):
+        if useless and (reader is not None or is_file or name_or_path in draft_names()):
+            raise InputError(
+                f"vehicle {name_or_path}: needs no {useless}; only files of other projects that we read do"
+            )
+        return load_draft(name_or_path) if reader is None else reader(path)
     from wakewise.importers.read import import_vehicle
 
-    return import_vehicle(path, packages=packages, skip_missing=skip_missing)
+    return import_vehicle(
+        path,
+        convention=convention,
+        thrust=thrust,
+        packages=packages,
+        arguments=arguments,
+        skip_missing=skip_missing,
+    )
 
 
 def _reader_from_outside(path: Path) -> Callable[[Path], VehicleDraft] | None:

@@ -21,6 +21,9 @@ Frame = Literal["FLU", "FRD"]
 R_LINK_CAMERA = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """Axes of a camera (OpenCV) in a Gazebo sensor frame, which looks along its x axis with y left and z up."""
 
+QUESTION = "QUESTIONED: "
+"""Begins a note on what was read in one way and may well be meant in another."""
+
 _FLIP = np.diag([1.0, -1.0, -1.0])
 _FLIP_BOTH = np.kron(np.eye(2), _FLIP)
 _AXES = {"x": 0, "y": 1, "z": 2}
@@ -67,6 +70,7 @@ class Found:
     thrusters: list[FoundThruster] = field(default_factory=list)
     matrix: Array | None = None
     matrix_name: str = ""
+    claims: list[tuple[int, str, Place, bool]] = field(default_factory=list)
     X_BC: Pose | None = None
     camera_fov_rad: float | None = None
     notes: list[str] = field(default_factory=list)
@@ -193,7 +197,7 @@ def _thruster(found: FoundThruster, thrust: str, *, turn: bool) -> ThrusterDraft
         axis = (1.0 if thrust[0] == "+" else -1.0) * found.R_BT[:, _AXES[thrust[1]]]
     try:
         return ThrusterDraft(
-            name=found.name,
+            name="".join(c if c.isprintable() else "?" for c in found.name)[:200],
             p_BT_m=to_frd(found.p_m) if turn else found.p_m,
             axis_B=to_frd(axis) if turn else axis,
             max_forward_N=forward,

@@ -1,4 +1,4 @@
-"""YAML of other projects: allocation matrices, lists of thruster positions and directions, and tables of parameters."""
+"""YAML of other projects: allocation matrices, thruster geometry, and tables of parameters."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import re
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.importers.bodies import pose_of
-from wakewise.importers.found import Found, FoundThruster, Frame
+from wakewise.importers.found import QUESTION, Found, Frame
+from wakewise.importers.layouts import read_geometry
+from wakewise.importers.plausible import claims_in, require_count, require_same_count, upright
 from wakewise.importers.xml import PlacedError
-from wakewise.importers.yaml_parameters import Entries, find, read_parameters, three
+from wakewise.importers.yaml_parameters import Entries, read_parameters
 from wakewise.importers.yamls import Item
 
 _MATRIX_KEY = re.compile(
@@ -18,11 +18,6 @@ _MATRIX_KEY = re.compile(
     re.IGNORECASE,
 )
 _NOT_MATRIX = re.compile(r"weight|controller|update|rate|slack|topic|solver", re.IGNORECASE)
-_POSITIONS = ("thruster_position", "thruster_positions", "positions", "thruster_locations", "locations")
-_DIRECTIONS = (
-    *("thruster_force_direction", "thruster_force_directions", "thruster_direction_matrix", "thruster_layout"),
-    *("thruster_orientation", "thruster_orientations", "thruster_directions", "directions", "orientations", "axes"),
-)
 _ROW_NAMES = (("x", "y", "z", "rx", "ry", "rz"), ("fx", "fy", "fz", "mx", "my", "mz"), ("X", "Y", "Z", "K", "M", "N"))
 _DOWN_WORDS = re.compile(r"(^|[^a-z])(ned|frd|fsd)([^a-z]|$)", re.IGNORECASE)
 _UP_WORDS = re.compile(r"(^|[^a-z])(enu|flu|nwu)([^a-z]|$)", re.IGNORECASE)
@@ -41,8 +36,10 @@ def read_yaml(root: Item, name: str, found: Found) -> None:
     if "thruster_layout" in root.table() and root.get("does_not_claim") is not None:
         raise PlacedError(f"{root.place}: is already a Wakewise vehicle file; use it where a vehicle is asked for")
     entries = list(root.walk())
-    geometry = _geometry(entries, found)
+    geometry = read_geometry(entries, found)
     matrix = _matrix(entries, found)
+    require_same_count(entries, found)
+    found.claims += claims_in(entries)
     parameters = read_parameters(entries, found)
     if not (geometry or matrix or parameters):
         raise PlacedError(
@@ -98,132 +95,34 @@ def _matrix(entries: Entries, found: Found) -> bool:
             matrix = np.stack(rows)
         elif item.is_matrix():
             matrix = item.rows(key)
+            if matrix.shape == (6, 6):
+                matrix = upright(matrix, matrix.T, key, found.notes)
         elif item.is_numbers():
             flat = item.numbers(key)
             if len(flat) % 6:
                 raise PlacedError(f"{item.place}: {key} has {len(flat)} numbers, must be 6 rows")
-            matrix = flat.reshape(6, -1)
+            matrix = upright(flat.reshape(6, -1), flat.reshape(-1, 6).T, key, found.notes)
+        elif item.table() and all(len(column.items()) == 6 and column.is_numbers() for column in item.table().values()):
+            matrix = np.stack([column.numbers(f"{name} of {key}", 6) for name, column in item.table().items()], axis=1)
+            found.notes.append(f"{key}: a column for each of {', '.join(item.table())[:120]}")
         else:
+            if item.items():
+                found.notes.append(
+                    f"{QUESTION}{key} is not read, neither rows nor columns of numbers ({item.place.file.name}:"
+                    f"{item.place.line})"
+                )
             continue
         if matrix.shape[0] != 6 and matrix.shape[1] == 6:
             found.notes.append(f"{key}: {matrix.shape[0]} rows of 6 are taken for its transpose")
             matrix = matrix.T
         if matrix.shape[0] != 6:
             raise PlacedError(f"{item.place}: {key} has shape {matrix.shape}, must be (6, n), a column per thruster")
+        if matrix.shape[1] == 0:
+            raise PlacedError(f"{item.place}: {key} has no columns, must have one per thruster")
+        require_count(matrix.shape[1], f"{item.place}: {key}: ")
         found.matrix, found.matrix_name = matrix, key
         found.notes.append(
             f"allocation matrix: {key}, 6 x {matrix.shape[1]} ({item.place.file.name}:{item.place.line})"
         )
         return True
     return False
-
-
-def _geometry(entries: Entries, found: Found) -> bool:
-    positions = find(entries, _POSITIONS)
-    directions = find(entries, _DIRECTIONS)
-    if positions is not None and directions is not None:
-        places, axes = _columns(positions, "positions"), _columns(directions, "directions")
-        if places.shape != axes.shape:
-            raise PlacedError(
-                f"{directions.place}: {axes.shape[1]} directions for {places.shape[1]} thruster positions, "
-                f"must be as many"
-            )
-        count = find(entries, ("num",), inside="thrusters")
-        if count is not None and round(count.scalar("number of thrusters")) != places.shape[1]:
-            raise PlacedError(f"{positions.place}: {places.shape[1]} positions, but num says {count.value}")
-        for i in range(places.shape[1]):
-            found.thrusters.append(
-                FoundThruster(
-                    f"thruster{i}", places[:, i], _axis(axes[:, i], directions, f"thruster{i}"), directions.place
-                )
-            )
-    else:
-        _listed(entries, found)
-    if not found.thrusters:
-        if positions is not None:
-            raise PlacedError(f"{positions.place}: thruster positions without directions, which are needed too")
-        return False
-    _limits(entries, found)
-    found.derived["thruster_layout"] = f"{found.kind} {found.file.name}: thruster positions and directions"
-    return True
-
-
-def _axis(axis: Array, item: Item, name: str) -> Array:
-    length = float(np.linalg.norm(axis))
-    if length < 1e-6:
-        raise PlacedError(f"{item.place}: {name}: axis {axis.tolist()} has length {length:g}, it must not be zero")
-    return axis / length
-
-
-def _columns(item: Item, what: str) -> Array:
-    """3 x n: from a flat list in rows (x..., y..., z...), from three rows, or from n rows of three."""
-    if item.is_matrix():
-        matrix = item.rows(what)
-        if matrix.shape[1] == 3 and matrix.shape[0] != 3:
-            return matrix.T
-        if matrix.shape[0] == 3:
-            return matrix
-        raise PlacedError(f"{item.place}: {what} have shape {matrix.shape}, must be (3, n) or (n, 3)")
-    flat = item.numbers(what)
-    if not len(flat) or len(flat) % 3:
-        raise PlacedError(f"{item.place}: {what} hold {len(flat)} numbers, must be three rows of one length")
-    return flat.reshape(3, -1)
-
-
-def _listed(entries: Entries, found: Found) -> None:
-    """Thrusters as a list or table of tables, each with a position and a direction or angles."""
-    for path, item in entries:
-        if "thruster" not in path[-1].lower():
-            continue
-        members = (
-            [(f"thruster{i}", member) for i, member in enumerate(item.items())]
-            if item.items()
-            else [(key, member) for key, member in item.table().items()]
-        )
-        members = [(name, member) for name, member in members if member.table()]
-        placed = [(n, m, _position(m)) for n, m in members]
-        located = [(n, m, p) for n, m, p in placed if p is not None]
-        if not located:
-            continue
-        for name, member, place in located:
-            axis, R = _direction(member)
-            if axis is None:
-                raise PlacedError(f"{member.place}: {name} has a position but no direction, which is needed too")
-            given = member.get("name", "id")
-            label = given.value if given is not None and isinstance(given.value, str) else name
-            found.thrusters.append(FoundThruster(label, place, _axis(axis, member, name), member.place, R))
-        if any(t.R_BT is not None for t in found.thrusters):
-            found.thrust_rule = "inferred: positive thrust pushes along +x of each thruster's frame"
-        return
-
-
-def _position(member: Item) -> Array | None:
-    item = member.get("position", "xyz", "pos", "location", "p", "translation")
-    if item is not None:
-        return three(item, "position")
-    if all(key in member.table() for key in "xyz"):
-        return np.array([member.table()[key].scalar(key) for key in "xyz"])
-    return None
-
-
-def _direction(member: Item) -> tuple[Array | None, Array | None]:
-    item = member.get("direction", "axis", "force_direction", "thrust_direction", "dir")
-    if item is not None:
-        return three(item, "direction"), None
-    item = member.get("rpy", "orientation", "rotation")
-    if item is not None:
-        R = pose_of(np.zeros(3), three(item, "angles")).R
-        return R[:, 0], R
-    return None, None
-
-
-def _limits(entries: Entries, found: Found) -> None:
-    high, low = find(entries, ("max_force", "max_thrust")), find(entries, ("min_force", "min_thrust"))
-    if high is None or low is None:
-        return
-    forward, reverse = high.scalar("max_force"), -low.scalar("min_force")
-    if forward < 0.0 or reverse < 0.0:
-        return
-    for thruster in found.thrusters:
-        thruster.max_forward_N, thruster.max_reverse_N = forward, reverse
-    found.derived["thruster_limits"] = f"{found.kind} {found.file.name}:{high.place.line}"

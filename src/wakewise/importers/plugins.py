@@ -8,16 +8,17 @@ import re
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.importers.bodies import Bodies, Joint
-from wakewise.importers.found import Found, FoundThruster
+from wakewise.importers.bodies import THRUSTER_NAME, Bodies, Joint
+from wakewise.importers.found import QUESTION, Found, FoundThruster
 from wakewise.importers.xml import Element, PlacedError, number, numbers
 
 GZ_RULE = "positive thrust pushes along the joint axis, whatever the sign of thrust_coefficient (gz-sim's Thruster)"
 UUV_RULE = "positive thrust pushes along the joint axis, +x of the thruster where none is given (UUV Simulator)"
 NAME_RULE = "inferred from names: positive thrust pushes along the axis of each joint that is called a thruster"
 
-_THRUSTER_NAME = re.compile(r"thrust|propell|prop(?:\d|_|$)|t200|rotor", re.IGNORECASE)
+_PROPELLER = re.compile(r"prop|rotor|blade", re.IGNORECASE)
 _NUMBERED = re.compile(r"\d+")
+_HAND_M = 0.15
 
 
 def words(plugin: Element) -> str:
@@ -47,13 +48,47 @@ def read_thrusters(bodies: Bodies, found: Found) -> None:
             rules.append(UUV_RULE)
             identity = plugin.value("thrusterID")
             order.append(number(identity, plugin.place, "thrusterID") if identity else math.inf)
+    _drop_repeats(found, order)
     if found.thrusters:
         found.thrusters = [t for _, t in sorted(zip(order, found.thrusters, strict=True), key=lambda pair: pair[0])]
         found.thrust_rule = "; ".join(dict.fromkeys(rules))
         found.derived["thruster_layout"] = f"{found.kind} {found.file.name}: thruster plugins and their joints"
+        _question_undriven(bodies, found)
     elif not _freefloating(bodies, found):
         _by_name(bodies, found)
     _ardupilot(bodies, found)
+
+
+def _question_undriven(bodies: Bodies, found: Found) -> None:
+    """Say which turning joints are called thrusters and are driven by no plugin."""
+    driven = [t.p_m for t in found.thrusters]
+    idle = [
+        j.name
+        for j in bodies.joints.values()
+        if j.kind in {"continuous", "revolute"}
+        and THRUSTER_NAME.search(short(j.child) + " " + short(j.name))
+        and not any(float(np.linalg.norm(j.X_BJ.p_m - p)) < _HAND_M for p in driven)
+    ]
+    if idle:
+        found.notes.append(
+            f"{QUESTION}{len(found.thrusters)} thrusters have a plugin, but {len(idle)} further joints are called "
+            f"thrusters: {', '.join(short(name) for name in idle[:12])}"
+        )
+
+
+def _drop_repeats(found: Found, order: list[float]) -> None:
+    """Count a thruster once that two plugins drive, as files for two simulators do."""
+    seen: list[FoundThruster] = []
+    for index in reversed(range(len(found.thrusters))):
+        thruster = found.thrusters[index]
+        same = [t for t in found.thrusters[:index] if t.name == thruster.name and np.array_equal(t.p_m, thruster.p_m)]
+        if same:
+            seen.append(found.thrusters.pop(index))
+            order.pop(index)
+    if seen:
+        found.notes.append(
+            f"{QUESTION}two plugins drive {', '.join(sorted(t.name for t in seen)[:12])}; counted once, by the first"
+        )
 
 
 def _checked_axis(axis: Array, where: str) -> Array:
@@ -144,9 +179,10 @@ def _number(element: Element, tag: str) -> float | None:
 
 
 def _by_name(bodies: Bodies, found: Found) -> None:
-    joints = [j for j in bodies.joints.values() if _THRUSTER_NAME.search(short(j.child) + " " + short(j.name))]
+    joints = [j for j in bodies.joints.values() if THRUSTER_NAME.search(short(j.child) + " " + short(j.name))]
     turning = [j for j in joints if j.axis is not None and j.kind in {"continuous", "revolute"}]
     fixed = [j for j in joints if j.kind == "fixed"]
+    turning, fixed = _one_each(turning, bodies, found), _one_each(fixed, bodies, found) if not turning else []
     for joint in turning or fixed:
         found.thrusters.append(_on_joint(joint))
     if turning:
@@ -159,6 +195,49 @@ def _by_name(bodies: Bodies, found: Found) -> None:
         found.notes.append("no thruster plugin in the file: links were taken for thrusters by their names")
         found.thrusters.sort(key=lambda t: [int(n) for n in _NUMBERED.findall(t.name)])
         found.derived["thruster_layout"] = f"{found.kind} {found.file.name}: joints with thruster names"
+
+
+def _one_each(joints: list[Joint], bodies: Bodies, found: Found) -> list[Joint]:
+    """One joint per thruster: a propeller counts, the hull that carries it does not.
+
+    Raises
+    ------
+    InputError
+        If two joints of one number lie within one another and neither is called a propeller.
+    """
+    above = {j.child: j.parent for j in bodies.joints.values()}
+    carriers: set[str] = set()
+    for joint in joints:
+        here, steps = joint.parent, 0
+        while here and steps < len(above) + 1:
+            carriers.add(here)
+            here, steps = above.get(here, ""), steps + 1
+    kept = [j for j in joints if j.child not in carriers]
+    dropped = [j for j in joints if j.child in carriers]
+    for joint in list(kept):
+        twins = [k for k in kept if k is not joint and _alike(joint, k)]
+        if not twins or _PROPELLER.search(short(joint.child)):
+            continue
+        if any(_PROPELLER.search(short(k.child)) for k in twins):
+            kept.remove(joint)
+            dropped.append(joint)
+        elif any(np.allclose(joint.X_BJ.p_m, k.X_BJ.p_m, atol=1e-6) for k in twins):
+            raise PlacedError(
+                f"{joint.place}: joints {joint.name} and {twins[0].name} are one thruster at one place, or two: "
+                f"which is meant cannot be told"
+            )
+    if dropped:
+        found.notes.append(
+            f"{len(dropped)} hulls of thrusters are not counted beside their propellers: "
+            f"{', '.join(short(j.child) for j in dropped[:12])}"
+        )
+    return kept
+
+
+def _alike(one: Joint, other: Joint) -> bool:
+    """Whether two joints may be parts of one thruster: of one number, and within a hand of one another."""
+    numbered = [_NUMBERED.findall(short(j.child)) for j in (one, other)]
+    return numbered[0] == numbered[1] and float(np.linalg.norm(one.X_BJ.p_m - other.X_BJ.p_m)) < _HAND_M
 
 
 def _freefloating(bodies: Bodies, found: Found) -> bool:

@@ -14,6 +14,7 @@ from wakewise.importers.bodies import Bodies, read_camera, read_displacement, re
 from wakewise.importers.found import FRAME_CHOICES, THRUST_CHOICES, Found, make_draft, wrench_rows_to_frd
 from wakewise.importers.matrices import read_matrix_only, read_yaml
 from wakewise.importers.packages import Folders
+from wakewise.importers.plausible import question_rank, require_count, require_force_columns
 from wakewise.importers.plugins import read_thrusters, words
 from wakewise.importers.sdf import left_out, read_sdf
 from wakewise.importers.stonefish import read_stonefish
@@ -76,8 +77,16 @@ def import_vehicle(
         # Overflow in numbers of absurd size shows as an infinity, which the record refuses; it needs no warning.
         with np.errstate(all="ignore"):
             found = _read(path, packages or {}, arguments or {}, skip_missing=skip_missing)
+            require_count(len(found.thrusters), f"{path}: ")
             draft = make_draft(found, convention, thrust)
-            return draft if matrix is None else _with_matrix(draft, matrix, convention)
+            draft = draft if matrix is None else _with_matrix(draft, matrix, convention)
+            if not draft.thrusters and draft.shipped_matrix is not None:
+                named = found.matrix_name or "matrix"
+                require_force_columns(draft.shipped_matrix, f"{path if matrix is None else matrix}: {named}")
+            if not draft.thrusters and draft.shipped_matrix is None:
+                return draft
+            doubts = question_rank(found, draft.allocation_matrix, found.name)
+            return replace(draft, notes=(*draft.notes, *doubts)) if doubts else draft
     except (RecursionError, ArithmeticError, np.linalg.LinAlgError) as fault:
         raise InputError(f"{path}: cannot be read ({type(fault).__name__})") from fault
 

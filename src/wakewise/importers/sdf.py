@@ -6,9 +6,18 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.geometry import Pose
-from wakewise.importers.bodies import Bodies, Joint, Link, Shape, checked_mass, geometry_volume, inertia_matrix, pose_of
+from wakewise.importers.bodies import (
+    PART_NAME,
+    Bodies,
+    Joint,
+    Link,
+    Shape,
+    checked_mass,
+    geometry_volume,
+    inertia_matrix,
+)
 from wakewise.importers.packages import Folders
-from wakewise.importers.urdf import CAMERA_TYPES, camera
+from wakewise.importers.urdf import CAMERA_TYPES, camera, pose_element
 from wakewise.importers.xml import Element, PlacedError, number, numbers, parse_xml, read_text
 
 MAX_INCLUDES = 40
@@ -113,7 +122,7 @@ class _Reader:
             if element.tag in {"link", "joint", "frame"}:
                 if not element.attributes.get("name"):
                     raise PlacedError(f"{element.place}: <{element.tag}> without a name")
-                pose, relative = _pose_element(element)
+                pose, relative = pose_element(element)
                 default = f"{scope}__model__"
                 if element.tag == "joint":
                     default = scope + (element.value("child") or "")
@@ -131,7 +140,7 @@ class _Reader:
                 self._include(element, scope, depth)
 
     def _nested(self, model: Element, scope: str, key: str, depth: int) -> None:
-        pose, relative = _pose_element(model)
+        pose, relative = pose_element(model)
         self.frames[f"{key}::__model__"] = (pose, scope + (relative or "__model__"), model)
         self._collect(model, f"{key}::", depth + 1)
 
@@ -141,22 +150,23 @@ class _Reader:
             raise PlacedError(f"{element.place}: more than {MAX_INCLUDES} includes")
         for model in _included(element, self.folders, self.notes, depth):
             key = scope + (element.value("name") or model.attributes.get("name", "included"))
-            pose, relative = _pose_element(element)
+            pose, relative = pose_element(element)
             merged = element.attributes.get("merge") == "true" or element.value("merge") == "true"
             self.frames[f"{key}::__model__"] = (pose, scope + (relative or "__model__"), element)
             self._collect(model, scope if merged else f"{key}::", depth + 1)
 
     def _base(self) -> str:
-        named = [key for key in self.links if key.rpartition("::")[2].rpartition("/")[2] == "base_link"]
+        own = {key: link for key, link in self.links.items() if not PART_NAME.search(key)} or self.links
+        named = [key for key in own if key.rpartition("::")[2].rpartition("/")[2] == "base_link"]
         told = self.model.attributes.get("canonical_link")
         if named:
             return min(named, key=len)
         if told in self.links:
             return str(told)
-        ending = [key for key in self.links if key.endswith("base_link")]
+        ending = [key for key in own if key.endswith("base_link")]
         if ending:
             return ending[0]
-        return max(self.links, key=lambda key: _mass_for_choice(self.links[key]))
+        return max(own, key=lambda key: _mass_for_choice(own[key]))
 
     def _pose(self, key: str, through: tuple[str, ...]) -> Pose:
         """Pose of a link, joint or frame in the model."""
@@ -186,7 +196,8 @@ class _Reader:
                 frame = "__model__"
             X_BF = X_BM @ self._pose((f"{scope}::" if scope else "") + frame, ()) if frame else X_BJ
             axis = X_BF.R @ axis
-        return Joint(key, element.attributes.get("type", ""), child, X_BJ, axis, place)
+        parent = (f"{scope}::" if scope else "") + (element.value("parent") or "")
+        return Joint(key, element.attributes.get("type", ""), child, X_BJ, axis, place, parent)
 
 
 def _mass_for_choice(link: Element) -> float:
@@ -197,22 +208,6 @@ def _mass_for_choice(link: Element) -> float:
         return 0.0
 
 
-def _pose_element(element: Element) -> tuple[Pose, str]:
-    pose = element.first("pose")
-    if pose is None:
-        return Pose(np.zeros(3)), ""
-    relative = pose.attributes.get("relative_to", "") or pose.attributes.get("frame", "")
-    if not pose.text.strip():
-        return Pose(np.zeros(3)), relative
-    values = numbers(pose.text, pose.place, "pose")
-    if len(values) == 7 and pose.attributes.get("rotation_format") == "quat_xyzw":
-        return Pose(values[:3], values[[6, 3, 4, 5]]), relative
-    if len(values) != 6:
-        raise PlacedError(f"{pose.place}: pose has {len(values)} numbers, must have 6")
-    angles = np.deg2rad(values[3:]) if pose.attributes.get("degrees") == "true" else values[3:]
-    return pose_of(values[:3], angles), relative
-
-
 def _link(element: Element, name: str, X_BL: Pose) -> Link:
     link = Link(name, element.place, X_BL)
     inertial = element.first("inertial")
@@ -220,7 +215,7 @@ def _link(element: Element, name: str, X_BL: Pose) -> Link:
         link.place = inertial.place
         mass = inertial.value("mass")
         link.mass_kg = checked_mass("1" if mass is None else mass, inertial.place, name)
-        at, _ = _pose_element(inertial)
+        at, _ = pose_element(inertial)
         link.p_LG_m = at.p_m
         inertia = inertial.first("inertia")
         if inertia is not None:
@@ -230,7 +225,7 @@ def _link(element: Element, name: str, X_BL: Pose) -> Link:
         if fluid is not None:
             link.added_mass = _fluid_added_mass(fluid)
     for collision in element.all("collision"):
-        pose, _ = _pose_element(collision)
+        pose, _ = pose_element(collision)
         link.shapes.append(Shape(pose, geometry_volume(collision.first("geometry"))))
     return link
 

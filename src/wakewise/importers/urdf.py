@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from wakewise.arrays import Array
 from wakewise.geometry import Pose
+from wakewise.importers.angles import require_radians
 from wakewise.importers.bodies import (
     IDENTITY,
+    PART_NAME,
     Bodies,
     Camera,
     Joint,
@@ -76,8 +79,12 @@ def origin(element: Element | None) -> Pose:
     xyz, rpy = element.attributes.get("xyz"), element.attributes.get("rpy")
     return pose_of(
         np.zeros(3) if xyz is None else numbers(xyz, element.place, "origin xyz", 3),
-        np.zeros(3) if rpy is None else numbers(rpy, element.place, "origin rpy", 3),
+        np.zeros(3) if rpy is None else require_radians(_rpy(rpy, element), element.place, "origin rpy"),
     )
+
+
+def _rpy(text: str, element: Element) -> Array:
+    return numbers(text, element.place, "origin rpy", 3)
 
 
 def _link(element: Element, name: str) -> Link:
@@ -113,10 +120,11 @@ def _parents(joints: list[tuple[str, Element]], links: dict[str, Link]) -> dict[
 
 
 def _base_link(links: dict[str, Link], parents: dict[str, str]) -> str:
-    for name in links:
+    own = [name for name in links if not PART_NAME.search(name)]
+    for name in [*own, *links]:
         if name.replace("::", "/").rpartition("/")[2] == "base_link":
             return name
-    bases = [name for name in links if name.endswith("base_link")]
+    bases = [name for name in own if name.endswith("base_link")]
     if bases:
         return bases[0]
     roots = [name for name in links if name not in parents]
@@ -158,7 +166,7 @@ def _joint(name: str, element: Element, links: dict[str, Link]) -> Joint:
         xyz = axis_element.attributes.get("xyz", "1 0 0") if axis_element is not None else "1 0 0"
         axis = X_BJ.R @ numbers(xyz, (axis_element or element).place, f"axis of joint {name}", 3)
     place = (axis_element or element).place
-    return Joint(name, kind, child, X_BJ, axis, place)
+    return Joint(name, kind, child, X_BJ, axis, place, _end(element, "parent"))
 
 
 def _cameras(root: Element, links: dict[str, Link]) -> list[Camera]:
@@ -173,11 +181,25 @@ def _cameras(root: Element, links: dict[str, Link]) -> list[Camera]:
 
 def camera(sensor: Element, X_BL: Pose) -> Camera:
     """A Gazebo camera sensor on a link."""
-    pose = sensor.first("pose")
-    X_LS = Pose(np.zeros(3))
-    if pose is not None and pose.text.strip():
-        six = numbers(pose.text, pose.place, "pose of a camera", 6)
-        X_LS = pose_of(six[:3], six[3:])
+    X_LS, _ = pose_element(sensor)
     fov = next((e for e in sensor.walk() if e.tag == "horizontal_fov" and e.text.strip()), None)
     fov_rad = None if fov is None else number(fov.text.strip(), fov.place, "horizontal_fov")
     return Camera(sensor.attributes.get("name", "camera"), X_BL @ X_LS, fov_rad)
+
+
+def pose_element(element: Element) -> tuple[Pose, str]:
+    """Pose of a `<pose>` of SDF, the frame it is relative to ("" if not said); identity if there is none."""
+    pose = element.first("pose")
+    if pose is None:
+        return Pose(np.zeros(3)), ""
+    relative = pose.attributes.get("relative_to", "") or pose.attributes.get("frame", "")
+    if not pose.text.strip():
+        return Pose(np.zeros(3)), relative
+    values = numbers(pose.text, pose.place, "pose")
+    if len(values) == 7 and pose.attributes.get("rotation_format") == "quat_xyzw":
+        return Pose(values[:3], values[[6, 3, 4, 5]]), relative
+    if len(values) != 6:
+        raise PlacedError(f"{pose.place}: pose has {len(values)} numbers, must have 6")
+    if pose.attributes.get("degrees", "").strip().lower() in {"true", "1"}:
+        return pose_of(values[:3], np.deg2rad(values[3:])), relative
+    return pose_of(values[:3], require_radians(values[3:], pose.place, "pose")), relative

@@ -19,7 +19,7 @@ MAX_CALLS = 60
 """Macros, includes and properties within one another."""
 MAX_TOTAL_TEXT = 20_000_000
 
-_PIECES = re.compile(r"\$\$+(?=[{(])|\$\{[^}]*\}|\$\([^)]*\)|\$|[^$]+", re.DOTALL)
+_PIECES = re.compile(r"\$\$+(?=[{(])|\$\{(?:[^{}]|\{[^{}]*\})*\}|\$\([^)]*\)|\$|[^$]+", re.DOTALL)
 
 
 class Texts:

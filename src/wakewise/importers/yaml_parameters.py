@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.importers.bodies import inertia_matrix
+from wakewise.importers.bodies import PART_NAME, inertia_matrix
 from wakewise.importers.found import Found
 from wakewise.importers.water import store
 from wakewise.importers.xml import PlacedError
@@ -46,6 +46,7 @@ def read_parameters(entries: Entries, found: Found) -> bool:
         If a number is not one, a mass is not positive, or an inertia is not positive definite.
     """
     known = len(found.derived)
+    entries = _of_the_vehicle(entries, found)
     where = f"{found.kind} {found.file.name}"
     mass = _number(entries, ("mass",))
     if mass is not None:
@@ -78,6 +79,35 @@ def read_parameters(entries: Entries, found: Found) -> bool:
     )
     _weights(entries, found)
     return len(found.derived) > known
+
+
+def _of_the_vehicle(entries: Entries, found: Found) -> Entries:
+    """Entries that speak of the vehicle, outermost first, not of an arm or another part of it.
+
+    Raises
+    ------
+    InputError
+        If two masses stand at one depth that may both be the vehicle's.
+    """
+    whole = [(path, item) for path, item in entries if not any(PART_NAME.search(key) for key in path[:-1])]
+    masses = [(path, item) for path, item in whole if path[-1] == "mass" and isinstance(item.value, str)]
+    parts = [path for path, item in entries if path[-1] == "mass" and any(PART_NAME.search(key) for key in path[:-1])]
+    if parts:
+        said = ", ".join(dict.fromkeys("/".join(path[:-1]) for path in parts[:6]))
+        found.notes.append(f"mass: that of {said} is of a part and is not taken for the vehicle's")
+    least = min((len(path) for path, _ in masses), default=0)
+    at_least = [(path, item) for path, item in masses if len(path) == least]
+    values = {item.scalar("mass") for _, item in at_least}
+    if len(values) > 1:
+        said = " and ".join("/".join(path) for path, _ in at_least[:4])
+        raise PlacedError(
+            f"{at_least[1][1].place}: {said} state different masses: which is the vehicle's cannot be told"
+        )
+    if not at_least:
+        return whole
+    # What stands beside the mass is of the same body, and comes before what stands elsewhere.
+    home = at_least[0][0][:-1]
+    return sorted(whole, key=lambda entry: entry[0][: len(home)] != home)
 
 
 def _number(entries: Entries, keys: Sequence[str]) -> tuple[float, Item] | None:

@@ -36,6 +36,9 @@ from wakewise.vehicles.vehicle import (
 ROUNDING = 1e-3
 """Largest asymmetry of an added mass, relative to its largest element, that passes as rounding in the file."""
 
+MAX_THRUSTERS = 64
+"""More than any vehicle has; beyond it a file is a mistake, and the checks of single failures take for ever."""
+
 _THRUSTER_WORDS = {
     "max_forward_N": "forward limit",
     "max_reverse_N": "reverse limit",
@@ -177,6 +180,8 @@ class VehicleDraft:
         thrust_steps(self.curve, self.least_thrust)
         require_different_names([t.name for t in self.thrusters])
         n = len(self.thrusters)
+        if n > MAX_THRUSTERS:
+            raise InputError(f"{n} thrusters, at most {MAX_THRUSTERS} are read")
         if self.shipped_matrix is not None and n and self.shipped_matrix.shape[1] != n:
             raise InputError(f"shipped_matrix: shape {self.shipped_matrix.shape}, allowed (6, {n}), one per thruster")
 

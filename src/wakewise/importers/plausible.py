@@ -1,0 +1,180 @@
+"""What a vehicle's thrusters must be, whatever file they are from: few enough, of unit force, as many as it says."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+from wakewise.arrays import Array
+from wakewise.importers.found import QUESTION, Found
+from wakewise.importers.xml import Place, PlacedError
+from wakewise.importers.yaml_parameters import Entries
+from wakewise.importers.yamls import Item
+from wakewise.vehicles.check import directions
+from wakewise.vehicles.draft import MAX_THRUSTERS
+
+UNIT_SLACK = 0.02
+"""How far a force column may be from length 1: entries of two digits, such as 0.7 for cos 45 deg, pass."""
+
+_COUNT = re.compile(r"^((num|number|n|no|count)_?(of_)?thrusters?|thrusters?_(count|num|number))$", re.IGNORECASE)
+_LIST = re.compile(
+    r"^thrusters?(_(names?|ids?|joints?|links?|frames?|topics?|pins?|channels?|labels?|list))?$", re.IGNORECASE
+)
+_LAYOUT_KEY = re.compile(r"frame|layout|config|mixer|type|dofs?$|degrees_of_freedom|actuation", re.IGNORECASE)
+_DOF_WORDS = re.compile(r"(?<![0-9.])([3-6])[ _-]?dofs?(?![a-z])", re.IGNORECASE)
+_FULL_WORDS = re.compile(r"(fully|over)[ _-]?actuated|holonomic", re.IGNORECASE)
+_DOF_KEY = re.compile(r"^(dofs?|num_dofs?|degrees_of_freedom)$", re.IGNORECASE)
+
+
+def is_unit(length: Any) -> Any:
+    """Whether lengths are 1 within `UNIT_SLACK`."""
+    return np.abs(np.asarray(length) - 1.0) <= UNIT_SLACK
+
+
+def require_count(n: int, where: str = "") -> None:
+    """Refuse more thrusters than any vehicle has.
+
+    Raises
+    ------
+    InputError
+        Naming the cap.
+    """
+    if n > MAX_THRUSTERS:
+        raise PlacedError(f"{where}{n} thrusters, at most {MAX_THRUSTERS} are read")
+
+
+def upright(matrix: Array, other: Array, key: str, notes: list[str]) -> Array:
+    """Of two ways of reading one matrix, each (6, n), the one whose force columns have length 1.
+
+    Where both have, a moment at right angles to its force decides, as every thruster without swirl has; where neither
+    has, or nothing tells, the first is kept.
+    """
+    if matrix.shape == other.shape and np.array_equal(matrix, other):
+        return matrix
+    first, second = (bool(is_unit(np.linalg.norm(m[:3], axis=0)).all()) for m in (matrix, other))
+    if first and second:
+        crossed = [
+            bool((np.abs(np.sum(m[:3] * m[3:], axis=0)) <= UNIT_SLACK * (1.0 + np.abs(m[3:]).max(axis=0))).all())
+            for m in (matrix, other)
+        ]
+        if crossed == [False, True]:
+            first = False
+        elif crossed[0] == crossed[1]:
+            notes.append(f"{QUESTION}{key} reads as six rows and as a row per thruster; taken as six rows")
+    if second and not first:
+        notes.append(f"{key}: a row of 6 per thruster, since only so every force has length 1")
+        return other
+    return matrix
+
+
+def require_force_columns(matrix: Array, what: str) -> None:
+    """Refuse a matrix, shape (6, n), that would be flown with and is no wrench per newton of each thruster.
+
+    Raises
+    ------
+    InputError
+        If it has no columns or too many, or a force column is not of length 1.
+    """
+    if matrix.shape[1] == 0:
+        raise PlacedError(f"{what} has no columns, must have one per thruster")
+    require_count(matrix.shape[1], f"{what}: ")
+    lengths = np.linalg.norm(matrix[:3], axis=0)
+    odd = np.flatnonzero(~is_unit(lengths))
+    if odd.size:
+        i = int(odd[0])
+        raise PlacedError(
+            f"{what}: the force of column {i + 1} has length {lengths[i]:.4g}, must be 1 (a column is the wrench that "
+            f"one newton of a thruster makes)"
+        )
+
+
+def require_same_count(entries: Entries, found: Found) -> None:
+    """Hold the number of thrusters against the file's own lists and counts of them.
+
+    Raises
+    ------
+    InputError
+        If they disagree.
+    """
+    columns = None if found.matrix is None else int(found.matrix.shape[1])
+    n = len(found.thrusters) or columns
+    if not n:
+        return
+    if columns is not None and n != columns:
+        raise PlacedError(f"{found.file}: {found.matrix_name} has {columns} columns, but the file places {n} thrusters")
+    for path, item in entries:
+        said = _said_count(path, item)
+        if said is not None and said != n:
+            what = f"{found.matrix_name} has" if not found.thrusters else "the file places"
+            raise PlacedError(f"{item.place}: {path[-1]} says {said} thrusters, but {what} {n}")
+
+
+def _said_count(path: tuple[str, ...], item: Item) -> int | None:
+    key = path[-1]
+    inside = len(path) > 1 and re.fullmatch(r"thrusters?", path[-2], re.IGNORECASE)
+    if isinstance(item.value, str):
+        plain = key.lower() == "thrusters" or (inside and key.lower() in {"num", "count", "number"})
+        if (_COUNT.match(key) or plain) and re.fullmatch(r"\d{1,6}", item.value.strip()):
+            return int(item.value)
+        return None
+    listed = item.items()
+    if listed and _LIST.match(key) and all(isinstance(member.value, str) for member in listed):
+        return len(listed)
+    return None
+
+
+def claims_in(entries: Entries) -> list[tuple[int, str, Place, bool]]:
+    """Axes that a YAML file's own words say its thrusters make: how many, the words, where, and whether they bind."""
+    said: list[tuple[int, str, Place, bool]] = []
+    for path, item in entries:
+        if not isinstance(item.value, str):
+            continue
+        key = path[-1]
+        inside = len(path) > 1 and _DOF_KEY.match(path[-2])
+        if (_DOF_KEY.match(key) or (inside and key.lower() in {"num", "count"})) and item.value.strip() in set(
+            "123456"
+        ):
+            said.append((int(item.value), f"{'.'.join(path[-2:])}: {item.value}", item.place, True))
+        elif _LAYOUT_KEY.search(key):
+            axes = claimed(item.value)
+            if axes:
+                said.append((axes, f"{key}: {item.value[:60]}", item.place, True))
+    return said
+
+
+def claimed(words: str) -> int:
+    """Axes that words such as `vectored_6dof` or `fully actuated` claim; 0 if none."""
+    match = _DOF_WORDS.search(words)
+    return int(match[1]) if match else 6 if _FULL_WORDS.search(words) else 0
+
+
+def question_rank(found: Found, matrix: Array, name: str) -> list[str]:
+    """Hold the rank of an allocation matrix, shape (6, n), against what the file's own words claim.
+
+    Returns
+    -------
+    list of str
+        Notes that question it.
+
+    Raises
+    ------
+    InputError
+        If the layout claims more axes than it has thrusters, so that it cannot be right.
+    """
+    notes: list[str] = []
+    rank = directions(matrix).rank
+    claims = list(found.claims)
+    for word in dict.fromkeys((name, found.file.stem)):
+        axes = claimed(word)
+        if axes:
+            claims.append((axes, f"the name {word[:60]}", Place(found.file, 1), False))
+    for axes, words, place, binds in claims:
+        if axes > matrix.shape[1] and binds:
+            raise PlacedError(
+                f"{place}: {words} claims {axes} axes, but {matrix.shape[1]} thrusters make at most that many"
+            )
+        if rank < axes:
+            notes.append(f"{QUESTION}{words} claims {axes} axes, but the thrusters make only {rank} (rank {rank})")
+    return notes
