@@ -121,7 +121,7 @@ export class Desk {
       return;
     }
     const deviation = finite(figures.deviation_pct), saved = finite(figures.saved_pct);
-    const now = deviation === null || saved === null ? "" : ` Now: ${shown(deviation, 0, "%")} off the command, ${shown(saved, 0, "%")} less disturbance than direct.`;
+    const now = deviation === null || saved === null ? "" : ` Now: ${shown(deviation, 0, "%")} off the command, ${shown(Math.abs(saved), 0, "%")} ${saved < 0 ? "more" : "less"} disturbance than direct.`;
     if (dragged === undefined) text("meaning", (REGIMES[name] ?? "") + now);
   }
 }

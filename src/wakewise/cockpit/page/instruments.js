@@ -26,6 +26,7 @@ export function figures(state) {
   put("photos", shown(photos, 0));
   put("disturbance", disturbance(state.disturbance));
   put("saved", shown(state.saved_pct, 0, "%"));
+  document.body.dataset.saves = String(Number(state.saved_pct) > 0);
   put("deviation", `now ${shown(state.deviation_pct, 1, "%")}`);
   horizon(state);
 }
