@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any
 
 import yaml
+
+from wakewise.errors import InputError
 
 
 class YamlError(ValueError):
@@ -38,6 +41,20 @@ def read_yaml(text: str) -> Any:
         raise YamlError("brackets in brackets, too deep to be read", None) from None
     except (yaml.YAMLError, ValueError) as fault:
         raise YamlError(" ".join(str(fault).split()), None) from None
+
+
+def yaml_file(path: Path) -> Any:
+    """Plain values of a file that a person wrote.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or see `read_yaml`.
+    """
+    try:
+        return read_yaml(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, YamlError) as fault:
+        raise InputError(f"{path}: cannot be read as YAML ({' '.join(str(fault).split())})") from fault
 
 
 class _StrictLoader(yaml.SafeLoader):

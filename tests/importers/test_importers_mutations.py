@@ -71,6 +71,7 @@ def require_sound(path: Path) -> None:
 
 @pytest.mark.parametrize("name", list(MATRICES))
 def test_the_unbroken_files_load(tmp_path: Path, name: str) -> None:
+    """What is spoiled below is read as it stands."""
     (tmp_path / name).write_text(GOOD[name])
     draft = import_vehicle(tmp_path / name)
     assert check_report(draft, None)["rank"] >= 1
@@ -81,6 +82,7 @@ def test_the_unbroken_files_load(tmp_path: Path, name: str) -> None:
 def test_no_mutation_gives_a_traceback_or_a_vehicle_of_other_forces(
     tmp_path: Path, name: str, seed: int, times: int
 ) -> None:
+    """A file spoiled in up to four places is refused in one line, or read with columns of unit force."""
     rng, text = random.Random(seed), GOOD[name]
     for _ in range(times):
         text = mutated(text, rng) or " "

@@ -27,7 +27,7 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.pilot.controls import ACTIONS, CONTROL_AXES, shaped
-from wakewise.yaml_text import YamlError, read_yaml
+from wakewise.yaml_text import yaml_file
 
 STICKS = ("leftx", "lefty", "rightx", "righty", "triggerleft", "triggerright")
 """SDL's names of a known pad's axes, in its order."""
@@ -135,11 +135,7 @@ def load_mapping(path: Path) -> PadMapping:
     InputError
         If it cannot be read, or see `mapping_of`.
     """
-    try:
-        tree = read_yaml(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, YamlError) as fault:
-        raise InputError(f"{path}: cannot be read as YAML ({' '.join(str(fault).split())})") from fault
-    return mapping_of(tree, str(path))
+    return mapping_of(yaml_file(path), str(path))
 
 
 def mapping_of(tree: Any, what: str = "mapping") -> PadMapping:

@@ -19,7 +19,7 @@ import numpy as np
 
 from wakewise.errors import InputError
 from wakewise.pilot.controls import CENTRED, CONTROL_AXES, Controls
-from wakewise.yaml_text import YamlError, read_yaml
+from wakewise.yaml_text import yaml_file
 
 LONGEST = 100_000
 """Most entries of a script."""
@@ -89,11 +89,7 @@ def load_script(path: Path) -> Script:
     InputError
         If it cannot be read, or see `script_of`.
     """
-    try:
-        entries = read_yaml(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, YamlError) as fault:
-        raise InputError(f"{path}: cannot be read as YAML ({' '.join(str(fault).split())})") from fault
-    return script_of(entries, str(path))
+    return script_of(yaml_file(path), str(path))
 
 
 def _moment(entry: Mapping[str, Any], what: str) -> Moment:
