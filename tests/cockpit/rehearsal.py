@@ -17,11 +17,12 @@ from typing import Any
 import cv2
 import numpy as np
 
-from wakewise.cockpit.files import Files
+from wakewise.cockpit.extras import PAGE
 from wakewise.cockpit.seat import Seat
 from wakewise.cockpit.server import Server
 from wakewise.cockpit.show import Note, Picture
 from wakewise.errors import InputError
+from wakewise.serving.files import Files
 
 _THRUSTERS = 8
 _RANGES = {"w_track": [0.5, 50.0], "gain": [0.1, 1.0], "mode": ["operator", "hold", "scan"]}
@@ -176,7 +177,7 @@ class Rehearsal:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--port", type=int, default=0)
-    server = Server(Rehearsal(), port=parser.parse_args().port, files=Files())
+    server = Server(Rehearsal(), port=parser.parse_args().port, files=Files(folder=PAGE))
     server.start()
     print(server.address, flush=True)
     try:

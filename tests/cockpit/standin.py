@@ -25,7 +25,7 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-PAGE = files("wakewise.cockpit") / "page"
+PAGE, SHARED = files("wakewise.cockpit") / "page", files("wakewise.serving") / "page"
 POLICY = "default-src 'self'; frame-src http://127.0.0.1:*; base-uri 'none'; form-action 'none'"
 LAPSE_S = 1.0
 QUIET = logging.getLogger("standin")
@@ -147,7 +147,8 @@ class StandIn:
             return None
         if path == "/around":
             return Response(200, "OK", Headers({"Content-Type": "text/html"}), AROUND)
-        entry = PAGE / ("index.html" if path == "/" else path.removeprefix("/page/"))
+        name = "index.html" if path == "/" else path.removeprefix("/page/")
+        entry = next((folder / name for folder in (PAGE, SHARED) if (folder / name).is_file()), PAGE / name)
         if "/" in path.removeprefix("/page/").strip("/") or not entry.is_file():
             return connection.respond(404, "no such file\n")
         kind = "text/javascript" if path.endswith(".js") else mimetypes.guess_type(entry.name)[0] or "text/plain"

@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 from rehearsal import Rehearsal
 
-from wakewise.cockpit.extras import cockpit_extras, extras_files, register_service
-from wakewise.cockpit.files import Files
+from wakewise.cockpit.extras import OFFER, page_files
 from wakewise.cockpit.server import Server
 
 # Required and optional keys of each object, as Cockpit's "External Integrations" lists them.
@@ -41,7 +40,7 @@ def fits(told: dict[str, Any], schema: tuple[dict[str, type], dict[str, type]]) 
 
 def test_the_extras_are_what_cockpit_reads() -> None:
     """One widget with an icon; no action, since what is sent to a bare address has no helm."""
-    told = cockpit_extras()
+    told = OFFER.cockpit_extras()
     fits(told, EXTRAS)
     assert told["targetSystem"] == "Cockpit"
     assert told["actions"] == []
@@ -52,7 +51,7 @@ def test_the_extras_are_what_cockpit_reads() -> None:
 
 def test_the_service_is_what_blueos_reads() -> None:
     """Registered with its extras, at paths that also hold behind BlueOS' own proxy."""
-    told = register_service()
+    told = OFFER.register_service()
     fits(told, SERVICE)
     assert told["extras"] == {"cockpit": "/cockpit_extras.json"}
     assert told["works_in_relative_paths"]
@@ -60,13 +59,13 @@ def test_the_service_is_what_blueos_reads() -> None:
 
 def test_every_address_that_is_named_is_served() -> None:
     """Widget, icon and both JSON files."""
-    files = Files(more=extras_files())
-    widget = cockpit_extras()["widgets"][0]
-    for address in (widget["iframeUrl"], widget["iframeIcon"], register_service()["icon"]):
+    files = page_files()
+    widget = OFFER.cockpit_extras()["widgets"][0]
+    for address in (widget["iframeUrl"], widget["iframeIcon"], OFFER.register_service()["icon"]):
         assert files.at(address) is not None, address
-    found = files.at(register_service()["extras"]["cockpit"])
+    found = files.at(OFFER.register_service()["extras"]["cockpit"])
     assert found is not None
-    assert json.loads(found.body) == cockpit_extras()
+    assert json.loads(found.body) == OFFER.cockpit_extras()
 
 
 def test_another_sites_page_reads_the_extras_and_nothing_else() -> None:
@@ -77,7 +76,7 @@ def test_another_sites_page_reads_the_extras_and_nothing_else() -> None:
     try:
         answer = ask(server, "/cockpit_extras.json", Origin="http://blueos.local")
         assert answer.headers["Access-Control-Allow-Origin"] == "*"
-        assert json.loads(answer.read()) == cockpit_extras()
+        assert json.loads(answer.read()) == OFFER.cockpit_extras()
         answer.close()
         for path, headers in (
             ("/", {"Origin": "http://blueos.local"}),

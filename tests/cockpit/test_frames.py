@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from wakewise.cockpit.frames import LiveCamera, View
+from wakewise.cockpit.frames import DRAWN_WITHIN_S, WIDTHS_PX, LiveCamera, View, Width
 from wakewise.errors import StageError
 from wakewise.imaging import photograph
 from wakewise.operation import Scenario
@@ -23,7 +23,7 @@ def test_a_picture_is_the_photograph_but_for_what_is_left_out() -> None:
     A process that was killed is told of, one that was closed is quiet.
     """
     scenario = Scenario.preset("quick")
-    camera = LiveCamera(scenario, width_px=WIDTH_PX)
+    camera = LiveCamera(scenario, widths_px=(WIDTH_PX,))
     parts = scenario.parts()
     view = View(X_WC=parts.start.X_WB @ parts.vehicle.X_BC)
     assert camera.draw(view) is None
@@ -50,3 +50,25 @@ def test_a_picture_is_the_photograph_but_for_what_is_left_out() -> None:
     finally:
         camera.close()
     assert camera.draw(view) is None
+
+
+def test_pictures_get_narrower_where_the_cores_are_busy_and_wide_again_where_they_are_not() -> None:
+    """By a time that goes with the pixels: to a width that keeps it, without going to and fro, and back."""
+    width = Width()
+    assert width.px == WIDTHS_PX[0]
+
+    def flown(widest_takes_s: float) -> list[int]:
+        widths = []
+        for _ in range(60):
+            width.took(widest_takes_s * (width.px / WIDTHS_PX[0]) ** 2)
+            widths.append(width.px)
+        return widths
+
+    busy = flown(0.13)
+    assert 0.13 * (busy[-1] / WIDTHS_PX[0]) ** 2 <= DRAWN_WITHIN_S
+    assert busy == sorted(busy, reverse=True)
+    assert WIDTHS_PX[-1] < busy[-1] < WIDTHS_PX[0]
+    assert flown(10.0)[-1] == WIDTHS_PX[-1]
+    free = flown(0.04)
+    assert free[-1] == WIDTHS_PX[0]
+    assert free == sorted(free)

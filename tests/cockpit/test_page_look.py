@@ -6,7 +6,7 @@ import re
 from typing import Any
 
 import pytest
-from standin import PAGE, StandIn
+from standin import PAGE, SHARED, StandIn
 
 SIZES = {
     "desk": (1280, 800, False),
@@ -48,7 +48,7 @@ def test_nothing_comes_from_elsewhere(standin: StandIn, spectate: Any) -> None:
     fetched = page.js("performance.getEntriesByType('resource').map((e) => e.name)")
     assert len(fetched) > 15
     assert all(name.startswith(standin.url) for name in fetched)
-    for entry in PAGE.iterdir():
+    for entry in [*PAGE.iterdir(), *SHARED.iterdir()]:
         text = entry.read_text(encoding="utf-8").replace('xmlns="http://www.w3.org/2000/svg"', "")
         assert not re.search(r"https?://|//[a-z]+\.[a-z]+/|\beval\(|innerHTML = [^\"]", text), entry.name
         assert not re.search(r"\sstyle=|\son[a-z]+=\"|<script>", text), f"{entry.name}: a policy without inline code"
@@ -58,7 +58,7 @@ def test_nothing_comes_from_elsewhere(standin: StandIn, spectate: Any) -> None:
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_words_stand_out(theme: str) -> None:
     """At least 4.5 to 1, as WCAG 2.2 (1.4.3) asks of small text, in both themes."""
-    css = (PAGE / "cockpit.css").read_text(encoding="utf-8")
+    css = (SHARED / "colours.css").read_text(encoding="utf-8")
     start = css.index(":root {") if theme == "light" else css.index(':root[data-theme="dark"]')
     inks = dict(re.findall(r"--([\w-]+): (#[0-9a-f]{6})", css[start : css.index("}", start)]))
     for ink, ground in (

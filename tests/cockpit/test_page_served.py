@@ -10,8 +10,7 @@ import pytest
 from browser import Browser, Page, until
 from rehearsal import Rehearsal
 
-from wakewise.cockpit.extras import extras_files
-from wakewise.cockpit.files import Files
+from wakewise.cockpit.extras import page_files
 from wakewise.cockpit.server import Server
 
 
@@ -24,7 +23,7 @@ def rehearsal() -> Iterator[Rehearsal]:
 
 @pytest.fixture
 def server(rehearsal: Rehearsal) -> Iterator[Server]:
-    served = Server(rehearsal, files=Files(more=extras_files()))
+    served = Server(rehearsal, files=page_files())
     served.start()
     yield served
     served.stop()

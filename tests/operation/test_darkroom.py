@@ -72,6 +72,7 @@ def photographed(parts, exposures, folder, beside):
     return made, {path.name: path.read_bytes() for path in sorted(folder.glob("images/*"))}, folder / "images.csv"
 
 
+@pytest.mark.slow
 def test_a_photograph_has_the_same_bytes_beside_the_flight_and_after_it(parts, exposures, tmp_path):
     """Some made by the other process, all by this one: photographs and images.csv are equal to the byte."""
     with warnings.catch_warnings():

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from wakewise.operation import fly, load_scenario
 
 SHORT = {
@@ -35,6 +37,7 @@ def _start(folder: Path) -> subprocess.Popen:
     return subprocess.Popen([sys.executable, "-c", FLIGHT, str(folder), json.dumps(SHORT)], stdout=subprocess.DEVNULL)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_on_one_and_on_two_processes(tmp_path):
     """One flight alone, here, then two at once: all three leave the same steps.parquet, byte for byte."""
     (tmp_path / "alone").mkdir()

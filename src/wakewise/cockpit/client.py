@@ -12,6 +12,8 @@ from wakewise.cockpit.show import Picture
 
 _MOST_WAITING = 64
 """Notes that wait for a client at most; of more the oldest are lost to it."""
+SEEN_WITHIN_S = 0.3
+"""A page that shows pictures says so within this time; one that is hidden leaves them unseen."""
 RATE_HZ, BURST = 120.0, 240.0
 """Messages that a client may send: sticks come at 25 Hz, pictures are acknowledged at some 15 Hz."""
 
@@ -28,6 +30,8 @@ class Client:
     amiss: int = 0
     throttled: int = 0
     unseen: int | None = None
+    pictured_s: float = 0.0
+    """When the last picture was put into the outbox."""
     sending_since_s: float | None = None
     """When the message that is on its way was given to the socket; None between messages."""
     _words: deque[str] = field(default_factory=lambda: deque(maxlen=_MOST_WAITING))
@@ -42,6 +46,10 @@ class Client:
         """Whether a picture would be sent on at once."""
         return self.greeted and self.unseen is None and self._picture is None
 
+    def will_look(self, now_s: float) -> bool:
+        """Whether it can take a picture, or has had one so lately that its word for it may be under way."""
+        return self.looks or (self.greeted and now_s - self.pictured_s < SEEN_WITHIN_S)
+
     def tell(self, text: str) -> None:
         """Put a message that is to arrive into the outbox."""
         self._words.append(text)
@@ -52,9 +60,9 @@ class Client:
         self._state = text
         self._something.set()
 
-    def picture(self, picture: Picture) -> None:
+    def picture(self, picture: Picture, now_s: float) -> None:
         """Put a picture into the outbox; the next one waits until this one was seen."""
-        self._picture, self.unseen = picture, picture.number
+        self._picture, self.unseen, self.pictured_s = picture, picture.number, now_s
         self._something.set()
 
     def seen(self, number: int) -> None:

@@ -14,9 +14,10 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections import deque
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import IO, TYPE_CHECKING, Any
 
 from wakewise.errors import StageError
@@ -28,7 +29,11 @@ if TYPE_CHECKING:
     from wakewise.operation import Scenario
     from wakewise.targets import Target
 
-WIDTH_PX = 480
+WIDTHS_PX = (480, 400, 320, 256)
+"""Widths a picture may have, widest first: where the cores are busy, pictures get smaller rather than rarer."""
+DRAWN_WITHIN_S = 0.07
+"""What a picture may take by the clock, so that ten a second are left when it has to be sent and shown, too."""
+_SMOOTHED = 0.3
 QUALITY = 75
 NICER = 5
 """How much the process yields to others (nice), once its scene is ready."""
@@ -37,10 +42,48 @@ _METERED = 8
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class View:
-    """Where the camera truly is, and the silt before it; None leaves that as it was."""
+    """Where the camera truly is, and the silt before it; None leaves that as it was. `width_px`: of the picture."""
 
     X_WC: Pose
     silt: ScalarGrid | None = None
+    width_px: int | None = None
+
+
+class Width:
+    """How wide the next picture may be, by how long the last ones took.
+
+    The time of a picture goes with its pixels, thus with the square of its width: one step narrower where the mean of
+    late is above `within_s`, one step wider only where that width would keep it with a fifth to spare.
+    """
+
+    def __init__(self, widths_px: tuple[int, ...] = WIDTHS_PX, within_s: float = DRAWN_WITHIN_S) -> None:
+        self._widths_px, self._within_s = widths_px, within_s
+        self._at = 0
+        self._mean_s: float | None = None
+
+    @property
+    def px(self) -> int:
+        """Of the next picture."""
+        return self._widths_px[self._at]
+
+    def took(self, took_s: float) -> None:
+        """Learn how long the last picture took by the clock."""
+        before_s = self._mean_s
+        mean_s = took_s if before_s is None else before_s + _SMOOTHED * (took_s - before_s)
+        self._mean_s = mean_s
+        if mean_s > self._within_s:
+            self._step(1)
+        elif self._at > 0 and 1.2 * mean_s * self._growth(-1) < self._within_s:
+            self._step(-1)
+
+    def _growth(self, by: int) -> float:
+        """Pixels of a width `by` steps on, over this one's."""
+        return (self._widths_px[self._at + by] / self.px) ** 2
+
+    def _step(self, by: int) -> None:
+        if 0 <= self._at + by < len(self._widths_px) and self._mean_s is not None:
+            self._mean_s *= self._growth(by)
+            self._at += by
 
 
 class LiveCamera:
@@ -52,12 +95,15 @@ class LiveCamera:
         Its target, camera, light and water.
     target : Target, optional
         In place of the scenario's own.
-    width_px : int
-        The height follows from the scenario's.
+    widths_px : tuple of int
+        Of its pictures, widest first; the height follows from the scenario's.
     """
 
-    def __init__(self, scenario: Scenario, target: Target | None = None, width_px: int = WIDTH_PX) -> None:
-        self._begin = (scenario, target, width_px)
+    def __init__(
+        self, scenario: Scenario, target: Target | None = None, widths_px: tuple[int, ...] = WIDTHS_PX
+    ) -> None:
+        self._begin = (scenario, target, widths_px[0])
+        self._width = Width(widths_px)
         self._process: subprocess.Popen[bytes] | None = None
         self._answers: queue.Queue[bytes | None] = queue.Queue()
         self._waited_for, self._last = 0, b""
@@ -90,9 +136,12 @@ class LiveCamera:
                 return None
             if not self._caught_up(0.0 if self._waited_for else timeout_s):
                 return None
-            self._send(pickle.dumps(view))
+            began_s = time.monotonic()
+            self._send(pickle.dumps(replace(view, width_px=self._width.px)))
             self._waited_for += 1
-            return self._last if self._caught_up(timeout_s) else None
+            in_time = self._caught_up(timeout_s)
+            self._width.took(time.monotonic() - began_s)
+            return self._last if in_time else None
 
     def close(self) -> None:
         """End the process."""
@@ -154,15 +203,17 @@ class Easel:
         from wakewise.imaging import SiltOptics
 
         parts = scenario.parts() if target is None else scenario.parts().replace(target=target)
-        given = parts.scenario.imaging
-        height = max(16, round(width_px * given.height / given.width))
-        self.settings: ImagingSettings = given.model_copy(update={"width": width_px, "height": height})
-        self._camera, self._scene = self.settings.camera(), parts.scene
+        self._given, self._width_px, self._scene = parts.scenario.imaging, width_px, parts.scene
         silt = parts.scenario.tank.silt
         self._grains = SiltOptics(diameter_m=silt.grain_m, density_kg_m3=silt.grain_density_kg_m3)
         self._silt: ScalarGrid | None = None
         self._seen: deque[float] = deque(maxlen=_METERED)
         self._rng = np.random.default_rng(parts.scenario.seed)
+
+    def settings(self, width_px: int) -> ImagingSettings:
+        """Settings of a picture of this width."""
+        height = max(16, round(width_px * self._given.height / self._given.width))
+        return self._given.model_copy(update={"width": width_px, "height": height})
 
     def draw(self, view: View) -> Any:
         """The picture, RGB, shape (h, w, 3), uint8."""
@@ -175,16 +226,17 @@ class Easel:
 
         if view.silt is not None:
             self._silt = view.silt if view.silt.largest > 0.0 else None
-        settings, X_WC = self.settings, view.X_WC
+        settings, X_WC = self.settings(view.width_px or self._width_px), view.X_WC
+        camera = settings.camera()
         lights, water, balance = settings.lights(), settings.water(), white_balance(settings)
         gain, amplification = settings.gain, 1.0
         if settings.auto_exposure:
             self._seen.append(brightness(self._scene, X_WC, self._silt, settings, self._grains, balance))
             chosen = divided(settled(self._seen), settings)
             gain, amplification = chosen.gain, chosen.amplification
-        seen = render(self._scene, self._camera, X_WC, lights, 1)
-        haze = haze_between(self._camera, X_WC, water, self._grains, self._silt, lights)
-        radiance, _ = through_water(seen, self._camera, haze, water, lights.from_above, self._grains)
+        seen = render(self._scene, camera, X_WC, lights, 1)
+        haze = haze_between(camera, X_WC, water, self._grains, self._silt, lights)
+        radiance, _ = through_water(seen, camera, haze, water, lights.from_above, self._grains)
         well_e = ELECTRONS_PER_S * settings.exposure_s / amplification
         return expose(radiance, gain * balance, well_e, READ_NOISE_E, self._rng)
 

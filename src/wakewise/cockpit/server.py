@@ -24,9 +24,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from wakewise.cockpit.client import Client
-from wakewise.cockpit.extras import extras_files
-from wakewise.cockpit.files import Files
-from wakewise.cockpit.gate import Caller, Gate, is_loopback, page_headers
+from wakewise.cockpit.extras import page_files
 from wakewise.cockpit.messages import (
     MOST_BYTES,
     Amiss,
@@ -40,12 +38,15 @@ from wakewise.cockpit.messages import (
     Sticks,
     read_message,
 )
+from wakewise.cockpit.pictures import show_pictures
 from wakewise.cockpit.seat import DEVICE, Holding
 from wakewise.cockpit.show import Note, Show, as_json
 from wakewise.errors import InputError
+from wakewise.serving.files import Files
+from wakewise.serving.gate import Caller, Gate, is_loopback, page_headers
 
 PROTOCOL = 1
-STATE_EVERY_S, PICTURE_EVERY_S = 0.1, 1.0 / 15.0
+STATE_EVERY_S = 0.1
 MOST_CLIENTS = 16
 STUCK_S = 10.0
 """A client that takes nothing for so long is let go."""
@@ -71,20 +72,29 @@ class Server:
         What callers from elsewhere must show; drawn if not given.
     files : Files, optional
         The page.
+    origins : tuple of str
+        Where browsers ask for the page if a proxy stands before it.
     """
 
     def __init__(
-        self, show: Show, host: str = "127.0.0.1", port: int = 0, token: str | None = None, files: Files | None = None
+        self,
+        show: Show,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        token: str | None = None,
+        files: Files | None = None,
+        origins: tuple[str, ...] = (),
     ) -> None:
         self.show, self.host, self.port = show, host, port
         self.token = token or secrets.token_urlsafe(16)
         self.clients: dict[str, Client] = {}
-        self._files = files or Files(more=extras_files())
-        self._gate = Gate(port=port, token=self.token)
+        self._files = files or page_files()
+        self._gate = Gate(port=port, token=self.token, origins=origins)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._listening: Listening | None = None
         self._thread: threading.Thread | None = None
         self._ready = threading.Event()
+        self._seen = asyncio.Event()
         self._fault: OSError | None = None
         self._over: asyncio.Event | None = None
         self._told: Holding | None = None
@@ -94,10 +104,13 @@ class Server:
     @property
     def address(self) -> str:
         """Where the page is, for this computer's browser, or with the token where it is asked for."""
+        token = f"#token={self.token}"
+        if self._gate.origins:
+            return f"{self._gate.origins[0]}/{token}"
         if is_loopback(self.host):
             host = f"[{self.host}]" if ":" in self.host else self.host
             return f"http://{host}:{self.port}/"
-        return f"http://{self.host}:{self.port}/#token={self.token}"
+        return f"http://{self.host}:{self.port}/{token}"
 
     @property
     def spectators(self) -> int:
@@ -154,9 +167,12 @@ class Server:
             return
         self.port = self._listening.sockets[0].getsockname()[1]
         near = is_loopback(self._listening.sockets[0].getsockname()[0])
-        self._gate = Gate(port=self.port, token=self.token, open_to_net=not near)
+        self._gate = replace(self._gate, port=self.port, open_to_net=not near)
         self._ready.set()
-        tasks = [asyncio.create_task(self._beat()), asyncio.create_task(self._look())]
+        tasks = [
+            asyncio.create_task(self._beat()),
+            asyncio.create_task(show_pictures(self.show, self._greeted, self._seen)),
+        ]
         await self._over.wait()
         for task in tasks:
             task.cancel()
@@ -178,7 +194,9 @@ class Server:
             return None
         if file is None:
             return _response(http.HTTPStatus.NOT_FOUND, b"there is nothing here\n")
-        more = page_headers(caller.host or "") | ({"Access-Control-Allow-Origin": "*"} if shared else {})
+        more = page_headers(caller.host or "", self._gate.origins) | (
+            {"Access-Control-Allow-Origin": "*"} if shared else {}
+        )
         return _response(http.HTTPStatus.OK, file.body, file.kind, more)
 
     async def _meet(self, connection: ServerConnection) -> None:
@@ -248,6 +266,7 @@ class Server:
                 seat.moved(client.id, message.lease, message.seq, message.t_ms, message.axes)
             case Seen():
                 client.seen(message.frame)
+                self._seen.set()
             case Press():
                 seat.press(client.id, message.lease, message.what)
             case DeskChange():
@@ -328,19 +347,6 @@ class Server:
     def _to_all(self, message: str) -> None:
         for client in self._greeted():
             client.tell(message)
-
-    async def _look(self) -> None:
-        """Pictures, for as long as somebody looks."""
-        assert self._loop is not None
-        while True:
-            due_s = self._loop.time() + PICTURE_EVERY_S
-            if any(client.looks for client in self._greeted()):
-                with contextlib.suppress(Exception):  # a picture that fails is one less
-                    picture = await asyncio.to_thread(self.show.picture)
-                    for client in self._greeted() if picture is not None else ():
-                        if client.looks and picture is not None:
-                            client.picture(picture)
-            await asyncio.sleep(max(due_s - self._loop.time(), 0.005))
 
     def _look_after_helm(self) -> None:
         holding = self.show.seat.holding

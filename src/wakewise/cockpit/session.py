@@ -1,8 +1,8 @@
 """From a scenario to flights that pages show and hands fly: one after the other, each with a folder of its own.
 
 A thread tends the session: it prepares the parts, lets the flight begin, follows its photographs and says what became
-of it. The flight has its own thread (`wakewise.operation.live`), pictures their own process, the server its own loop;
-none waits for another.
+of it. The flight has its own thread (`wakewise.operation.by_hand.live`), pictures their own process, the server its own
+loop; none waits for another.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from wakewise.cockpit.show import Note, Picture
 from wakewise.cockpit.state import Instruments, described, number, rounded, told_scenario
 from wakewise.errors import StageError, WakewiseError
 from wakewise.operation import Parts, Scenario
-from wakewise.operation.assisted import AssistedPilot, assisted
-from wakewise.operation.desk import MODES, RANGES, WAYS, Desk, regime
-from wakewise.operation.live import LiveFlight
+from wakewise.operation.by_hand.assisted import AssistedPilot, assisted
+from wakewise.operation.by_hand.desk import MODES, RANGES, WAYS, Desk, regime
+from wakewise.operation.by_hand.live import LiveFlight
 from wakewise.pilot.controls import CENTRED, ControlSource
 
 TENDED_S, SCENE_EVERY_S = 0.05, 0.2

@@ -3,19 +3,17 @@
 Start reading in `parts.py` (what a flight is built from, and the one place where the controller's world and the true
 one meet) and `loop.py` (the loop itself). `scenario.py` with `target_settings.py` is a maker of parts, read from YAML
 (`renamed.py` knows the names of older files) with `draws.py` (what its seed draws), `seeds.py` its random streams,
-`regions.py` keeps what takes long to draw; `worlds/` and `pilots.py` are worlds and pilots by name (`helm.py` is the
-pilot who is a person), `instant_water.py` and `lattice_water.py` worlds other than the tank, `survey.py` what is known
-of target and camera beforehand; `surroundings.py` is what a planner is told to keep clear of, `preflight.py` refuses
-what does not fit, `switches.py` says what is set and cannot act, `foreign.py` guards what comes from outside;
-`flying.py` flies, `recorder.py` and `telemetry.py` keep what was, `flight_trim.py` reads from it what ballast is
-lacking, `photography.py` renders what the camera saw, `darkroom.py` while the flight goes on, `guide.py` begins the
-guide of what photographs have seen.
+`regions.py` keeps what takes long to draw; `worlds/` and `pilots.py` are worlds and pilots by name,
+`instant_water.py` and `lattice_water.py` worlds other than the tank, `survey.py` what is known of target and camera
+beforehand; `surroundings.py` is what a planner is told to keep clear of, `preflight.py` refuses what does not fit,
+`switches.py` says what is set and cannot act, `foreign.py` guards what comes from outside; `flying.py` flies,
+`recorder.py` and `telemetry.py` keep what was, `flight_trim.py` reads from it what ballast is lacking,
+`photography.py` renders what the camera saw, `darkroom.py` while the flight goes on, `guide.py` begins the guide of
+what photographs have seen.
 
-By hand: `desk.py` is what an operator has set, `assisted.py` the pilot between hands and goals; `motion.py` is the one
-smooth goal that all share, `steering.py` moves it by sticks and `assists.py`, `keep_off.py` off what is solid,
-`scanning.py` along a mission that waits; `hands.py` is a person at these sticks. `live.py` flies without an end, by the
-clock of `pace.py`, and photographs when `shutter.py` is asked; what was lies in the parts of `flight_log.py` until
-`live_folder.py` makes them a trial's folder (`trial_folder.py`, `exposures.py`), and `replay.py` flies its hands again.
+By hand (`by_hand/`): what an operator asks for, and flights that go on until somebody ends them. What was lies in the
+parts of `flight_log.py` until it is a trial's folder (`trial_folder.py`, `exposures.py`). With a real vehicle
+(`at_sea/`): who has the thrusters when. `behind_firmware.py` is the scenario's vehicle behind an autopilot's.
 """
 
 from typing import TYPE_CHECKING
@@ -23,10 +21,10 @@ from typing import TYPE_CHECKING
 from wakewise.doors import lazy_door
 
 if TYPE_CHECKING:
+    from wakewise.operation.by_hand.live import LiveFlight
     from wakewise.operation.darkroom import Darkroom
     from wakewise.operation.exposures import read_exposures
     from wakewise.operation.flying import Flight, fly, fly_trial
-    from wakewise.operation.live import LiveFlight
     from wakewise.operation.parts import PARTS, Parts
     from wakewise.operation.photography import photo_name, photograph_flight
     from wakewise.operation.recorder import FlightRecorder, step_columns

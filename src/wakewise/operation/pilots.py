@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from wakewise.errors import InputError
 from wakewise.interfaces import Pilot
 from wakewise.missions import RoutePilot
-from wakewise.operation.helm import HumanPilot
+from wakewise.operation.by_hand.helm import HumanPilot
 from wakewise.pilot.sources import hands_from
 from wakewise.plugins import find
 
@@ -41,8 +41,8 @@ def operator_pilot(parts: Parts) -> Pilot:
     InputError
         If the scenario names no such file: a person's own hands no scenario can hold.
     """
-    from wakewise.operation.assisted import assisted_pilot
-    from wakewise.operation.desk import Desk
+    from wakewise.operation.by_hand.assisted import assisted_pilot
+    from wakewise.operation.by_hand.desk import Desk
 
     if parts.scenario.controls is None:
         raise InputError("pilot: operator, flies by hand: take `wakewise cockpit`, or name a record in controls")
@@ -51,9 +51,9 @@ def operator_pilot(parts: Parts) -> Pilot:
 
 def assisted_person(parts: Parts) -> Pilot:
     """`assisted`: the person of `human` at the desk's sticks, camera kept on the target, brakes and all."""
-    from wakewise.operation.assisted import assisted_pilot
-    from wakewise.operation.desk import Desk, DeskState
-    from wakewise.operation.hands import PersonsHands
+    from wakewise.operation.by_hand.assisted import assisted_pilot
+    from wakewise.operation.by_hand.desk import Desk, DeskState
+    from wakewise.operation.by_hand.hands import PersonsHands
 
     hands = PersonsHands(
         wish=route_pilot(parts),

@@ -10,10 +10,10 @@ from wakewise.geometry import Pose, quat_conjugate, quat_multiply, rotvec_from_q
 from wakewise.interfaces import BodyState
 from wakewise.missions import RoutePilot
 from wakewise.operation import Scenario
-from wakewise.operation.assisted import assisted_pilot
-from wakewise.operation.desk import Desk, DeskState
-from wakewise.operation.scanning import PACE_S
-from wakewise.operation.steering import BRAKING_M_S2
+from wakewise.operation.by_hand.assisted import assisted_pilot
+from wakewise.operation.by_hand.desk import Desk, DeskState
+from wakewise.operation.by_hand.scanning import PACE_S
+from wakewise.operation.by_hand.steering import BRAKING_M_S2
 from wakewise.pilot import CENTRED, Controls
 from wakewise.planning.barrier import least_gap
 from wakewise.planning.problem import CLEARANCE_M

@@ -23,11 +23,11 @@ from wakewise.control.intent import PAPER_W_TRACK
 from wakewise.control.switching import Switched
 from wakewise.interfaces import BodyState, Controller, Goal
 from wakewise.missions import CameraAim
-from wakewise.operation.desk import WAYS, Desk, DeskState
-from wakewise.operation.keep_off import KeepOff
-from wakewise.operation.motion import Motion
-from wakewise.operation.scanning import Mission, Scan
-from wakewise.operation.steering import BRAKING_M_S2, Sphere, steered, turned
+from wakewise.operation.by_hand.desk import WAYS, Desk, DeskState
+from wakewise.operation.by_hand.keep_off import KeepOff
+from wakewise.operation.by_hand.motion import Motion
+from wakewise.operation.by_hand.scanning import Mission, Scan
+from wakewise.operation.by_hand.steering import BRAKING_M_S2, Sphere, steered, turned
 from wakewise.pilot import CENTRED, Controls, ControlSource
 from wakewise.pilot.trace import TraceWriter
 

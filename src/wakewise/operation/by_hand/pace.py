@@ -62,6 +62,10 @@ class Pace:
             self.behind_s = late_s
         self._read_at_s = now_s
 
+    def due_s(self, time_s: float) -> float:
+        """When this time of the flight has come, by the clock; before the first step the flight begins now."""
+        return (self._clock() if self._origin_s is None else self._origin_s) + time_s
+
     def sent(self, time_s: float) -> None:  # noqa: ARG002  (run_loop hands it over)
         """Take note that the thrusts which answer what was read at `pace` go to the plant."""
         k = self._steps % KEPT

@@ -10,7 +10,7 @@ from wakewise.arrays import Array
 from wakewise.control.intent import FULL_M_S, FULL_RAD_S
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Pilot
-from wakewise.operation.helm import STICKS, watched
+from wakewise.operation.by_hand.helm import STICKS, watched
 from wakewise.pilot import CENTRED, Controls, Person, PersonState, View, begin, draw_person, steer
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from wakewise.operation import Scenario, fly
-from wakewise.operation.assisted import assisted
-from wakewise.operation.desk import Desk, DeskState
+from wakewise.operation.by_hand.assisted import assisted
+from wakewise.operation.by_hand.desk import Desk, DeskState
 from wakewise.pilot.script import script_of
 
 OVERSHOOT_M = 0.1

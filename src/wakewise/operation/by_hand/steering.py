@@ -16,10 +16,10 @@ from wakewise.arrays import Array
 from wakewise.control.intent import FULL_M_S, FULL_RAD_S, HIGHEST_RAD, moved_on, shaped, slewed
 from wakewise.interfaces import BodyState
 from wakewise.missions import CameraAim
-from wakewise.operation.assists import elevation_rad, level_frame, sphere_frame, watching
-from wakewise.operation.desk import DeskState
-from wakewise.operation.keep_off import KeepOff
-from wakewise.operation.motion import STEEPEST_RAD, Attitude, Motion, followed, tilted, tilting, turning
+from wakewise.operation.by_hand.assists import elevation_rad, level_frame, sphere_frame, watching
+from wakewise.operation.by_hand.desk import DeskState
+from wakewise.operation.by_hand.keep_off import KeepOff
+from wakewise.operation.by_hand.motion import STEEPEST_RAD, Attitude, Motion, followed, tilted, tilting, turning
 
 FASTER_M_S2, BRAKING_M_S2 = 0.15, 0.2
 """How fast a commanded velocity grows and falls on average; from 0.3 m/s to rest it takes 1.5 s and 0.23 m."""

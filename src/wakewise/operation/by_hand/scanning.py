@@ -21,7 +21,7 @@ from wakewise.geometry import Pose, euler_from_quat, quat_conjugate, quat_multip
 from wakewise.missions import CameraAim, Leg, Route
 from wakewise.missions.orbit import camera_pose, camera_twist
 from wakewise.missions.route import rest_to_rest
-from wakewise.operation.motion import Attitude, Motion, rates_of, tilting, turned_to, turning
+from wakewise.operation.by_hand.motion import Attitude, Motion, rates_of, tilting, turned_to, turning
 
 PACE_S = 1.0
 """Time in which the mission's clock comes up to the world's: at its acceleration a mission of 0.1 m/s takes two."""

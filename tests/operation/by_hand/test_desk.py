@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from wakewise.errors import InputError
-from wakewise.operation.desk import FIELDS, Desk, DeskState, Meaning, meaning, regime
+from wakewise.operation.by_hand.desk import FIELDS, Desk, DeskState, Meaning, meaning, regime
 
 
 @pytest.mark.parametrize(

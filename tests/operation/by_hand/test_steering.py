@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wakewise.operation.steering import BRAKING_M_S2, answered
+from wakewise.operation.by_hand.steering import BRAKING_M_S2, answered
 
 DT_S = 0.02
 

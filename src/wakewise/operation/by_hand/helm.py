@@ -17,9 +17,9 @@ from wakewise.control.easing import slewed_rate
 from wakewise.control.intent import FULL_M_S, FULL_RAD_S
 from wakewise.geometry import Pose, euler_from_quat, matrix_from_quat, quat_from_euler
 from wakewise.interfaces import BodyState, Goal, Pilot
-from wakewise.operation.assists import level_frame
-from wakewise.operation.motion import TURN_RAD_S2
-from wakewise.operation.steering import answered, led
+from wakewise.operation.by_hand.assists import level_frame
+from wakewise.operation.by_hand.motion import TURN_RAD_S2
+from wakewise.operation.by_hand.steering import answered, led
 from wakewise.pilot import Person, PersonState, Sticks, View, begin, draw_person, steer
 
 ANSWER_S = 0.5

@@ -10,8 +10,8 @@ import pytest
 
 from wakewise.errors import InputError
 from wakewise.operation import LiveFlight, read_exposures, read_scenario
+from wakewise.operation.by_hand.live_folder import gather
 from wakewise.operation.flight_log import PARTS
-from wakewise.operation.live_folder import gather
 
 pytestmark = pytest.mark.slow
 

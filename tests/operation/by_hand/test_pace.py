@@ -2,7 +2,7 @@
 
 import pytest
 
-from wakewise.operation.pace import MOST_CATCHING_UP_S, Pace
+from wakewise.operation.by_hand.pace import MOST_CATCHING_UP_S, Pace
 
 
 class Clock:

@@ -8,10 +8,10 @@ import pytest
 from wakewise.errors import InputError
 from wakewise.interfaces import Witness
 from wakewise.operation import LiveFlight, load_scenario, read_scenario
-from wakewise.operation.assisted import assisted
-from wakewise.operation.desk import Desk, DeskState
+from wakewise.operation.by_hand.assisted import assisted
+from wakewise.operation.by_hand.desk import Desk, DeskState
+from wakewise.operation.by_hand.replay import replay_of
 from wakewise.operation.loop import Step
-from wakewise.operation.replay import replay_of
 from wakewise.pilot.script import script_of
 
 SCENARIO = load_scenario("quick", None, {"world": "tank", "method": "dp"})

@@ -18,7 +18,7 @@ from wakewise.geometry import (
 )
 from wakewise.missions import CameraAim
 from wakewise.missions.orbit import R_FC
-from wakewise.operation.motion import STEEPEST_RAD, Attitude
+from wakewise.operation.by_hand.motion import STEEPEST_RAD, Attitude
 
 _Q_FC = quat_from_matrix(R_FC)
 OVER_M = 0.15

@@ -8,12 +8,12 @@ import numpy as np
 import polars as pl
 
 from wakewise.errors import InputError
-from wakewise.operation.assisted import assisted
-from wakewise.operation.desk import Desk
-from wakewise.operation.live import LiveFlight
+from wakewise.operation.by_hand.assisted import assisted
+from wakewise.operation.by_hand.desk import Desk
+from wakewise.operation.by_hand.live import LiveFlight
+from wakewise.operation.by_hand.shutter import Shutter
 from wakewise.operation.parts import Parts
 from wakewise.operation.scenario import Scenario, read_scenario
-from wakewise.operation.shutter import Shutter
 from wakewise.pilot.script import Script
 from wakewise.pilot.sources import hands_from
 from wakewise.pilot.trace import TRACE_FILE, Trace, read_trace

@@ -18,14 +18,14 @@ import numpy as np
 
 from wakewise.errors import InputError
 from wakewise.interfaces import ScalarGrid, Witness
+from wakewise.operation.by_hand.live_folder import gather
+from wakewise.operation.by_hand.pace import Pace
+from wakewise.operation.by_hand.shutter import Shutter
 from wakewise.operation.exposures import ExposureRecord
 from wakewise.operation.flight_log import PARTS, FlightLog, hands_part, has_parts
 from wakewise.operation.flying import FLIGHT_JOBS, WATER_EVERY_S, blamed, loop_of, recorder_of
-from wakewise.operation.live_folder import gather
 from wakewise.operation.loop import Step
-from wakewise.operation.pace import Pace
 from wakewise.operation.parts import Parts
-from wakewise.operation.shutter import Shutter
 from wakewise.operation.trial_folder import claim, flown_by_hand, write_truth
 from wakewise.pilot.trace import TraceWriter
 from wakewise.processes import alone
@@ -53,6 +53,8 @@ class LiveFlight:
         How often the water at the target is measured.
     shutter : Shutter, optional
         Says when photographs are taken and when the flight is over; by default when it is asked.
+    checked : bool
+        Hold the parts against their scenario's tank first (see `Parts.preflight`); who flies elsewhere has done so.
 
     Raises
     ------
@@ -69,13 +71,14 @@ class LiveFlight:
         watch: Callable[[Step, Witness | None], None] | None = None,
         water_every_s: float = WATER_EVERY_S,
         shutter: Shutter | None = None,
+        checked: bool = True,
     ) -> None:
         if folder is not None and (folder / "steps.parquet").exists():
             raise InputError(f"{folder}: holds a flight already, give another folder")
         if folder is not None and has_parts(folder):
             raise InputError(f"{folder}: holds a flight that was cut off; wakewise scan --resume {folder} finishes it")
         self.parts, self.folder = parts, folder
-        self._watch, self._water_every_s = watch, water_every_s
+        self._watch, self._water_every_s, self._checked = watch, water_every_s, checked
         self._told_to_stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="flight")
         self._shutter = Shutter(parts) if shutter is None else shutter
@@ -103,6 +106,10 @@ class LiveFlight:
     def stop(self) -> None:
         """End the flight at the next step; its folder is written then, so wait for it with `join`."""
         self._told_to_stop.set()
+
+    def wait(self, seconds: float) -> None:
+        """Wait in the flying thread, or until the flight is to end."""
+        self._told_to_stop.wait(seconds)
 
     def join(self, timeout_s: float | None = None) -> None:
         """Wait until the flight is over and its folder written."""
@@ -140,8 +147,9 @@ class LiveFlight:
     def _fly(self) -> None:
         parts, folder = self.parts, self.folder
         warm(FLIGHT_JOBS, self._prepare)
-        self._prepare(0, 1, "holds parts and water against each other")
-        _ = parts.preflight
+        if self._checked:
+            self._prepare(0, 1, "holds parts and water against each other")
+            _ = parts.preflight
         if folder is not None:
             claim(folder, flown_by_hand(parts))
             write_truth(parts, folder)
