@@ -33,7 +33,7 @@ def _stick(t: float) -> int:
     return 0 if t < 5 else 500 if t < ASTERN_S else -500
 
 
-def messages() -> Iterator[tuple[float, int, int, Any]]:
+def messages(*, position: bool = False) -> Iterator[tuple[float, int, int, Any]]:
     """Time in seconds, system, component and message of the dive, in order."""
     mav = ardupilotmega
     for name, value in [("BARO2_GND_PRESS", 101_300.0)] + [
@@ -51,16 +51,18 @@ def messages() -> Iterator[tuple[float, int, int, Any]]:
             yield t, 1, 1, mav.MAVLink_sys_status_message(0, 0, 0, 0, round(1e3 * VOLTAGE_V), 0, -1, 0, 0, 0, 0, 0, 0)
         yield t, 255, 190, mav.MAVLink_manual_control_message(1, _stick(t), 0, 250 if t >= 5 else 500, 0, 0)
         yield t, 1, 1, mav.MAVLink_attitude_message(boot, 0.1, -0.2, 3.1 + 0.01 * t, 0, 0, 0)
+        if position:
+            yield t, 1, 1, mav.MAVLink_local_position_ned_message(boot, 0.1 * t, -0.2 * t, 0.5 * t, 0.1, -0.2, 0.5)
         yield t, 1, 1, mav.MAVLink_vfr_hud_message(0, 0, 0, 0, -0.5 * t, 0)
         yield t, 1, 1, mav.MAVLink_scaled_pressure2_message(boot, 1013.0 + 49.0 * t, 0, 900)
         yield t, 1, 1, mav.MAVLink_servo_output_raw_message(boot * 1000, 0, *pulses(step))
 
 
-def tlog(jump_at_s: float = 1e9, jump_s: float = 0.0) -> bytes:
+def tlog(jump_at_s: float = 1e9, jump_s: float = 0.0, *, position: bool = False) -> bytes:
     """The dive as a ground station keeps it; from one time on its clock is off."""
     out = io.BytesIO()
     senders = {}
-    for t, system, component, message in messages():
+    for t, system, component, message in messages(position=position):
         sender = senders.setdefault(
             (system, component), ardupilotmega.MAVLink(None, srcSystem=system, srcComponent=component)
         )

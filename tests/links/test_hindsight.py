@@ -9,7 +9,9 @@ import polars as pl
 import pytest
 
 from wakewise.errors import InputError
-from wakewise.links.logs.hindsight import bow_points, hindsight, motor_channels
+from wakewise.links.craft import Craft
+from wakewise.links.logs.hindsight import bow_points, hindsight
+from wakewise.links.motors import motor_channels
 from wakewise.thrusters.curve_library import library_curve
 from wakewise.vehicles import Vehicle, load_vehicle
 from wakewise.wake import wake_model
@@ -89,12 +91,13 @@ def test_what_is_not_known_is_null_and_rest_is_nothing(vehicle: Vehicle) -> None
 
 def test_motors_are_found_on_their_channels(vehicle: Vehicle) -> None:
     """SERVOn_FUNCTION says where a motor is; without it they are in order; another number of motors is refused."""
-    assert motor_channels(vehicle, {}) == tuple(range(1, 9))
+    craft = Craft.of(vehicle, wake_model("jet"))
+    assert motor_channels(craft, {}) == tuple(range(1, 9))
     moved = {f"SERVO{i + 4}_FUNCTION": 32.0 + i for i in range(1, 9)}
-    assert motor_channels(vehicle, moved) == tuple(range(5, 13))
+    assert motor_channels(craft, moved) == tuple(range(5, 13))
     six = {name: value for name, value in PARAMETERS.items() if value not in {39.0, 40.0}}
-    with pytest.raises(InputError, match="8 thrusters, the log's SERVOn_FUNCTION drives motors 1, 2, 3, 4, 5, 6;"):
-        motor_channels(vehicle, six)
+    with pytest.raises(InputError, match="8 thrusters, SERVOn_FUNCTION drives motors 1, 2, 3, 4, 5, 6;"):
+        motor_channels(craft, six)
 
 
 def test_a_thruster_without_a_curve_goes_in_proportion(vehicle: Vehicle) -> None:

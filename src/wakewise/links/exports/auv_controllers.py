@@ -36,7 +36,8 @@ def tam_yaml(
     vehicle : str
         Goes into a comment.
     names : sequence of str
-        Of the thrusters, in the order of the columns; joints and controllers are numbered from 1.
+        Of the thrusters, in the order of the columns; joints and controllers are numbered from 1, as in the
+        project's demos: `thruster_1_joint`.
     matrix_B : ndarray, shape (6, n)
         Wrench about the body origin per newton of each thruster, in FRD.
     limits_N : tuple of ndarray, shape (n,), optional
@@ -58,8 +59,8 @@ def tam_yaml(
     for k, name in enumerate(names):
         told = " ".join(str(name).split())
         reach = "" if limits_N is None else f", {limits_N[0][k]:.3g} to {limits_N[1][k]:.3g} N"
-        joints.append(f"      - thruster{k + 1}_joint  # {told}{reach}")
-        controllers.append(f"      - thruster{k + 1}_controller")
+        joints.append(f"      - thruster_{k + 1}_joint  # {told}{reach}")
+        controllers.append(f"      - thruster_{k + 1}_controller")
     rows = [
         f"      {row}: [{', '.join(_number(value) for value in values)}]"
         for row, values in zip(ROWS, matrix, strict=True)

@@ -23,7 +23,7 @@ _CODES: dict[str, tuple[str, float | None]] = {
     "c": ("h", 0.01), "C": ("H", 0.01), "e": ("i", 0.01), "E": ("I", 0.01), "L": ("i", 1e-7),
     "n": ("4s", None), "N": ("16s", None), "Z": ("64s", None), "a": ("64s", None),
 }  # fmt: skip
-_WANTED = frozenset({"ATT", "RCOU", "RCIN", "CTUN", "BARO", "BAT", "MODE", "ARM", "EV", "PARM"})
+_WANTED = frozenset({"ATT", "RCOU", "RCIN", "CTUN", "BARO", "BAT", "MODE", "ARM", "EV", "PARM", "XKF1"})
 _ARMED_EVENT, _DISARMED_EVENT = 10, 11
 _MIDDLE_US, _HALF_US = 1500.0, 400.0
 
@@ -128,6 +128,10 @@ def _take(gather: Gather, vessel: Vessel, form: Format, body: bytes) -> None:
             # The first is inside the hull.
             if fields.get("I", fields.get("Id", 1)) == 1:
                 vessel.put("depth BARO", time_s, (-fields["Alt"],))
+        case "XKF1":
+            # The estimator's first core; the autopilot may change over to another, which MAVLink's position follows.
+            if fields.get("C", 0) == 0:
+                vessel.put("position", time_s, (fields[k] for k in ("PN", "PE", "PD")))
         case "BAT":
             if fields.get("Inst", fields.get("Instance", fields.get("I", 0))) == 0:
                 vessel.put("voltage", time_s, (fields["Volt"],))

@@ -1,8 +1,9 @@
 """What readers find in a log, whatever its format: samples by channel, parameters, and a count of what was no record.
 
 Channels, all in SI, NED and FRD: `sticks` (forward, right, down, turn in [-1, 1]), `servo` (16 pulses in us),
-`attitude` (roll, pitch, yaw in rad), `armed`, `mode` (its number), `voltage`; of depth, each source by itself:
-`depth VFR_HUD`, `depth AHRS2`, `depth CTUN`, `depth BARO` (m), `pressure 1` to `pressure 3` (Pa).
+`attitude` (roll, pitch, yaw in rad), `position` (north, east, down of the autopilot's origin, m), `armed`, `mode` (its
+number), `voltage`; of depth, each source by itself: `depth VFR_HUD`, `depth AHRS2`, `depth CTUN`, `depth BARO` (m),
+`pressure 1` to `pressure 3` (Pa).
 """
 
 from __future__ import annotations
@@ -19,12 +20,15 @@ from wakewise.arrays import Array
 from wakewise.links.logs.clock import Clock, ClockJump
 
 SERVOS = 16
-WIDTHS = {"sticks": 4, "servo": SERVOS, "attitude": 3}
+WIDTHS = {"sticks": 4, "servo": SERVOS, "attitude": 3, "position": 3}
+HELD_S = {"sticks": 1.0, "servo": 1.5, "attitude": 1.0, "position": 1.0, "armed": 5.0, "mode": 5.0, "voltage": 10.0}
+"""How long the last sample of a channel stands where one is needed at an instant; then none is known."""
 # Beyond these a value is damage, not a measurement.
 _ALLOWED = {
     "sticks": (-1.0, 1.0),
     "servo": (500.0, 2500.0),
     "attitude": (-2.0 * math.pi, 2.0 * math.pi),
+    "position": (-1e5, 1e5),
     "armed": (0.0, 1.0),
     "mode": (0.0, 255.0),
     "voltage": (0.5, 100.0),
@@ -102,6 +106,17 @@ class VehicleLog:
         return max((float(s.time_s[-1]) for s in self.series.values()), default=0.0)
 
 
+def sound(channel: str, values: Iterable[float]) -> tuple[float, ...]:
+    """Values of a channel's sample; one out of its range, or none, becomes NaN."""
+    low, high = _ALLOWED[channel.partition(" ")[0]]
+    return tuple(float(v) if low <= v <= high else math.nan for v in values)
+
+
+def is_parameter(name: str, value: float) -> bool:
+    """Whether a name and a value can be a parameter's."""
+    return name.isidentifier() and math.isfinite(value)
+
+
 @dataclass
 class Vessel:
     """Samples and parameters of one system while a log is read."""
@@ -111,13 +126,12 @@ class Vessel:
 
     def put(self, channel: str, time_s: float, values: Iterable[float]) -> None:
         """Keep one sample; a value out of its range, or none, becomes NaN."""
-        low, high = _ALLOWED[channel.partition(" ")[0]]
-        kept = tuple(float(v) if low <= v <= high else math.nan for v in values)
+        kept = sound(channel, values)
         self.rows.setdefault(channel, []).append((time_s, *kept))
 
     def parameter(self, name: str, value: float) -> None:
         """Keep a parameter under a name that can be one."""
-        if name.isidentifier() and math.isfinite(value):
+        if is_parameter(name, value):
             self.parameters[name] = value
 
     @property

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping
+from typing import Any, Protocol
 
-from wakewise.links.logs.gather import SERVOS, Gather
+from wakewise.links.logs.gather import SERVOS
 
 WANTED = frozenset({
     "MANUAL_CONTROL", "SERVO_OUTPUT_RAW", "ATTITUDE", "VFR_HUD", "AHRS2", "SCALED_PRESSURE", "SCALED_PRESSURE2",
-    "SCALED_PRESSURE3", "HEARTBEAT", "SYS_STATUS", "PARAM_VALUE",
+    "SCALED_PRESSURE3", "HEARTBEAT", "SYS_STATUS", "PARAM_VALUE", "LOCAL_POSITION_NED",
 })  # fmt: skip
 AUTOPILOT = 1
 """Component id of a vehicle's autopilot; cameras, sonars and companions have others."""
@@ -20,7 +20,40 @@ _NO_VOLTAGE = 65535
 _PASCAL_PER_MBAR = 100.0
 
 
-def take(gather: Gather, stamp_s: float, system: int, component: int, name: str, fields: Mapping[str, Any]) -> None:
+class Stamped(Protocol):
+    """What makes one clock of stamps."""
+
+    def at(self, stamp_s: float, boot_s: float | None = None) -> float:
+        """Time of a stamp on that clock."""
+        ...
+
+
+class Told(Protocol):
+    """Where the samples and parameters of one system go."""
+
+    def put(self, channel: str, time_s: float, values: Iterable[float]) -> None:
+        """Keep one sample of a channel (`wakewise.links.logs.gather`)."""
+        ...
+
+    def parameter(self, name: str, value: float) -> None:
+        """Keep a parameter."""
+        ...
+
+
+class Listener(Protocol):
+    """Who keeps what messages say: a log's reader, or the meter beside a vehicle."""
+
+    @property
+    def clock(self) -> Stamped:
+        """Its clock."""
+        ...
+
+    def vessel(self, system: int) -> Told:
+        """Where a system's go."""
+        ...
+
+
+def take(gather: Listener, stamp_s: float, system: int, component: int, name: str, fields: Mapping[str, Any]) -> None:
     """Keep what a message says; those that are not `WANTED` only set the clock.
 
     Raises
@@ -46,6 +79,8 @@ def take(gather: Gather, stamp_s: float, system: int, component: int, name: str,
             vessel.put("servo", time_s, (_number(fields.get(f"servo{i}_raw", 0)) for i in range(1, SERVOS + 1)))
     elif name == "ATTITUDE":
         vessel.put("attitude", time_s, (_number(fields[k]) for k in ("roll", "pitch", "yaw")))
+    elif name == "LOCAL_POSITION_NED":
+        vessel.put("position", time_s, (_number(fields[k]) for k in ("x", "y", "z")))
     elif name == "VFR_HUD":
         vessel.put("depth VFR_HUD", time_s, (-_number(fields["alt"]),))
     elif name == "AHRS2":

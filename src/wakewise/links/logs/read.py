@@ -22,7 +22,7 @@ def read_log(path: Path) -> VehicleLog:
     MissingExtra
         If the extra `links` is not installed.
     """
-    need("wakewise link log", "links")
+    need("wakewise link log", "links", only=("pymavlink", "mcap"))
     from wakewise.links.logs.dataflash import HEAD, read_dataflash
     from wakewise.links.logs.mcap_file import MAGIC, read_mcap
     from wakewise.links.logs.tlog import holds_packets, read_tlog

@@ -1,4 +1,8 @@
-"""A log as a table: one row per tick of one clock, whatever rate each channel came at."""
+"""A log as a table: one row per tick of one clock, whatever rate each channel came at.
+
+What a log and a flight in the tank both know has the same name and meaning as in a trial's `steps.parquet`: where the
+vehicle believed to be (`est_`), and with `hindsight.py` its thrusts and wrench.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +12,15 @@ import numpy as np
 import polars as pl
 
 from wakewise.arrays import Array
-from wakewise.links.logs.gather import MODES, SERVOS, Series, VehicleLog
+from wakewise.geometry import quat_from_euler
+from wakewise.links.logs.gather import HELD_S, MODES, SERVOS, Series, VehicleLog
 from wakewise.physics import GRAVITY_M_S2
 
 RATE_HZ = 10.0
 MOST_ROWS = 500_000
-HELD_S = {"sticks": 1.0, "servo": 1.5, "armed": 5.0, "mode": 5.0, "voltage": 10.0}
-"""How long the last sample of a channel stands; then the table has none."""
 LINE_S = 2.0
 """Longest gap that depth and attitude are drawn straight across."""
+_POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
 STICKS = ("forward", "right", "down", "turn")
 _STATED = ("depth VFR_HUD", "depth AHRS2", "depth CTUN", "depth BARO")
 _FRESH_KG_M3 = 1000.0
@@ -26,7 +30,7 @@ _ROUNDING_S = 1e-3
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LogTable:
-    """Rows of a log at `rate_hz`: time_s, sticks, servo_i_us, depth_m, attitude, armed, mode, voltage_V.
+    """Rows of a log at `rate_hz`: time_s, sticks, servo_i_us, depth_m, attitude, armed, mode, voltage_V, est_ poses.
 
     `depth_from` says which source the depth is of, None without any. What was not known at a time is null.
     """
@@ -59,12 +63,24 @@ def tabulate(log: VehicleLog, rate_hz: float = RATE_HZ) -> LogTable:
     for i, name in enumerate(("roll", "pitch", "heading")):
         angle = turned[:, i]
         columns[f"{name}_rad"] = np.mod(angle, 2.0 * np.pi) if name == "heading" else _wound(angle)
+    columns |= _pose(log, depth, turned, time_s)
     columns["armed"] = _held(log, "armed", time_s, 1)[:, 0]
     mode = _held(log, "mode", time_s, 1)[:, 0]
     columns["mode"] = [None if np.isnan(m) else MODES.get(int(m), f"mode {int(m)}") for m in mode]
     columns["voltage_V"] = _held(log, "voltage", time_s, 1)[:, 0]
     rows = pl.DataFrame(columns, schema_overrides={"mode": pl.String}).with_columns(pl.col(pl.Float64).fill_nan(None))
     return LogTable(rows=rows.with_columns(pl.col("armed") > 0.5), rate_hz=rate, depth_from=source)
+
+
+def _pose(log: VehicleLog, depth: Series | None, turned: Array, time_s: Array) -> dict[str, Array]:
+    """Where the vehicle believed to be, as a trial has it; a place that nobody knew is unknown but for its depth."""
+    place = _straight(log.series.get("position"), time_s, 3)
+    if np.isnan(place).all():
+        place[:, 2] = _straight(depth, time_s, 1)[:, 0]
+    attitude = np.full((len(time_s), 4), np.nan)
+    known = np.isfinite(turned).all(axis=1)
+    attitude[known] = quat_from_euler(*turned[known].T).T  # its formula holds for arrays, too
+    return {f"est_{name}": column for name, column in zip(_POSE, np.column_stack([place, attitude]).T, strict=True)}
 
 
 def _held(log: VehicleLog, channel: str, time_s: Array, width: int) -> Array:

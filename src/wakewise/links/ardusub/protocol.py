@@ -1,0 +1,119 @@
+"""What the companion and the script on the autopilot agree on: ids, names, times and bounds. No other file states them.
+
+The companion sends thrusts as SET_ACTUATOR_CONTROL_TARGET: `controls[i]` is motor i + 1, a value v in [-1, 1] that the
+script turns into a pulse of 1500 + 400 v us on the channel whose SERVOn_FUNCTION is that motor. An override of a
+channel goes past the mixer, so MOT_n_DIRECTION has no effect on it and the companion applies it (`output.py`).
+
+`script/wakewise.lua` states the same numbers; a test reads them out of it.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+SCRIPT_VERSION: Final = 1
+"""Of wire and script together: the script says it as `VERSION_NAME`, and the companion drives only its own."""
+
+# Who speaks.
+DEFAULT_SYSTEM: Final = 1
+"""System id of a vehicle (SYSID_THISMAV, from 4.7 MAV_SYSID), which its companion shares."""
+AUTOPILOT_COMPONENT: Final = 1
+COMPANION_COMPONENT: Final = 191
+"""MAV_COMP_ID_ONBOARD_COMPUTER. A companion is never a ground station: its heartbeats would hide the pilot's loss."""
+HEARTBEAT_PERIOD_S: Final = 1.0
+
+# Thrusts, companion to script.
+THRUST_MESSAGE: Final = 139
+"""SET_ACTUATOR_CONTROL_TARGET of MAVLink's common set."""
+THRUST_BYTES: Final = 43
+"""Its payload: uint64 time_usec, float controls[8], uint8 group_mlx, target_system, target_component."""
+THRUST_GROUP: Final = 0
+"""group_mlx of thrusts."""
+RELEASE_GROUP: Final = 1
+"""group_mlx of the message that lets go: the script ends its override at once, whatever the controls hold."""
+SLOTS: Final = 8
+"""Motors that one message holds; a slot without a motor holds NaN."""
+MIDDLE_US: Final = 1500
+FULL_US: Final = 400
+FIRST_FUNCTION: Final = 33
+"""SERVOn_FUNCTION of motor 1; motor i has 32 + i up to 8."""
+SEND_PERIOD_S: Final = 0.05
+"""Longest time between two messages while engaged: five may be lost before the override ends."""
+
+# Times.
+HOLD_MS: Final = 250
+"""How long one message acts; after that the outputs are the autopilot's, and so the pilot's."""
+LOOP_MS: Final = 20
+"""Period of the script."""
+NEUTRAL_WITHIN_S: Final = 0.3
+"""What must hold after any loss: `HOLD_MS` and two loops."""
+MOST_AHEAD_US: Final = 5_000_000
+"""A message further ahead of the last than this is of another sender: both are refused."""
+MOST_BEHIND_US: Final = 250_000
+"""A message behind the last by more than this, likewise; one that is less behind was overtaken and is left out."""
+SESSION_STEP_US: Final = 2**15
+"""A companion's times begin at this for each of its session's number, which is drawn below 2^31. Two on one clock are
+so further apart than `MOST_AHEAD_US`, but for one pair in seven million, and stay below the 2^48 that the script reads.
+"""
+RIVAL_MS: Final = 1000
+"""How long nobody acts after two senders were heard."""
+
+# What the script says.
+ENGAGED_NAME: Final = "WKW_ENG"
+"""NAMED_VALUE_FLOAT: 1 while thrusts act on the motors, else 0."""
+VERSION_NAME: Final = "WKW_VER"
+REASON_NAME: Final = "WKW_WHY"
+"""NAMED_VALUE_FLOAT: key of `REASONS`."""
+STATE_PERIOD_S: Final = 0.5
+STATE_FRESH_S: Final = 1.5
+"""A script not heard for this long is not there."""
+STATUS_PREFIX: Final = "Wakewise: "
+"""The script's STATUSTEXT begin so."""
+REASONS: Final[dict[int, str]] = {
+    0: "acting",
+    1: "not enabled",
+    2: "disarmed",
+    3: "mode not allowed",
+    4: "no thrusts arrive",
+    5: "thrusts refused: not a number or out of range",
+    6: "thrusts refused: their slots are not the motors",
+    7: "two senders",
+    8: "thrusts refused: not from the companion",
+}
+"""Why the script acts or does not, the first that holds: the words of its STATUSTEXT at a change."""
+
+# Parameters that the script adds.
+ENABLE_PARAMETER: Final = "WKW_ENABLE"
+"""1 lets the companion drive the motors. The script writes 0 when it starts, so a reboot switches it off."""
+MODES_PARAMETER: Final = "WKW_MODES"
+"""Sum of 2^mode over the modes in which thrusts act."""
+PARAMETER_TABLE: Final = 87
+"""Key of the script's parameter table on the autopilot (0 to 200), one script's own."""
+
+# Flight modes of ArduSub (ArduPilot, ArduSub/mode.h).
+STABILIZE: Final = 0
+ALT_HOLD: Final = 2
+POSHOLD: Final = 16
+MANUAL: Final = 19
+ALLOWED_MODES: Final = frozenset({STABILIZE, MANUAL})
+"""Those without an integrator of depth or place that goes on beneath the override and would jump when it ends."""
+DEFAULT_MODES: Final = sum(1 << mode for mode in sorted(ALLOWED_MODES))
+
+# The pilot.
+STICKS_MESSAGE: Final = 69
+"""MANUAL_CONTROL."""
+STICKS_FULL: Final = 1000
+STICKS_MIDDLE: Final = (0, 0, 500, 0)
+"""x, y, z, r of sticks let go: the throttle z goes from 0 (down) by 500 (none) to 1000 (up)."""
+
+# What the companion tells every ground station, as NAMED_VALUE_FLOAT.
+DISTURBANCE_NAME: Final = "WW_D"
+SAVED_NAME: Final = "WW_SAVED"
+COVERAGE_NAME: Final = "WW_COVER"
+FIGURES_PERIOD_S: Final = 0.5
+
+# What it runs on.
+LEAST_FIRMWARE: Final = (4, 5, 0)
+"""Oldest ArduSub whose Lua has every binding that the script calls."""
+TRIED_FIRMWARE: Final = (4, 6, 0)
+"""ArduSub that the way through message 139 was tried on: its development version of May 2024."""

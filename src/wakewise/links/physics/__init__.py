@@ -1,0 +1,25 @@
+"""ArduPilot's JSON physics link: a vehicle of Wakewise in its water behind the real firmware, or behind the stand-in.
+
+Start reading in `physics.py` (a frame of pulses is answered by motion). `datagrams.py` is what is on the wire,
+`frames.py` which frames are new, `pulses.py` what a pulse gives, `free_water.py` a body for quick tests, `udp.py` the
+socket. A tank is put behind it in `wakewise.operation.behind_firmware`.
+"""
+
+from wakewise.links.physics.datagrams import Motion, Request, read_reply, read_request, write_reply, write_request
+from wakewise.links.physics.free_water import FreeWater
+from wakewise.links.physics.physics import Body, Physics, PhysicsFigures
+from wakewise.links.physics.pulses import PulseTable
+
+__all__ = [
+    "Body",
+    "FreeWater",
+    "Motion",
+    "Physics",
+    "PhysicsFigures",
+    "PulseTable",
+    "Request",
+    "read_reply",
+    "read_request",
+    "write_reply",
+    "write_request",
+]

@@ -1,0 +1,76 @@
+"""The hazard table: every row names a test that exists; and the rows that have no other place."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from bottle import Bottle
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from wakewise.links.ardusub.drive import VehicleDrive
+from wakewise.links.ardusub.engagement import Limits
+from wakewise.links.ardusub.protocol import ALT_HOLD, MANUAL
+from wakewise.links.autopilot.aboard import FAULTS_ABOARD
+from wakewise.links.autopilot.own_parameters import own_parameters
+from wakewise.links.autopilot.rehearsal import Rehearsal
+from wakewise.vehicles import load_vehicle
+
+ROOT = Path(__file__).parents[3]
+ROW = re.compile(r"^\|.*\| `(test_\w+)(?:\[(.+)\])?` \|$", re.MULTILINE)
+
+
+def test_every_row_names_a_test_that_exists():
+    """Its function is in some test file, and what it is parametrized with stands in that file."""
+    text = (ROOT / "docs" / "hazards.md").read_text(encoding="utf-8")
+    rows = [line for line in text.splitlines() if line.startswith("| ")][1:]
+    found = ROW.findall(text)
+    assert len(found) == len(rows) >= 25
+    files = {path: path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py")}
+    for name, case in found:
+        homes = [body for body in files.values() if re.search(rf"^def {name}\(", body, re.MULTILINE)]
+        assert homes, name
+        assert not case or case in FAULTS_ABOARD or any(f'"{case}"' in body for body in homes), f"{name}[{case}]"
+
+
+def test_a_vehicle_of_another_number_of_motors_is_refused():
+    """A file of six thrusters on an autopilot that drives eight motors: said in one line, and it is never ready."""
+    six = load_vehicle("bluerov2")
+    words = VehicleDrive(six).amiss(own_parameters(8))
+    assert words.startswith("vehicle bluerov2: 6 thrusters, the autopilot drives motors 1, 2, 3, 4, 5, 6, 7, 8;")
+    assert "\n" not in words
+    bottle = Bottle()
+    bottle.parameter("MOT_1_DIRECTION", 0.0)
+    assert bottle.engage() == "not engaged: MOT_1_DIRECTION must be 1 or -1"
+
+
+def back_up_m(mode: int) -> float:
+    """How far the vehicle rises after thrusts have pushed it down for 15 s in a mode, and it was handed back."""
+    flight = Rehearsal(load_vehicle("bluerov2-heavy"), loop_hz=50.0)
+    flight.run(0.2)
+    flight.set("WKW_MODES", float((1 << ALT_HOLD) + (1 << MANUAL)))
+    flight.set_mode(mode)
+    flight.arm(True)
+    flight.run(3.0)
+    flight.set("WKW_ENABLE", 1.0)
+    flight.thrusts, flight.streams = (0.0,) * 4 + (0.08,) * 4, True
+    flight.run(15.0)
+    assert flight.moments[-1].overridden
+    flight.streams = False
+    flight.station.say(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    flight.run(0.3)
+    deepest = float(flight.stand_in.motion.p_WB_m[2])
+    least = deepest
+    for _ in range(100):
+        flight.run(0.1)
+        least = min(least, float(flight.stand_in.motion.p_WB_m[2]))
+    return deepest - least
+
+
+def test_hand_back_jumps_in_alt_hold_and_not_in_manual():
+    """ALT_HOLD goes back to the depth that it held beneath the override; so neither script nor warden drives in it."""
+    assert back_up_m(ALT_HOLD) > 0.5
+    assert back_up_m(MANUAL) < 0.05
+    assert ALT_HOLD not in Limits().modes
+    bottle = Bottle(mode=ALT_HOLD)
+    assert bottle.engage() == "not engaged: mode ALT_HOLD, allowed are MANUAL and STABILIZE"
