@@ -33,6 +33,7 @@ def study(tmp_path_factory):
     return folder, scenario, degrade(scenario, folder, {"silt": (0.0, 3000.0, 4000.0)})
 
 
+@pytest.mark.slow
 def test_clear_water_gives_a_model_and_mud_gives_none(study):
     """In clear water there are figures; in mud a reason instead of every one of them, and it ends there."""
     _, _, rows = study

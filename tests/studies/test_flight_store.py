@@ -1,22 +1,50 @@
 """Flights are kept by what was flown and by what flies them."""
 
-from wakewise.studies.flight_store import FlightStore, source_version, store_folder
+from pools import Here
+
+from wakewise.campaigns.store import open_store
+from wakewise.studies import flight_store, side_by_side
+from wakewise.studies.flight_store import FlightStore, store_folder
 from wakewise.studies.gentle.flight import Trial
+from wakewise.trials import BenchOptions
 
-ROW = {"target_speed_mean_m_s": 1.0}
+FLY = f"{__name__}:made_up"
+flown = []
 
 
-def test_flights_are_kept_by_what_was_flown(tmp_path):
-    """The same trial is found again, another is not, and `fresh` finds none; nonsense on disk counts as not flown."""
-    store, trial = FlightStore(tmp_path), Trial(scenario="orbit/paper", method="dp", seed=1)
-    assert store.load(trial) is None
-    store.save(trial, ROW)
-    assert store.load(trial) == ROW and len(source_version()) == 64
-    assert store.load(Trial(scenario="orbit/paper", method="dp", seed=2)) is None
-    assert store.load(Trial(scenario="orbit/paper", method="dp", seed=1, wrong_current=True)) is None
-    assert FlightStore(tmp_path, fresh=True).load(trial) is None
-    store.path(trial).write_text("[1, 2")
-    assert store.load(trial) is None
+def made_up(trial):
+    """Figures of a flight that nobody made."""
+    flown.append(trial)
+    return {"target_speed_mean_m_s": float(trial.seed)}
+
+
+def test_flights_are_kept_by_what_was_flown(tmp_path, monkeypatch):
+    """The same trial is found again as it was, another is not, and `fresh` finds none; nonsense counts as not flown."""
+    monkeypatch.setattr(side_by_side, "warm", lambda **_: None)
+    store = FlightStore(tmp_path / "c")
+    trial = Trial(scenario="orbit/paper", method="dp", seed=1, control=(("levers.drift", False), ("w", (1.0, 2.0))))
+    assert store.load(trial, FLY) is None
+    flown.clear()
+    rows, failures, known = side_by_side.fly_all({("a", "b", 1): trial}, FLY, store, BenchOptions(), lambda _: Here())
+    assert (rows, failures, known) == ({("a", "b", 1): {"target_speed_mean_m_s": 1.0}}, [], 0)
+    assert flown == [trial]
+    assert store.load(trial, FLY) == {"target_speed_mean_m_s": 1.0}
+    assert side_by_side.fly_all({("a", "b", 1): trial}, FLY, store, BenchOptions(), lambda _: Here())[2] == 1
+    assert store.load(Trial(scenario="orbit/paper", method="dp", seed=2), FLY) is None
+    assert store.load(trial, f"{__name__}:another") is None
+    fresh = FlightStore(store.folder, fresh=True)
+    assert fresh.load(trial, FLY) is None
+    assert side_by_side.fly_all({("a", "b", 1): trial}, FLY, fresh, BenchOptions(), lambda _: Here())[2] == 0
+    assert flown == [trial, trial]
+    (open_store(store.folder).place(store.task(trial, FLY).key) / "figures.json").write_text("[1, 2")
+    assert store.load(trial, FLY) is None
+
+
+def test_what_flies_is_part_of_a_flight():
+    """Flights and models name the parts of the package that can change them."""
+    assert set(flight_store.FLIES) < set(flight_store.PHOTOGRAPHS)
+    task = FlightStore(store_folder()).task(Trial(scenario="orbit/paper", method="dp", seed=1), FLY)
+    assert task.sources == flight_store.FLIES and len(task.key) == 32
 
 
 def test_the_cache_folder_follows_the_environment(monkeypatch, tmp_path):

@@ -8,8 +8,8 @@ import pytest
 
 from wakewise.errors import InputError, StageError
 from wakewise.operation import LiveFlight, load_scenario, read_scenario
-from wakewise.operation.assisted import assisted
-from wakewise.operation.desk import Desk
+from wakewise.operation.by_hand.assisted import assisted
+from wakewise.operation.by_hand.desk import Desk
 from wakewise.pilot.script import script_of
 from wakewise.trials import run_trial
 

@@ -50,6 +50,12 @@ def folder(tmp_path):
     return tmp_path
 
 
+def instead(begin):
+    """`subprocess.Popen` with `begin` in place of what starts the maker; COLMAP's own processes are begun as ever."""
+    popen = subprocess.Popen
+    return lambda words, **options: (begin if "wakewise.trials.surface" in words else popen)(words, **options)
+
+
 def made(folder, meanwhile=lambda _: None):
     watch = Stages()
     with SurfaceMaker(folder, COARSE, 1.0) as maker:
@@ -70,7 +76,8 @@ def test_the_other_process_makes_the_mesh_that_this_one_would(folder, monkeypatc
     assert dict(calls)["colours"] is True
     assert not list(folder.rglob(".*"))
     (folder / "mesh.ply").unlink()
-    monkeypatch.setattr(surface.subprocess, "Popen", lambda *_, **__: pytest.fail("a process was begun"))
+    refused = instead(lambda *_, **__: pytest.fail("a process was begun"))
+    monkeypatch.setattr(surface.subprocess, "Popen", refused)
     with SurfaceMaker(folder, COARSE, 1.0) as maker:
         maker.make(Stages())
     assert (folder / "mesh.ply").read_bytes() == beside
@@ -96,7 +103,9 @@ def test_a_process_that_fails_is_told_and_costs_no_mesh(folder, program, monkeyp
     if program is not None:
         python.write_text(program)
         python.chmod(0o755)
-    monkeypatch.setattr(sys, "executable", str(python))
+    popen = subprocess.Popen
+    begun = instead(lambda words, **options: popen([str(python), *words[1:]], **options))
+    monkeypatch.setattr(surface.subprocess, "Popen", begun)
     with pytest.warns(RuntimeWarning, match="status 3" if program else "python"):
         made(folder)
     assert (folder / "mesh.ply").stat().st_size > 0

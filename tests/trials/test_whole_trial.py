@@ -195,7 +195,8 @@ class Likeness:
 def likeness(parts: Parts, water: Any, speeds_m_s: Callable[[Any], Any]) -> Likeness:
     """Blow thrusts of no wrench for 4 s, look round each jet to half a metre and 15 cm aside, stop, look again."""
     vehicle = parts.vehicle
-    null = vehicle_layout(vehicle).null[:, 0]
+    basis = vehicle_layout(vehicle).null
+    null = basis @ basis[0]  # the first thruster's share of what makes no wrench, whatever the basis
     thrusts = 0.6 * null / np.abs(null).max()
     for _ in range(200):
         water.step(thrusts, 0.02)

@@ -106,6 +106,29 @@ def problem_at(
     )
 
 
+class DraggedPlant:
+    """Carries problems on by what was planned: its drag is 15 % and its current 10 % above what planners believe."""
+
+    def __init__(self, weight_N: float) -> None:
+        self._weight_N, self._steps = weight_N, 0
+        self._body = np.array(compile_body(VEHICLE).packed)
+        self._body[12:19] *= 1.15
+        self.problem = problem_at(0.0, weight_N)
+        self._state, self._thrusts_N = np.array(self.problem.state), np.zeros(len(VEHICLE.thrusters))
+
+    def flown(self, command_N: Array) -> PlanProblem:
+        """The problem after a control step of .1 s with this command, shape (n,)."""
+        state = self._state
+        for _ in range(5):
+            self._thrusts_N = thruster_lag(self._thrusts_N, command_N, VEHICLE.time_constants_s, 0.02)
+            wrench = VEHICLE.allocation_matrix @ self._thrusts_N
+            wrench[:3] += Pose(state[:3], state[3:7]).R.T @ self.problem.force_W_N
+            rk4_kernel(self._body, state, np.concatenate([wrench, 1.1 * CURRENT_M_S]), 0.02)
+        self._steps += 1
+        self.problem = problem_at(0.1 * self._steps, self._weight_N, state, self._thrusts_N, command_N)
+        return self.problem
+
+
 def _scenario(weight_N: float, why: dict[str, str]) -> dict[str, Any]:
     planners: dict[str, Planner] = {
         "paper": PaperPlanner(plan_model(5)),
@@ -119,10 +142,8 @@ def _scenario(weight_N: float, why: dict[str, str]) -> dict[str, Any]:
     converged: dict[str, list[bool]] = {name: [] for name in planners}
     gaps: dict[str, list[float]] = {name: [] for name in planners}
     reference = _reference(why)
-    plant = np.array(compile_body(VEHICLE).packed)
-    plant[12:19] *= 1.15
-    problem = problem_at(0.0, weight_N)
-    state, thrusts = np.array(problem.state), np.zeros(shape[1])
+    plant = DraggedPlant(weight_N)
+    problem = plant.problem
     best, spreads = None, []
     for instant in range(INSTANTS):
         for name, planner in planners.items():
@@ -141,14 +162,8 @@ def _scenario(weight_N: float, why: dict[str, str]) -> dict[str, Any]:
         elif best is not None:
             best = np.vstack([best[1:], best[-1:]])
         if instant in (20, 60):
-            spreads.append(_restart_spread(problem))
-        command = plans["mm_quality"].commands_N[0]
-        for _ in range(5):
-            thrusts = thruster_lag(thrusts, command, VEHICLE.time_constants_s, 0.02)
-            wrench = VEHICLE.allocation_matrix @ thrusts
-            wrench[:3] += Pose(state[:3], state[3:7]).R.T @ problem.force_W_N
-            rk4_kernel(plant, state, np.concatenate([wrench, 1.1 * CURRENT_M_S]), 0.02)
-        problem = problem_at(0.1 * (instant + 1), weight_N, state, thrusts, command)
+            spreads.append(restart_spread(problem))
+        problem = plant.flown(plans["mm_quality"].commands_N[0])
     rows: dict[str, Any] = {}
     for name in planners:
         late = np.array(spans[name][WARM_UP:])
@@ -161,7 +176,7 @@ def _scenario(weight_N: float, why: dict[str, str]) -> dict[str, Any]:
         }
     rows["restart_spread_pct"] = max(spread[0] for spread in spreads)
     rows["restart_cost_spread_pct"] = max(spread[1] for spread in spreads)
-    rows["path_error_mm"] = float(1e3 * np.linalg.norm(state[:3] - problem.reference[0, :3]))
+    rows["path_error_mm"] = float(1e3 * np.linalg.norm(problem.state[:3] - problem.reference[0, :3]))
     return rows
 
 
@@ -174,7 +189,7 @@ def _reference(why: dict[str, str]) -> tuple[Planner, IpoptReference] | None:
         return None
 
 
-def _restart_spread(problem: PlanProblem) -> tuple[float, float]:
+def restart_spread(problem: PlanProblem) -> tuple[float, float]:
     """Spread over plans from random starts, (q95 - q5) / (2 median), in percent: of D, and of the cost.
 
     A start is 1 N of noise on every command of every stage; plans that did not converge are left out.

@@ -10,6 +10,7 @@ from wakewise.trials.timing import BenchOptions
 
 BENCHES = {
     "allocator": "exact allocation against SciPy's SLSQP and the pseudo-inverse",
+    "campaign": "what a campaign costs: a trial, two workers beside one, what lies between trials, a list of many",
     "cold": "what a user waits for at first: import, --help, compiling, first flight, second flight",
     "disturbance": "the Gram matrix of D against the sum over points",
     "estimator": "the filter in the default tank: error, consistency, ten seconds without a camera",
@@ -20,7 +21,9 @@ BENCHES = {
     "operator": "an operator's velocity obeyed and the target's water spared, by w_track, where users have the trouble",
     "imaging": "one photograph: speed by part, memory, geometry, flat port, features",
     "lattice": "the lattice-Boltzmann solver: cell updates per core beside a plain loop, distance from the twin",
+    "link": "physics behind a firmware, the relay, the loop at sea, noise, and what every loss leads to",
     "tank": "the world of a trial against the clock",
+    "traps": "photographs that deceive: of each the model is right, or says that it is not",
     "worlds": "what each method leaves of each world in which users have the trouble, models included",
 }
 """Name of each bench and what it measures; the module of that name in this folder holds it, or one of `_STUDIES`."""

@@ -1,67 +1,32 @@
-"""Keeps what flights gave, so that a bench that was stopped goes on where it was.
+"""Flights of the benches as trials of a campaign: known by what was flown and by the source of all that flies it.
 
-A flight is known by a hash of everything that its trial says and of the source of all that flies it: change either and
-it is flown anew. One small JSON file each, written whole.
+One store for all (`wakewise.campaigns.store`): a bench that was stopped goes on where it was, a flight that is known is
+not flown again, and two benches may run side by side.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from wakewise.files import write_json
+from wakewise.campaigns import versions
+from wakewise.campaigns.store import open_store
+from wakewise.campaigns.task import Figures, Task, WorkProgress, function_named
 
-FLIES = (
-    "allocation",
-    "control",
-    "estimation",
-    "evaluation",
-    "geometry",
-    "interfaces.py",
-    "lattice",
-    "missions",
-    "operation",
-    "planning",
-    "studies/gentle",
-    "studies/worlds",
-    "tank",
-    "targets",
-    "thrusters",
-    "vehicles",
-    "wake",
-    "water",
-)
-"""Parts of the package that can change a flight."""
-_SOURCES = {".py", ".yaml", ".csv", ".json"}
+_BENCHES = ("studies/gentle", "studies/worlds")
+FLIES = (*versions.FLIES, *_BENCHES)
+"""Parts of the package that can change a flight of a bench."""
+PHOTOGRAPHS = (*versions.PHOTOGRAPHS, *_BENCHES)
+"""Parts of the package that can change a model made from a flight's photographs."""
 
 
 def store_folder(bench: str = "gentle") -> Path:
     """Where a bench's flights are kept unless told otherwise: the user's cache folder (XDG base directories)."""
     base = os.environ.get("XDG_CACHE_HOME", "")
-    return (Path(base) if base else Path.home() / ".cache") / "wakewise" / bench
-
-
-PHOTOGRAPHS = (*FLIES, "imaging", "reconstruction", "trials")
-"""Parts of the package that can change a model made from a flight's photographs."""
-
-
-@lru_cache(maxsize=4)
-def source_version(parts: tuple[str, ...] = FLIES) -> str:
-    """Hash of the source that flies, or of these parts of the package."""
-    root = Path(__file__).parents[1]
-    digest = hashlib.sha256()
-    for part in parts:
-        place = root / part
-        files = [place] if place.is_file() else sorted(place.rglob("*"))
-        for file in (f for f in files if f.suffix in _SOURCES):
-            digest.update(file.relative_to(root).as_posix().encode())
-            digest.update(file.read_bytes())
-    return digest.hexdigest()
+    return (Path(base) if base else Path.home() / ".cache") / "wakewise" / "campaigns" / bench
 
 
 @dataclass(frozen=True)
@@ -72,22 +37,41 @@ class FlightStore:
     fresh: bool = False
     parts: tuple[str, ...] = FLIES
 
-    def path(self, trial: Any) -> Path:
-        """File of a trial (a dataclass of plain values)."""
-        told = json.dumps({"trial": asdict(trial), "source": source_version(self.parts)}, sort_keys=True, default=str)
-        return self.folder / f"{hashlib.sha256(told.encode()).hexdigest()[:32]}.json"
+    def task(self, trial: Any, fly: str, name: str = "") -> Task:
+        """A flight as a trial of a campaign.
 
-    def load(self, trial: Any) -> dict[str, float | None] | None:
+        Parameters
+        ----------
+        trial : dataclass of plain values
+        fly : str
+            ``package.module:function`` that gives its figures.
+        name : str
+            For people.
+        """
+        kind = type(trial)
+        settings = {"fly": fly, "kind": f"{kind.__module__}:{kind.__qualname__}", "trial": asdict(trial)}
+        return Task(name=name, work=f"{__name__}:fly_kept", settings=settings, sources=self.parts)
+
+    def load(self, trial: Any, fly: str) -> dict[str, float | None] | None:
         """Figures of a trial that was flown before, or None."""
-        if self.fresh:
+        if self.fresh or not self.folder.exists():
             return None
-        try:
-            kept = json.loads(self.path(trial).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            return None
-        figures = kept.get("figures") if isinstance(kept, dict) else None
-        return figures if isinstance(figures, dict) else None
+        figures = open_store(self.folder).figures(self.task(trial, fly).key)
+        return None if figures is None else numbers(figures)
 
-    def save(self, trial: Any, figures: dict[str, float | None]) -> None:
-        """Keep the figures of a trial, with what was flown beside them for people to read."""
-        write_json(self.path(trial), {"trial": asdict(trial), "figures": figures})
+
+def fly_kept(settings: Mapping[str, Any], folder: Path, progress: WorkProgress) -> Figures:  # noqa: ARG001
+    """Work of such a trial: build it from its plain values and fly it."""
+    kind, fly = function_named(settings["kind"]), function_named(settings["fly"])
+    figures: Figures = fly(kind(**{name: _hashable(value) for name, value in settings["trial"].items()}))
+    return figures
+
+
+def numbers(figures: Figures) -> dict[str, float | None]:
+    """Figures of a flight that are numbers, as all of the benches' are."""
+    return {name: value for name, value in figures.items() if not isinstance(value, str)}
+
+
+def _hashable(value: Any) -> Any:
+    """Tuples, as trials have them, for the lists that JSON makes of them."""
+    return tuple(map(_hashable, value)) if isinstance(value, list) else value

@@ -6,7 +6,7 @@ Start reading in `trial.py` (a trial is a page). `stages.py` is who watches and 
 and colours beside the report, `size.py` how large the model came out, `metrics.py` every figure with its unit,
 definition and better side, `coverage.py` holds the guide of photographs against the model, `yardstick.py` what a flight
 is held against, `timing.py` how benches and studies measure and what they are asked,
-`export.py` hands a trial on to other tools.
+`export.py` hands a trial on to other tools, `dataset/` makes a data set of many.
 """
 
 from typing import TYPE_CHECKING

@@ -75,7 +75,7 @@ def export_trial(
         If rosbag2 is asked for and rosbags is not installed.
     """
     if to not in EXPORTS:
-        raise InputError(f"--to: '{to}', allowed are {', '.join(EXPORTS)} and, for a vehicle, auv_controllers")
+        raise InputError(f"--to: '{to}', allowed are {', '.join(EXPORTS)}, dataset and, for a vehicle, auv_controllers")
     if poses not in POSES:
         raise InputError(f"--poses: '{poses}', allowed are {', '.join(POSES)}")
     if to == "rosbag2":
@@ -110,13 +110,16 @@ def _bag(folder: Path, path: Path) -> dict[str, int]:
     from wakewise.links.exports import write_bag
 
     steps = _steps(folder)
+    bodies, telemetry = _found(steps), _telemetry(steps)
+    if telemetry is None:
+        bodies = _bodies(steps)
     cameras = _cameras(folder)
     who = next((name for name in ("estimated", "true") if name in cameras), None)
     photographs = None if who is None else _photographs_of(folder, who)
     with whole_folder(path) as temporary:
         # A bag makes its own folder, whose name its file bears.
         inner = temporary / path.name
-        messages = write_bag(inner, _bodies(steps), _telemetry(steps), cameras, photographs)
+        messages = write_bag(inner, bodies, telemetry, cameras, photographs)
         for file in sorted(inner.iterdir()):
             file.rename(temporary / file.name)
         inner.rmdir()

@@ -26,14 +26,14 @@ from wakewise.operation import (
     photograph_flight,
     read_exposures,
 )
+from wakewise.operation.by_hand.live_folder import gather
+from wakewise.operation.by_hand.replay import fly_hands
 from wakewise.operation.flight_log import has_parts
 from wakewise.operation.flying import FLIGHT_JOBS
-from wakewise.operation.live_folder import gather
-from wakewise.operation.replay import fly_hands
 from wakewise.operation.trial_folder import BY_HAND, as_flown, check_place, claim, write_plan
 from wakewise.processes import alone
 from wakewise.reconstruction import read_cloud, read_lens, reconstruct
-from wakewise.targets import Mesh
+from wakewise.targets import Mesh, coral_kinds
 from wakewise.trials.coverage import FROM_MODEL, coverage_figures
 from wakewise.trials.metrics import Figures, Gathering, comparison
 from wakewise.trials.size import SIZE_FIGURES, size_figures
@@ -107,6 +107,8 @@ def run_trial(
     scenario = as_flown(parts)
     check_place(folder, scenario)
     if not is_warm(JOBS):
+        if scenario.target.kind not in coral_kinds():
+            _ = parts.target  # a file that cannot be read is refused before minutes of compiling
         with watch.stage("compile") as progress:
             warm(JOBS, progress)
     if not _is_flown(folder):

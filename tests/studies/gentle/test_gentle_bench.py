@@ -38,10 +38,12 @@ def here(monkeypatch):
         flown.append(trial)
         return made_up(trial)
 
-    monkeypatch.setattr(gentle, "_pool", lambda _: Here())
+    monkeypatch.setattr(gentle, "_engine", lambda _: Here())
     monkeypatch.setattr("wakewise.studies.side_by_side.warm", lambda **_: None)
-    monkeypatch.setattr(gentle, "fly_trial", flight)
-    monkeypatch.setattr(gentle, "fly_paper", lambda trial: dict.fromkeys(PAPER_FIGURES, float(trial.seed)))
+    monkeypatch.setattr("wakewise.studies.gentle.flight.fly_trial", flight)
+    monkeypatch.setattr(
+        "wakewise.studies.gentle.paper.fly_paper", lambda trial: dict.fromkeys(PAPER_FIGURES, float(trial.seed))
+    )
     return flown
 
 
@@ -86,7 +88,7 @@ def test_a_bench_that_was_stopped_goes_on_and_failures_count(here, monkeypatch, 
             raise StageError("the vehicle was lost")
         return made_up(trial)
 
-    monkeypatch.setattr(gentle, "fly_trial", flight)
+    monkeypatch.setattr("wakewise.studies.gentle.flight.fly_trial", flight)
     said = []
     options = BenchOptions(
         seeds=2,
@@ -103,7 +105,7 @@ def test_a_bench_that_was_stopped_goes_on_and_failures_count(here, monkeypatch, 
     assert first["headline"]["trouble"]["position_ok"] is False
     assert first["headline"]["trouble"]["reduction_vs_dp_pct"] < 70.0
     assert first["scenarios"]["orbit/paper"]["methods"]["wake-aware"]["failed"] == 1
-    assert "min left" in said[-1][2]
+    assert "s left" in said[-1][2]
     lost = False
     again = gentle.run(options)
     assert again["flown"] == 1 and again["failed"] == 0 and len(here) == 7

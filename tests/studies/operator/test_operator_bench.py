@@ -34,8 +34,8 @@ def paper_flight(trial):
 
 @pytest.fixture
 def made_up(monkeypatch, tmp_path):
-    monkeypatch.setattr(bench, "_pool", lambda _: Here())
-    monkeypatch.setattr(bench, "fly_trial", flight)
+    monkeypatch.setattr(bench, "_engine", lambda _: Here())
+    monkeypatch.setattr("wakewise.studies.operator.flight.fly_trial", flight)
     monkeypatch.setattr(paper, "fly_trial", paper_flight)
     monkeypatch.setattr("wakewise.studies.side_by_side.warm", lambda **_: None)
     return tmp_path
@@ -91,7 +91,9 @@ def test_a_run_that_was_stopped_goes_on(made_up, monkeypatch):
     options = BenchOptions(seeds=1, worlds=("mud",), w_tracks=(5.0,), store=made_up)
     bench.run(options)
     again = []
-    monkeypatch.setattr(bench, "fly_trial", lambda trial: (again.append(trial), flight(trial))[1])
+    monkeypatch.setattr(
+        "wakewise.studies.operator.flight.fly_trial", lambda trial: (again.append(trial), flight(trial))[1]
+    )
     assert bench.run(options)["flown"] == 0 and not again
     bench.run(BenchOptions(seeds=1, worlds=("mud",), w_tracks=(5.0, 20.0), store=made_up))
     assert {(t.method, t.w_track) for t in again} == {("wake-aware", 20.0), ("unaware", 20.0)}

@@ -33,9 +33,9 @@ def scan(trial):
 
 @pytest.fixture
 def made_up(monkeypatch, tmp_path):
-    monkeypatch.setattr(bench, "_pool", lambda _: Here())
-    monkeypatch.setattr(bench, "fly_trial", flight)
-    monkeypatch.setattr(bench, "scan_trial", scan)
+    monkeypatch.setattr(bench, "_engine", lambda _: Here())
+    monkeypatch.setattr("wakewise.studies.worlds.flight.fly_trial", flight)
+    monkeypatch.setattr("wakewise.studies.worlds.flight.scan_trial", scan)
     monkeypatch.setattr("wakewise.studies.side_by_side.warm", lambda **_: None)
     return tmp_path
 
@@ -80,7 +80,9 @@ def test_a_run_that_was_stopped_goes_on(made_up, monkeypatch):
     options = BenchOptions(seeds=2, models=0, worlds=("payload",), methods=("dp", "wake-aware"), store=made_up)
     bench.run(options)
     again = []
-    monkeypatch.setattr(bench, "fly_trial", lambda trial: (again.append(trial), flight(trial))[1])
+    monkeypatch.setattr(
+        "wakewise.studies.worlds.flight.fly_trial", lambda trial: (again.append(trial), flight(trial))[1]
+    )
     bench.run(options)
     assert [(t.method, t.seed) for t in again] == [("dp", 2)]
 

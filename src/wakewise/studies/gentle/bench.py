@@ -16,17 +16,18 @@ from typing import Any
 
 import numpy as np
 
+from wakewise.campaigns import Processes
 from wakewise.studies import side_by_side
 from wakewise.studies.flight_store import FlightStore, store_folder
 from wakewise.studies.gentle.figures import SPEED, Row, log_reduction_pct, means, pairs_of, reduction_pct
-from wakewise.studies.gentle.flight import FIGURES, fly_trial
+from wakewise.studies.gentle.flight import FIGURES
 from wakewise.studies.gentle.headline import PLACE, RIVALS, WRONG, headline
 from wakewise.studies.gentle.levers import LEVERS, NONE, alone, left_out, wished_levers
 from wakewise.studies.gentle.library import names_of, title_of, trim_of
 from wakewise.studies.gentle.paper import FIGURES as PAPER_FIGURES
 from wakewise.studies.gentle.paper import METHODS as PAPER_METHODS
 from wakewise.studies.gentle.paper import SEEDS as PAPER_SEEDS
-from wakewise.studies.gentle.paper import PaperTrial, fly_paper
+from wakewise.studies.gentle.paper import PaperTrial
 from wakewise.studies.gentle.plan import METHODS, flight_s, flown_methods, planned_trials
 from wakewise.studies.side_by_side import Failure, Key
 from wakewise.trials.timing import BenchOptions
@@ -34,7 +35,8 @@ from wakewise.trials.timing import BenchOptions
 MODEL_FIGURES = ("rmse_mm", "completeness_pct", "success_pct")
 PAPER = "paper"
 
-_pool = side_by_side.processes
+_engine = Processes
+_FLY, _FLY_PAPER = "wakewise.studies.gentle.flight:fly_trial", "wakewise.studies.gentle.paper:fly_paper"
 
 
 def run(options: BenchOptions) -> dict[str, Any]:
@@ -54,16 +56,16 @@ def run(options: BenchOptions) -> dict[str, Any]:
     trials = planned_trials(scenarios, methods, levers, options.seeds)
     folder = options.store or store_folder()
     store = FlightStore(folder, options.fresh)
-    expected = sum(flight_s(trial) for trial in trials.values() if store.load(trial) is None)
+    expected = sum(flight_s(trial) for trial in trials.values() if store.load(trial, _FLY) is None)
     words = f"{len(trials)} flights, some {expected / 60.0 / options.workers:.0f} min of {options.workers} free cores"
     options.progress(0, max(len(trials), 1), words)
-    rows, failures, kept = side_by_side.fly_all(trials, fly_trial, store, options, _pool)
+    rows, failures, kept = side_by_side.fly_all(trials, _FLY, store, options, _engine)
     papers: dict[Key, Row] = {}
     lost: list[Failure] = []
     known = 0
     if with_paper:
         papers, lost, known = side_by_side.fly_all(
-            paper_trials(methods, options.seeds), fly_paper, store, options, _pool
+            paper_trials(methods, options.seeds), _FLY_PAPER, store, options, _engine
         )
     failed = {(failure.name, (failure.flow, failure.seed)) for failure in failures}
     trims = {(scenario, seed): trim_of(scenario, seed) for scenario, _, seed in trials}

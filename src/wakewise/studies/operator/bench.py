@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from wakewise.campaigns import Processes
 from wakewise.control.intent import PAPER_W_TRACK
 from wakewise.operation import load_scenario
 from wakewise.operation.worlds.library import load_world
@@ -21,7 +22,7 @@ from wakewise.studies.flight_store import FLIES, FlightStore, store_folder
 from wakewise.studies.gentle.figures import Row
 from wakewise.studies.operator import paper
 from wakewise.studies.operator.figures import Flights, Known, sliced, table
-from wakewise.studies.operator.flight import PILOTS, OperatorTrial, course_of, fly_trial
+from wakewise.studies.operator.flight import PILOTS, OperatorTrial, course_of
 from wakewise.studies.operator.plan import (
     DIRECT,
     GRID_SEEDS,
@@ -50,7 +51,8 @@ ELSEWHERE = {
     "coverage_ms_per_photo": "the coverage guide is not timed by this bench",
 }
 
-_pool = side_by_side.processes
+_engine = Processes
+_FLY, _FLY_PAPER = "wakewise.studies.operator.flight:fly_trial", "wakewise.studies.operator.paper:fly_trial"
 
 
 def run(options: BenchOptions) -> dict[str, Any]:
@@ -65,12 +67,12 @@ def run(options: BenchOptions) -> dict[str, Any]:
     worlds, w_tracks = wished_worlds(options.worlds), wished_w_tracks(options.w_tracks)
     trials = planned_trials(worlds, w_tracks, options.seeds, min(options.seeds, GRID_SEEDS))
     store = FlightStore(options.store or store_folder("operator"), options.fresh, SOURCES)
-    left_s = sum(flight_s(trial) for trial in trials.values() if store.load(trial) is None)
+    left_s = sum(flight_s(trial) for trial in trials.values() if store.load(trial, _FLY) is None)
     words = f"{len(trials)} flights, some {left_s / 60.0 / options.workers:.0f} min of {options.workers} free cores"
     options.progress(0, max(len(trials), 1), words)
-    rows, failures, kept = side_by_side.fly_all(trials, fly_trial, store, options, _pool)
+    rows, failures, kept = side_by_side.fly_all(trials, _FLY, store, options, _engine)
     own = paper.paper_trials(w_tracks, min(options.seeds, paper.SEEDS))
-    papers, lost, known = side_by_side.fly_all(own, paper.fly_trial, store, options, _pool)
+    papers, lost, known = side_by_side.fly_all(own, _FLY_PAPER, store, options, _engine)
     told = Told(trials, rows, failures)
     default = load_scenario("quick", None, {}).world
     tables = {name: world_figures(name, w_tracks, told) for name in worlds}

@@ -16,10 +16,10 @@ from wakewise.evaluation import flight_figures
 from wakewise.interfaces import BodyState, Witness
 from wakewise.missions import SETTLING, RoutePilot
 from wakewise.operation import Parts, Scenario, fly
-from wakewise.operation.assisted import AssistedPilot, assisted_pilot
-from wakewise.operation.assists import level_frame
-from wakewise.operation.desk import Desk, DeskState
-from wakewise.operation.hands import PersonsHands
+from wakewise.operation.by_hand.assisted import AssistedPilot, assisted_pilot
+from wakewise.operation.by_hand.assists import level_frame
+from wakewise.operation.by_hand.desk import Desk, DeskState
+from wakewise.operation.by_hand.hands import PersonsHands
 from wakewise.operation.loop import Step
 from wakewise.pilot import ControlSource
 from wakewise.studies.gentle.courses import SETTLE_S

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from wakewise.control.intent import PAPER_W_TRACK
 from wakewise.errors import InputError
-from wakewise.operation.desk import RANGES
+from wakewise.operation.by_hand.desk import RANGES
 from wakewise.operation.worlds.library import world_names
 from wakewise.studies.operator.flight import PILOTS, OperatorTrial
 from wakewise.studies.operator.waters import CONTROL, TROUBLE

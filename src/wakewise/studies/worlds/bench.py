@@ -15,6 +15,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
+from wakewise.campaigns import Processes
 from wakewise.errors import InputError
 from wakewise.operation import load_scenario
 from wakewise.operation.worlds.library import load_world, world_names
@@ -22,7 +23,7 @@ from wakewise.studies import side_by_side
 from wakewise.studies.flight_store import PHOTOGRAPHS, FlightStore, store_folder
 from wakewise.studies.side_by_side import Failure, Key, Row
 from wakewise.studies.worlds.figures import method_figures, ratios
-from wakewise.studies.worlds.flight import FLIGHT_FIGURES, MODEL_FIGURES, WorldTrial, fly_trial, scan_trial
+from wakewise.studies.worlds.flight import FLIGHT_FIGURES, MODEL_FIGURES, WorldTrial
 from wakewise.studies.worlds.judge import JUDGED, judge_table, judge_trials
 from wakewise.trials.timing import BenchOptions
 
@@ -35,7 +36,8 @@ EMERGENT = (
 )
 TYPED_IN = "constants of the laws and numbers of the worlds, each with its source (wakewise world show NAME)"
 
-_pool = side_by_side.processes
+_engine = Processes
+_FLY, _SCAN = (f"wakewise.studies.worlds.flight:{name}_trial" for name in ("fly", "scan"))
 
 
 def run(options: BenchOptions) -> dict[str, Any]:
@@ -52,24 +54,22 @@ def run(options: BenchOptions) -> dict[str, Any]:
     flights = planned(worlds, methods, options.seeds)
     scans = planned(worlds, methods, options.models)
     folder = options.store or store_folder("worlds")
-    flown, lost, kept = side_by_side.fly_all(
-        flights, fly_trial, FlightStore(folder / "flights", options.fresh), options, _pool
-    )
+    flown, lost, kept = side_by_side.fly_all(flights, _FLY, FlightStore(folder, options.fresh), options, _engine)
     models, failed, had = side_by_side.fly_all(
-        scans, scan_trial, FlightStore(folder / "models", options.fresh, PHOTOGRAPHS), options, _pool
+        scans, _SCAN, FlightStore(folder, options.fresh, PHOTOGRAPHS), options, _engine
     )
     judged, unjudged, seen = side_by_side.fly_all(
         judge_trials(options.judge, tuple(name for name in JUDGED if name in worlds)),
-        fly_trial,
-        FlightStore(folder / "judge", options.fresh),
+        _FLY,
+        FlightStore(folder, options.fresh),
         options,
-        _pool,
+        _engine,
     )
-    known = FlightStore(folder / "models", False, PHOTOGRAPHS)
+    known = FlightStore(folder, False, PHOTOGRAPHS)
     for name in worlds:  # models of an earlier run count, too
         for method in methods:
             for seed in range(options.models + 1, options.seeds + 1):
-                row = known.load(WorldTrial(world=name, method=method, seed=seed))
+                row = known.load(WorldTrial(world=name, method=method, seed=seed), _SCAN)
                 if row is not None:
                     models[name, method, seed] = row
     return {

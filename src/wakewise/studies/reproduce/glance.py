@@ -1,0 +1,166 @@
+"""A table at a glance: who won, by how much, how sure, at what price, where it failed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wakewise.campaigns.statistics import WORST, paired_test, probability_of_improvement, stratified_bootstrap
+from wakewise.campaigns.statistics.intervals import ratio_of_sums
+from wakewise.studies.reproduce.rows import by_target
+
+Place = Mapping[str, Any]
+"""A trial as `run.place_of` tells of it."""
+JUDGED: dict[str, tuple[str, str, float, bool]] = {
+    "dynamic": ("rmse_mm", "mm RMSE", 1.0, True),
+    "success": ("success", "% of models", 100.0, False),
+    "station": ("target_speed_mean_m_s", "mm/s at the target", 1e3, True),
+    "ablation": ("target_speed_mean_m_s", "mm/s at the target", 1e3, True),
+    "sediment": ("rmse_mm", "mm RMSE", 1.0, True),
+    "flow": ("piv_speed_m_s", "mm/s by PIV", 1e3, True),
+    "field": ("rmse_mm", "mm RMSE", 1.0, True),
+    "operator": ("target_speed_mean_m_s", "mm/s at the target", 1e3, True),
+    "comparison": ("target_speed_mean_m_s", "mm/s at the target", 1e3, True),
+}
+"""By table the figure that it is judged by, its unit in words, the factor to that, and whether less is better."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Glance:
+    """One world of a table in a few words.
+
+    `means` are in the unit of `words`, worst last; `less_pct` is how much better the winner is than `rival`, the best
+    of the others, with its interval; `energy_ratio` what it costs over the rival; `failed` counts trials by method.
+    """
+
+    world: str
+    figure: str
+    words: str
+    means: dict[str, float]
+    winner: str
+    rival: str | None
+    less_pct: float | None
+    interval_pct: tuple[float, float] | None
+    p_t: float | None
+    improvement: float | None
+    energy_ratio: float | None
+    failed: dict[str, int]
+    trials: int
+
+    @property
+    def sure(self) -> str:
+        """How sure the winner is, in words."""
+        if self.rival is None:
+            return "there was no other method"
+        if self.trials < 2:
+            return "one trial each: nobody knows"
+        if self.interval_pct is None or self.interval_pct[0] <= 0.0:
+            return "undecided, the interval holds zero"
+        return "sure, the interval does not hold zero"
+
+
+def glances(table: str, places: Sequence[Place]) -> list[Glance]:
+    """One for each world of a table, over the trials that all of its methods have; none of tables without methods."""
+    if table not in JUDGED:
+        return []
+    found = (glance(table, world, places) for world in dict.fromkeys(place["world"] for place in places))
+    return [one for one in found if one is not None]
+
+
+def glance(table: str, world: str, places: Sequence[Place]) -> Glance | None:
+    """A table in one world; None where no seed was flown by all."""
+    figure, words, scale, less = JUDGED[table]
+    here = [place for place in places if place["world"] == world]
+    values: dict[str, dict[tuple[str, int], float]] = {}
+    energy: dict[str, dict[tuple[str, int], float]] = {}
+    failed: dict[str, int] = {}
+    for place in here:
+        method, known = place["method"], (place["target"], place["seed"])
+        value = place["figures"].get(figure)
+        failed.setdefault(method, 0)
+        if value is None:
+            failed[method] += 1
+            value = WORST.get(figure)
+        if value is not None:
+            values.setdefault(method, {})[known] = scale * float(value)
+        spent = place["figures"].get("energy_kJ")
+        if spent is not None:
+            energy.setdefault(method, {})[known] = float(spent)
+    both = [known for known in next(iter(values.values()), {}) if all(known in own for own in values.values())]
+    if not both:
+        return None
+    means = {method: float(np.mean([own[known] for known in both])) for method, own in values.items()}
+    ranked = sorted(means, key=lambda method: means[method] if less else -means[method])
+    winner, rival = ranked[0], ranked[1] if len(ranked) > 1 else None
+    told: dict[str, Any] = dict.fromkeys(("less_pct", "interval_pct", "p_t", "improvement", "energy_ratio"))
+    if rival is not None:
+        ours, theirs = (np.array([values[who][known] for known in both]) for who in (winner, rival))
+        if theirs.sum() > 0.0:
+            ratio, ends = stratified_bootstrap(np.column_stack([ours, theirs]), [k[0] for k in both], ratio_of_sums)
+            sign = 1.0 if less else -1.0
+            told["less_pct"] = sign * 100.0 * (1.0 - ratio)
+            if ends is not None:
+                low, high = sorted(sign * 100.0 * (1.0 - end) for end in ends)
+                told["interval_pct"] = (low, high)
+        told["p_t"] = paired_test(ours, theirs).p_t
+        groups = [by_target(values[who], both) for who in (winner, rival)]
+        told["improvement"] = probability_of_improvement(*groups, less_is_better=less)[0]
+        spent = [[energy.get(who, {}).get(known) for known in both] for who in (winner, rival)]
+        if all(value is not None for side in spent for value in side) and sum(v or 0.0 for v in spent[1]) > 0.0:
+            told["energy_ratio"] = sum(v or 0.0 for v in spent[0]) / sum(v or 0.0 for v in spent[1])
+    return Glance(
+        world=world,
+        figure=figure,
+        words=words,
+        means={method: means[method] for method in ranked},
+        winner=winner,
+        rival=rival,
+        failed=failed,
+        trials=len(both),
+        **told,
+    )
+
+
+def worst_trials(table: str, world: str, places: Sequence[Place]) -> dict[str, Place]:
+    """The worst trial of each method in a world: one that failed, else the one with the worst figure."""
+    if table not in JUDGED:
+        return {}
+    figure, _, _, less = JUDGED[table]
+
+    def badness(place: Place) -> float:
+        value = place["figures"].get(figure)
+        return float("inf") if value is None else (1.0 if less else -1.0) * float(value)
+
+    found: dict[str, Place] = {}
+    for place in (p for p in places if p["world"] == world):
+        method = place["method"]
+        if method not in found or badness(place) > badness(found[method]):
+            found[method] = place
+    return found
+
+
+CIRCULAR = ("paper",)
+"""Worlds whose water is the planner's own model: what is met there alone is told apart."""
+
+
+def tally(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, int]:
+    """How many of the figures that the paper quotes are met, each counted once, however many worlds or flows it has.
+
+    `quoted`: figures with a value of the paper and one of ours; `met`: in some world that is not circular; `surely`:
+    there with the whole interval on that side; `circular`: in a circular world alone.
+    """
+    found: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
+    for name, rows in tables.items():
+        for row in rows:
+            if row["paper"] is not None and row["met"] is not None:
+                found.setdefault((name, row["method"], row["figure"]), []).append(row)
+    fair = {key: [row for row in rows if row["met"] and row["world"] not in CIRCULAR] for key, rows in found.items()}
+    return {
+        "quoted": len(found),
+        "met": sum(bool(rows) for rows in fair.values()),
+        "surely": sum(any(row["sure"] for row in rows) for rows in fair.values()),
+        "circular": sum(not fair[key] and any(row["met"] for row in rows) for key, rows in found.items()),
+    }
