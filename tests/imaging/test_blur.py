@@ -20,6 +20,7 @@ def moving(middle, shift_C_m, turn_C_rad, count=5):
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("shift", "turn"),
     [((0.006, 0.0, 0.0), (0, 0, 0)), ((0.0, 0.003, 0.01), (0, 0, 0)), ((0, 0, 0), (0.004, 0.01, 0.02))],

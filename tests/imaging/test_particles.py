@@ -7,7 +7,15 @@ import pytest
 
 from wakewise.geometry import Pose
 from wakewise.imaging import Lights, PinholeCamera, Shutter, water_optics
-from wakewise.imaging.particles import FARTHEST_M, NEAREST_M, Seen, draw_flakes, flake_positions, flakes_before
+from wakewise.imaging.particles import (
+    FARTHEST_M,
+    NEAREST_M,
+    Seen,
+    concentration,
+    draw_flakes,
+    flake_positions,
+    flakes_before,
+)
 from wakewise.interfaces import FlakeCloud, ScalarGrid
 
 CAMERA = PinholeCamera(160, 120, np.deg2rad(90))
@@ -53,6 +61,30 @@ def test_flakes_are_where_the_silt_is():
     points = flake_positions(CAMERA, STILL[0], silt, 0.0, 1e6, np.random.default_rng(1))
     assert np.mean(points[:, 0]) > 0.01
     assert len(flake_positions(CAMERA, STILL[0], None, 0.0, 1e6, np.random.default_rng(1))) == 0
+
+
+def test_a_cloud_out_of_sight_costs_no_draws():
+    """However dense it is: the flakes that are seen are those that were drawn without it, to the last one."""
+    values = np.zeros((40, 5, 5))
+    values[18:22] = 0.05
+    near = ScalarGrid(origin_W_m=np.array([-2.0, -0.2, -0.2]), spacing_m=0.1, values=values)
+    far = values.copy()
+    far[0, 0, 0] = 1e6  # its flakes would fill the memory
+    clouds = (near, replace(near, values=far), replace(near, outer=replace(near, spacing_m=0.5, values=far)))
+    drawn = [flake_positions(CAMERA, STILL[0], silt, 1e3, 1e6, np.random.default_rng(2)) for silt in clouds]
+    assert len(drawn[0]) > 100
+    assert all(np.array_equal(drawn[0], one) for one in drawn[1:])
+
+
+def test_no_place_has_more_silt_than_the_largest_near_it():
+    """The bound of a ball about the camera holds for all places in it, on either grid."""
+    rng = np.random.default_rng(3)
+    outer = ScalarGrid(origin_W_m=np.full(3, -2.0), spacing_m=0.4, values=rng.random((11, 11, 11)) ** 8)
+    silt = ScalarGrid(origin_W_m=np.full(3, -0.5), spacing_m=0.1, values=rng.random((11, 11, 11)) ** 8, outer=outer)
+    for centre in rng.uniform(-2.5, 2.5, (20, 3)):
+        ways = rng.normal(size=(500, 3))
+        places = centre + 0.6 * rng.random((500, 1)) * ways / np.linalg.norm(ways, axis=1)[:, None]
+        assert concentration(silt, places).max() <= silt.largest_near(centre, 0.6) + 1e-12
 
 
 def test_flakes_show_before_the_wall_only():

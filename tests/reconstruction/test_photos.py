@@ -185,13 +185,13 @@ def test_a_png_is_whole_only_with_all_its_bytes():
 
 
 def test_images_of_other_kinds_and_folders_of_folders_are_told(tmp_path):
-    """A WebP under a JPEG's name, and photos one folder further down."""
+    """A WebP under a JPEG's name, and photos two folders further down."""
     (tmp_path / "a.jpg").write_bytes(cv2.imencode(".webp", np.zeros((9, 9, 3), np.uint8))[1].tobytes())
     with pytest.raises(InputError, match=r"a\.jpg: holds an image of another kind than JPEG"):
         read_photos(tmp_path)
-    (tmp_path / "all" / "left").mkdir(parents=True)
-    put(tmp_path / "all" / "left", "1.png", "2.png")
-    with pytest.raises(InputError, match=r"holds only folders \(left\)"):
+    (tmp_path / "all" / "left" / "day").mkdir(parents=True)
+    put(tmp_path / "all" / "left" / "day", "1.png", "2.png")
+    with pytest.raises(InputError, match=r"holds only folders \(left\) without photos"):
         read_photos(tmp_path / "all")
 
 

@@ -2,7 +2,9 @@
 
 Pure functions whose results carry their unit in their name. Start reading in `surface.py` (a cloud against the true
 surface) and `flight.py` (a flight's figures from its steps). `alignment.py` brings a model into the truth's frame
-(Umeyama, ICP), `depth_maps.py` judges against laser scans, `definitions.py` says what each figure is.
+(Umeyama, ICP), `thresholds.py` counts what lies within, `extent.py` measures area and volume, `depth_maps.py` and
+`against_cloud.py` judge against laser scans, `soundness.py` counts a mesh's faults, `definitions.py` says what each
+figure is.
 """
 
 from typing import TYPE_CHECKING
@@ -10,7 +12,9 @@ from typing import TYPE_CHECKING
 from wakewise.doors import lazy_door
 
 if TYPE_CHECKING:
+    from wakewise.evaluation.against_cloud import CLOUD_DEFINITIONS, CloudComparison, compare_clouds, extent_m
     from wakewise.evaluation.alignment import Refinement, Similarity, refine_icp, robust_similarity, umeyama
+    from wakewise.evaluation.definitions import MESH_REFERENCE as MESH_REFERENCE_DEFINITIONS
     from wakewise.evaluation.definitions import SURFACE as SURFACE_DEFINITIONS
     from wakewise.evaluation.depth_maps import (
         DEPTH_DEFINITIONS,
@@ -20,6 +24,7 @@ if TYPE_CHECKING:
         read_depth_views,
     )
     from wakewise.evaluation.flight import SWAY_FIGURES, attitude_rmse_deg, flight_figures
+    from wakewise.evaluation.soundness import MeshFaults, mesh_faults
     from wakewise.evaluation.surface import (
         Comparison,
         Crop,
@@ -33,30 +38,41 @@ if TYPE_CHECKING:
         suspicious_scale,
         thin,
     )
+    from wakewise.evaluation.thresholds import Share, read_thresholds, shares
 
 __all__ = [
+    "CLOUD_DEFINITIONS",
     "DEPTH_DEFINITIONS",
+    "MESH_REFERENCE_DEFINITIONS",
     "SURFACE_DEFINITIONS",
     "SWAY_FIGURES",
+    "CloudComparison",
     "Comparison",
     "Crop",
     "DepthScore",
     "DepthView",
+    "MeshFaults",
     "Refinement",
+    "Share",
     "Similarity",
     "Surface",
     "SurfaceScore",
     "attitude_rmse_deg",
+    "compare_clouds",
     "compare_depths",
     "compare_surface",
     "count_views",
     "error_colours",
     "evaluate_surface",
+    "extent_m",
     "flight_figures",
+    "mesh_faults",
     "read_depth_views",
+    "read_thresholds",
     "refine_icp",
     "robust_similarity",
     "sample_surface",
+    "shares",
     "suspicious_scale",
     "thin",
     "umeyama",

@@ -39,3 +39,13 @@ SURFACE: dict[str, tuple[str, str]] = {
     "cloud_points": ("", "points of the model that count, after thinning"),
     "truth_samples": ("", "samples of the true surface that count"),
 }  # fmt: skip
+
+MESH_REFERENCE: dict[str, tuple[str, str]] = {
+    "extent_mm": ("mm", "diagonal of the true surface's box, which thresholds in percent are of"),
+    "shares": ("", "accuracy, completeness and F-score at each threshold, of the model thinned to a point per cell of "
+               "half the smallest threshold or of 0.8 mm, whichever is finer"),
+    "reference_faults": ("", "of the true surface: faces that come twice, edges of more than two faces (non-manifold), "
+                         "faces without area, edges of one face (its rim)"),
+    "model_faults": ("", "the same of the model, where it is a mesh"),
+}  # fmt: skip
+"""What `wakewise evaluate` says besides `SURFACE`."""

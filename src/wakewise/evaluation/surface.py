@@ -17,6 +17,7 @@ from scipy.spatial import KDTree
 from wakewise.arrays import Array, BoolArray, IntArray, freeze
 from wakewise.errors import InputError, StageError
 from wakewise.evaluation.alignment import Refinement, refine_icp
+from wakewise.evaluation.thresholds import Share, shares
 from wakewise.extras import need
 from wakewise.targets import MeshDistance
 
@@ -192,11 +193,15 @@ def thin(points_m: Array, voxel_m: float) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Comparison:
-    """A score with what it was computed from: the aligned, thinned cloud, shape (n, 3), and its errors, shape (n,)."""
+    """A score with what it was computed from: the aligned, thinned cloud, shape (n, 3), and its errors, shape (n,).
+
+    shares: at the thresholds that were asked for, of the cloud thinned to half the smallest where that is finer.
+    """
 
     score: SurfaceScore
     points_W_m: Array
     error_mm: Array
+    shares: tuple[Share, ...] = ()
 
     def __post_init__(self) -> None:
         freeze(self, points_W_m=(None, 3), error_mm=(None,))
@@ -219,6 +224,7 @@ def compare_surface(
     voxel_m: float = 0.0008,
     rng: np.random.Generator | None = None,
     samples: int = SAMPLES,
+    thresholds_mm: tuple[float, ...] = (),
 ) -> Comparison:
     """Score a cloud against a true mesh; `SurfaceScore` defines every figure.
 
@@ -238,6 +244,8 @@ def compare_surface(
         Draws the samples of the truth; without one they are the same at every call.
     samples : int
         How many are drawn.
+    thresholds_mm : tuple of float
+        At which shares are wanted besides those of the score.
 
     Raises
     ------
@@ -264,7 +272,8 @@ def compare_surface(
         moved = refinement.apply(cloud)
         kept = moved[crop.keeps(moved, low, high)]
     even = thin(kept, voxel_m)
-    to_truth_mm = 1e3 * MeshDistance(mesh.vertices_m, mesh.faces)(even)
+    distance = MeshDistance(mesh.vertices_m, mesh.faces)
+    to_truth_mm = 1e3 * distance(even)
     to_cloud_mm = 1e3 * np.asarray(KDTree(even).query(surface.points_m, workers=-1)[0])
     seen = None
     if camera_centres_W_m is not None:
@@ -297,7 +306,14 @@ def compare_surface(
         cloud_points=len(even),
         truth_samples=len(surface.points_m),
     )
-    return Comparison(score=score, points_W_m=even, error_mm=to_truth_mm)
+    found: tuple[Share, ...] = ()
+    if thresholds_mm:
+        fine, near = to_truth_mm, to_cloud_mm
+        if 0.5e-3 * min(thresholds_mm) < voxel_m:
+            finer = thin(kept, 0.5e-3 * min(thresholds_mm))
+            fine, near = 1e3 * distance(finer), 1e3 * np.asarray(KDTree(finer).query(surface.points_m, workers=-1)[0])
+        found = shares(fine, near, thresholds_mm)
+    return Comparison(score=score, points_W_m=even, error_mm=to_truth_mm, shares=found)
 
 
 def suspicious_scale(cloud_m: Array, mesh: Mesh) -> str | None:
@@ -305,13 +321,18 @@ def suspicious_scale(cloud_m: Array, mesh: Mesh) -> str | None:
 
     A cloud may hold more than the truth or a part of it only, so that a factor of ten either way proves nothing.
     """
+    return suspicious_extent(cloud_m, np.asarray(mesh.vertices_m))
+
+
+def suspicious_extent(cloud_m: Array, truth_m: Array) -> str | None:
+    """The same of a truth that is points, shape (n, 3)."""
     cloud = np.asarray(cloud_m, dtype=np.float64).reshape(-1, 3)
-    if len(cloud) < 2 or len(mesh.vertices_m) == 0:
+    if len(cloud) < 2 or len(truth_m) == 0:
         return None
     # The middle nine tenths: one stray point must not make a cloud look large.
     low, high = np.percentile(cloud, (5.0, 95.0), axis=0)
     extent = float(np.linalg.norm(high - low)) / 0.9
-    truth = float(np.linalg.norm(np.ptp(np.asarray(mesh.vertices_m), axis=0)))
+    truth = float(np.linalg.norm(np.ptp(truth_m, axis=0)))
     if extent <= 0.0 or truth <= 0.0 or 1.0 / MAX_SCALE_RATIO < extent / truth < MAX_SCALE_RATIO:
         return None
     ratio = extent / truth

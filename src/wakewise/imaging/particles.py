@@ -47,7 +47,6 @@ def flake_positions(
     rng: np.random.Generator,
 ) -> Array:
     """Draw where flakes are, shape (n, 3) in the camera frame: a Poisson process with density per_m3 + per_kg C."""
-    densest = per_m3 + (per_kg * silt.largest if silt is not None else 0.0)
     # A pyramid that holds the whole view: slopes to the points of the image's border.
     w, h = float(camera.width), float(camera.height)
     edge = np.linspace(0.0, 1.0, 17)
@@ -55,6 +54,9 @@ def flake_positions(
     border += [np.column_stack([np.full(17, x), edge * h]) for x in (0.0, w)]
     corners = camera.unproject(np.concatenate(border), np.full(68, FARTHEST_M))[:, :2] / FARTHEST_M
     low, high = corners.min(axis=0), corners.max(axis=0)
+    reach_m = FARTHEST_M * float(np.sqrt(1.0 + (np.maximum(-low, high) ** 2).sum()))
+    # A cloud that the camera does not see, however dense, costs no draws.
+    densest = per_m3 + (per_kg * silt.largest_near(X_WC.p_m, reach_m) if silt is not None else 0.0)
     volume = float(np.prod(high - low)) * (FARTHEST_M**3 - NEAREST_M**3) / 3.0
     n = int(rng.poisson(densest * volume))
     depth = (NEAREST_M**3 + rng.random(n) * (FARTHEST_M**3 - NEAREST_M**3)) ** (1.0 / 3.0)

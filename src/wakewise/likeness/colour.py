@@ -184,7 +184,7 @@ def without_water(image: Photo8, range_m: NDArray[np.float32], fit: WaterFit) ->
     # Where veil is nearly all there is, such as in open water, some is left: its hue is right, that of noise is not.
     direct = np.maximum(seen - fit.veil * -np.expm1(-r * fit.veil_per_m), _KEPT * seen)
     linear = direct * np.minimum(np.exp(r * fit.signal_per_m), MOST_GAIN) * fit.gains
-    return _bytes(srgb_encode(linear))
+    return srgb_bytes(srgb_encode(linear))
 
 
 def balanced(image: Photo8) -> Photo8:
@@ -197,10 +197,11 @@ def balanced(image: Photo8) -> Photo8:
     grey = flat.mean(axis=0)
     flat = flat * np.clip(grey.mean() / np.maximum(grey, 1e-6), 0.25, 4.0)
     flat *= np.clip(_WHITE / max(float(np.quantile(flat.max(axis=1), 0.99)), 1e-6), 0.5, 4.0)
-    lab = cv2.cvtColor(_bytes(srgb_encode(flat.reshape(linear.shape))), cv2.COLOR_RGB2LAB)
+    lab = cv2.cvtColor(srgb_bytes(srgb_encode(flat.reshape(linear.shape))), cv2.COLOR_RGB2LAB)
     lab[..., 0] = cv2.createCLAHE(clipLimit=1.6, tileGridSize=(8, 8)).apply(np.ascontiguousarray(lab[..., 0]))
     return np.asarray(cv2.cvtColor(lab, cv2.COLOR_LAB2RGB), np.uint8)
 
 
-def _bytes(values: NDArray[np.float64]) -> Photo8:
+def srgb_bytes(values: NDArray[np.float64]) -> Photo8:
+    """Encoded values, 0 to 1, as bytes."""
     return np.round(255.0 * np.clip(values, 0.0, 1.0)).astype(np.uint8)

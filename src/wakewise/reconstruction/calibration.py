@@ -101,7 +101,7 @@ def calibrate(folder: Path, board: Board, model: str = "radial") -> Calibration:
     if model not in MODELS:
         raise InputError(f"lens model: '{model}', allowed are {', '.join(MODELS)}")
     photos = _read(folder)
-    name, detector = _detector(list(photos.values()), board)
+    name, detector = board_detector(list(photos.values()), board)
     found: dict[str, tuple[Points, Points]] = {}
     left_out: dict[str, int] = {}
     for photo, grey in photos.items():
@@ -166,7 +166,7 @@ def _read(folder: Path) -> dict[str, NDArray[np.uint8]]:
     return out
 
 
-def _detector(photos: list[NDArray[np.uint8]], board: Board) -> tuple[str, Any]:
+def board_detector(photos: list[NDArray[np.uint8]], board: Board) -> tuple[str, Any]:
     """The dictionary and the pattern of squares (white or black at the origin) that most corners are found with."""
     some = photos[:: max(1, len(photos) // 3)][:3]
     best: tuple[int, str, Any] = (-1, "", None)

@@ -85,7 +85,9 @@ class CellMeans:
         cells = self._cells[:used]
         order = np.lexsort((cells[:, 2], cells[:, 1], cells[:, 0]))
         count = self._counts[:used][order]
-        return self._sums[:used][order] / count[:, None], count
+        mean = self._sums[:used][order]
+        mean /= count[:, None]
+        return mean, count
 
     def _make_room(self, rows: int) -> None:
         if rows <= len(self._counts):

@@ -6,22 +6,34 @@ The one door to pycolmap: whoever needs it takes it from here, without the signa
 from __future__ import annotations
 
 import os
+import pickle
 import shutil
 import signal
 import sqlite3
+import subprocess
 import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pycolmap
 
 from wakewise.errors import EnvironmentFailure, StageError
 
-__all__ = ["RESERVE_MB", "be_quiet", "call", "keep_sigterm", "no_stderr", "pycolmap", "settle", "workroom"]
+__all__ = [
+    "RESERVE_MB",
+    "be_quiet",
+    "call",
+    "call_apart",
+    "keep_sigterm",
+    "no_stderr",
+    "pycolmap",
+    "settle",
+    "workroom",
+]
 
 T = TypeVar("T")
 # Room that a disk must keep while COLMAP writes its database: what it writes in about a second.
@@ -70,35 +82,98 @@ def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: 
     token = pycolmap.CancellationToken()
     result: list[T] = []
     failure: list[Exception] = []
+    # Not the thread itself: a join with a time limit that is interrupted leaves a running thread looking dead in
+    # CPython 3.11, and its database was removed under its hands.
+    ended = threading.Event()
 
     def body() -> None:
-        be_quiet()  # a bundle adjustment on its own makes COLMAP talk again
         try:
+            be_quiet()  # a bundle adjustment on its own makes COLMAP talk again
             result.append(work(cancellation_token=token))
         except (RuntimeError, ValueError, IndexError, TypeError, OSError) as error:
             failure.append(error)
+        finally:
+            ended.set()
 
     thread = threading.Thread(target=body, name=what)
-    thread.start()
     try:
-        while thread.is_alive():
-            thread.join(0.25 if disk is None else 0.05)
+        thread.start()
+        watch()
+        while not ended.wait(0.25 if disk is None else 0.05):
             watch()
-            if disk is not None and thread.is_alive() and (free := shutil.disk_usage(disk).free / 1e6) < RESERVE_MB:
+            if disk is not None and not ended.is_set() and (free := shutil.disk_usage(disk).free / 1e6) < RESERVE_MB:
                 raise EnvironmentFailure(
                     f"{what}: the disk of {disk} is full, {free:.0f} MB are left and {RESERVE_MB:g} MB needed; the "
                     "stages before it are kept"
                 )
     finally:
-        if thread.is_alive():
-            token.cancel()
-            thread.join()
+        token.cancel()
+        _see_out(thread, ended)
     if failure:
         if isinstance(failure[0], OSError):
             raise failure[0]
         reason = " ".join(str(failure[0]).split())[:200]
         raise StageError(f"{what}: COLMAP stopped: {reason}") from failure[0]
     return result[0]
+
+
+def call_apart(what: str, function: str, *arguments: Any, watch: Callable[[], None] = lambda: None) -> None:
+    """Run a function of pycolmap that cannot be cancelled in a process of its own, which an interrupt ends at once.
+
+    Parameters
+    ----------
+    what : str
+        Name of the stage, for messages.
+    function : str
+        Its name; it takes and leaves files.
+    arguments
+        Paths, and options of pycolmap's own.
+
+    Raises
+    ------
+    StageError
+        If it fails, with its reason in one line.
+    """
+    order: bytes | None = pickle.dumps((function, arguments))
+    # Its own session: a terminal's Ctrl-C goes to whoever waits for it, and that ends it.
+    child = subprocess.Popen(
+        [sys.executable, "-c", _APART],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    )
+    told = b""
+    try:
+        while True:
+            try:
+                _, told = child.communicate(order, timeout=0.25)
+                break
+            except subprocess.TimeoutExpired:
+                order = None  # it has it
+                watch()
+    finally:
+        child.kill()
+        child.communicate()
+    if child.returncode != 0:
+        last = told.decode(errors="replace").strip().splitlines()[-1:] or [f"exit code {child.returncode}"]
+        raise StageError(f"{what}: COLMAP stopped: {' '.join(last[0].split())[:200]}")
+
+
+_APART = """
+import pickle, sys
+import pycolmap
+pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL.value
+function, arguments = pickle.load(sys.stdin.buffer)
+getattr(pycolmap, function)(*arguments)
+"""
+
+
+def _see_out(thread: threading.Thread, ended: threading.Event) -> None:
+    """Wait for a cancelled call to come back, however often the user presses Ctrl-C meanwhile."""
+    while thread.ident is not None and not ended.is_set():
+        with suppress(KeyboardInterrupt):
+            ended.wait(1.0)
 
 
 @contextmanager

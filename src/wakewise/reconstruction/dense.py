@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -15,9 +16,12 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.errors import StageError
 from wakewise.interfaces import Progress
+from wakewise.processes import half_done
 from wakewise.reconstruction.cells import CellMeans
 from wakewise.reconstruction.clouds import Cloud, write_cloud
+from wakewise.reconstruction.depth_store import DepthStore
 from wakewise.reconstruction.fusion import facing_normals, fuse, lonely
+from wakewise.reconstruction.masks import masked
 from wakewise.reconstruction.photos import Image, PhotoStore
 from wakewise.reconstruction.settings import ReconstructionSettings
 from wakewise.reconstruction.stereo import DepthMap, pair_depth, rectifiable
@@ -58,12 +62,14 @@ def densify(
     scale = _scale(views, region, settings)
     before = cv2.getNumThreads()
     cv2.setNumThreads(1)  # the threads are over photos and pairs
-    try:
-        maps = _all_depths(store or PhotoStore(folder), views, partners, region, settings, scale, progress)
-    finally:
-        cv2.setNumThreads(before)
-    spacing = _spacing(maps) if maps else 0.0
-    cloud = _fuse_all(maps, partners, settings, spacing, progress) if maps else np.zeros((0, 9))
+    with tempfile.TemporaryDirectory(prefix=half_done("depths"), dir=out.parent) as scratch:
+        maps = DepthStore(Path(scratch))
+        try:
+            given = store or PhotoStore(folder)
+            spacing = _all_depths(maps, given, views, partners, region, settings, scale, progress)
+        finally:
+            cv2.setNumThreads(before)
+        cloud = _fuse_all(maps, partners, settings, spacing, progress) if len(maps) else np.zeros((0, 9))
     if len(cloud) < 100:
         raise StageError(f"dense: {len(cloud)} points survive from {len(maps)} depth maps, at least 100 must")
     normals = facing_normals(cloud[:, :3], cloud[:, 6:9], settings.threads)
@@ -72,6 +78,7 @@ def densify(
 
 
 def _all_depths(
+    maps: DepthStore,
     store: PhotoStore,
     views: tuple[View, ...],
     partners: list[list[int]],
@@ -79,8 +86,11 @@ def _all_depths(
     settings: ReconstructionSettings,
     scale: float,
     progress: Progress,
-) -> list[DepthMap]:
-    """A depth map of every photo with each of its best partners, as far as they can be rectified."""
+) -> float:
+    """A depth map of every photo with each of its best partners, as far as they can be rectified.
+
+    Returns the usual distance between neighbouring rectified pixels at the surface's depth, in m; 0 without any.
+    """
     jobs = []
     for i, best in enumerate(partners):
         good = [j for j in best if rectifiable(views[i], views[j])]
@@ -91,14 +101,20 @@ def _all_depths(
     small = tuple(_shrunk(view, shrink) for view in views)
 
     def one(job: tuple[int, int]) -> DepthMap | None:
-        return pair_depth(small, photos, *job, region, scale * shrink, settings.stereo_paths)
+        found = pair_depth(small, photos, *job, region, scale * shrink, settings.stereo_paths)
+        if found is None or store.masks is None:
+            return found
+        return masked(found, small[found.first], store.masks.of(views[found.first].name))
 
-    maps: list[DepthMap] = []
+    spacings = []
     for done, depth_map in enumerate(in_order(one, jobs, settings.threads)):
         progress(done, 2 * len(jobs), "stereo")
         if depth_map is not None:
-            maps.append(depth_map)
-    return maps
+            maps.add(depth_map)
+            depth = depth_map.depth_m
+            if depth.any():
+                spacings.append(np.median(depth[depth > 0]) / depth_map.focal_px)
+    return float(np.median(spacings)) if spacings else 0.0
 
 
 def _load(store: PhotoStore, name: str, shrink: int) -> Image:
@@ -131,32 +147,29 @@ def _scale(views: tuple[View, ...], region: Ball | None, settings: Reconstructio
     return min(settings.dense_zoom, settings.dense_px / float(np.median(wide)))
 
 
-def _spacing(maps: list[DepthMap]) -> float:
-    """Usual distance between neighbouring rectified pixels at the surface's depth, in m."""
-    return float(np.median([np.median(m.depth_m[m.depth_m > 0]) / m.focal_px for m in maps if m.depth_m.any()]))
-
-
 def _fuse_all(
-    maps: list[DepthMap],
+    maps: DepthStore,
     partners: list[list[int]],
     settings: ReconstructionSettings,
     spacing: float,
     progress: Progress,
 ) -> Array:
     """Points, colours and directions to the camera side by side, shape (n, 9)."""
-    alone = len({own.first for own in maps} | {own.second for own in maps}) == 2
+    photos = [maps.photos(k) for k in range(len(maps))]
+    alone = len({photo for both in photos for photo in both}) == 2
 
     def of_one(index: int) -> Array:
-        own = maps[index]
-        voters = {own.first, *partners[own.first][:VOTING_PHOTOS]}
+        first, second = photos[index]
+        voters = {first, *partners[first][:VOTING_PHOTOS]}
         neighbours = [
             k
-            for k, other in enumerate(maps)
-            if other.first in voters
+            for k, other in enumerate(photos)
+            if other[0] in voters
             # The pair the other way round is no independent witness; of two photos it is the only one.
-            and ({other.first, other.second} != {own.first, own.second} or (alone and other.first != own.first))
+            and (set(other) != {first, second} or (alone and other[0] != first))
         ]
-        return fuse(maps, index, neighbours, 1 if alone else settings.agreeing_views, AGREEMENT_PX)
+        read = {k: maps.depths(k) for k in neighbours} | {index: maps.whole(index)}
+        return fuse(read, index, neighbours, 1 if alone else settings.agreeing_views, AGREEMENT_PX)
 
     # Cells as they come, in the order of the maps, so that all points need not be in memory at once.
     gathered = CellMeans(9, spacing)

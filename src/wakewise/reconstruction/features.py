@@ -17,11 +17,14 @@ from wakewise.interfaces import Progress
 from wakewise.processes import half_done
 from wakewise.reconstruction.colmap import call, pycolmap, settle, workroom
 from wakewise.reconstruction.guided import Poses, match_by_poses
+from wakewise.reconstruction.lens_groups import LensGroup, group_photos
 from wakewise.reconstruction.lenses import Lens
+from wakewise.reconstruction.look_alike import like_pairs, read_looks
+from wakewise.reconstruction.masks import write_for_colmap
 from wakewise.reconstruction.pairs import Pairs
 from wakewise.reconstruction.photos import Photo, PhotoStore
 from wakewise.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
-from wakewise.reconstruction.sift import PEAK_THRESHOLD, folder_features
+from wakewise.reconstruction.sift import PEAK_THRESHOLD, folder_features, within
 
 T = TypeVar("T")
 FEW_FEATURES = 150
@@ -41,6 +44,9 @@ def match_photos(
     store: PhotoStore | None = None,
     lens: Lens | None = None,
     poses: Poses | None = None,
+    groups: tuple[LensGroup, ...] | None = None,
+    may_be_none: bool = False,
+    look_alikes: int = 0,
 ) -> dict[str, Any]:
     """Find SIFT features, match and verify; write COLMAP's database whole.
 
@@ -54,9 +60,15 @@ def match_photos(
         Photos that are decoded already.
     lens : Lens, optional
         The camera that took them all, instead of a focal length.
+    groups : tuple of LensGroup, optional
+        Which photos share a lens; found from the photos if not given.
     poses : dict, optional
         Rough R_WC, shape (3, 3), and p_WC_m, shape (3,), by photo name: pairs are matched along epipolar lines first,
         and only those that do not verify among all features.
+    may_be_none : bool
+        Whether it is no failure that nothing matches, as where the cameras are known.
+    look_alikes : int
+        With how many others each is matched besides, because they look alike.
 
     Returns
     -------
@@ -74,17 +86,22 @@ def match_photos(
     names = [photo.name for photo in photos]
     _check_pairs(names, pairs)
     pycolmap.set_random_seed(RANDOM_SEED)
-    with whole_file(database) as whole, workroom(database, database_bytes(len(photos), len(pairs), settings)) as room:
+    size = database_bytes(len(photos), len(pairs) + look_alikes * len(photos), settings)
+    with whole_file(database) as whole, workroom(database, size) as room:
         work = room / "database.db"
         work.touch()
-        _extract(store or PhotoStore(folder), photos, work, settings, focal_px, lens, progress)
+        lenses = group_photos(photos, lenses=lens) if groups is None else groups
+        store = store or PhotoStore(folder)
+        _extract(store, lenses, work, settings, focal_px, progress, room)
         _check_all_there(work, folder, names)
+        if look_alikes:
+            pairs = sorted({*pairs, *like_pairs(read_looks(work), look_alikes)})
         left = pairs if poses is None else match_by_poses(work, pairs, poses, settings.threads, progress)
-        _match(work, settings, left, progress)
+        match_pairs(work, settings, left, progress)
         figures = _figures(work, len(photos)) | {"pairs": len(pairs), "posed_pairs": len(pairs) - len(left)}
         settle(work)
         shutil.copyfile(work, whole)
-        if figures["inlier_matches"] == 0:
+        if figures["inlier_matches"] == 0 and not may_be_none:
             count = figures["features_per_image"]
             hint = ""
             if count < FEW_FEATURES:
@@ -124,49 +141,31 @@ def _check_pairs(names: list[str], pairs: Pairs) -> None:
 
 def _extract(
     store: PhotoStore,
-    photos: tuple[Photo, ...],
+    groups: tuple[LensGroup, ...],
     database: Path,
     settings: ReconstructionSettings,
     focal_px: float | None,
-    lens: Lens | None,
     progress: Progress,
+    room: Path,
 ) -> None:
-    """Features of all photos; those of one size share a camera, as one that was turned has another size."""
-    groups: dict[tuple[int, int], list[str]] = {}
-    for photo in photos:
-        groups.setdefault((photo.width, photo.height), []).append(photo.name)
-    if focal_px is not None and len(groups) > 1:
+    """Features of all photos; those of one group share a camera. Masks are laid out in `room` for COLMAP."""
+    if focal_px is not None and len({(group.width, group.height) for group in groups}) > 1:
         raise InputError("photos: have different sizes, so one focal length in pixels cannot hold for all of them")
-    if lens is not None:
-        check_sizes(photos, lens)
-    done = 0
-    for (width, height), names in groups.items():
+    done, total = 0, sum(len(group.photos) for group in groups)
+    for group in groups:
         reader = pycolmap.ImageReaderOptions()
         reader.camera_model = "SIMPLE_RADIAL"
+        if store.masks is not None:
+            write_for_colmap(store.masks, list(group.photos), room / "masks")
+            reader.mask_path = room / "masks"
         if focal_px is not None:
-            reader.camera_params = f"{focal_px},{width / 2},{height / 2},0"
-        if lens is not None:
-            reader.camera_model, reader.camera_params = lens.for_colmap()
+            reader.camera_params = f"{focal_px},{group.width / 2},{group.height / 2},0"
+        if group.lens is not None:
+            reader.camera_model, reader.camera_params = group.lens.for_colmap()
         work = _by_opencv if settings.detector == "opencv" else _by_colmap
-        work(store, names, database, settings, reader, partial(_tell, progress, done, len(photos)))
-        done += len(names)
-    progress(done, len(photos), "features")
-
-
-def check_sizes(photos: tuple[Photo, ...], lens: Lens) -> None:
-    """Check that photos can be of a camera.
-
-    Raises
-    ------
-    InputError
-        If one has another size.
-    """
-    for photo in photos:
-        if (photo.width, photo.height) != (lens.width, lens.height):
-            raise InputError(
-                f"camera: is of photos of {lens.width} x {lens.height} px, {photo.name} has {photo.width} x "
-                f"{photo.height}; all must have the camera's size"
-            )
+        work(store, list(group.photos), database, settings, reader, partial(_tell, progress, done, total))
+        done += len(group.photos)
+    progress(done, total, "features")
 
 
 def _tell(progress: Progress, before: int, total: int, done: int) -> None:
@@ -192,7 +191,7 @@ def _by_opencv(
     found = []
     for k, features in enumerate(folder_features(store, names, settings)):
         tell(k)
-        found.append(features)
+        found.append(features if store.masks is None else within(features, store.masks.of(names[k])))
     link = pycolmap.Database.open(database)
     try:
         for name, features in zip(names, found, strict=True):
@@ -246,12 +245,13 @@ def _by_colmap(
                 reader.existing_camera_id = read[0]
 
 
-def _match(
+def match_pairs(
     database: Path,
     settings: ReconstructionSettings,
     pairs: Pairs,
     progress: Progress,
 ) -> None:
+    """Match pairs of photos, by name, among all their features, and write what verifies into COLMAP's database."""
     options = pycolmap.FeatureMatchingOptions()
     options.num_threads = settings.threads
     options.use_gpu = False

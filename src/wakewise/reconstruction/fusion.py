@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 import small_gicp
 from scipy.spatial import KDTree
@@ -141,11 +143,19 @@ def _gather(
     return rows
 
 
-def fuse(maps: list[DepthMap], index: int, neighbours: list[int], agreeing: int, tolerance_px: float) -> Array:
+def fuse(
+    maps: Mapping[int, DepthMap] | Sequence[DepthMap],
+    index: int,
+    neighbours: list[int],
+    agreeing: int,
+    tolerance_px: float,
+) -> Array:
     """Points that other maps confirm, shape (n, 9): position, colour (red first, 0 to 1), unit direction to the camera.
 
     Parameters
     ----------
+    maps : mapping or sequence
+        Depth maps by number: `index` whole, the neighbours with their depths.
     neighbours : list of int
         Which maps may vote; the map of the same two photos the other way round is not independent and must not be
         among them.

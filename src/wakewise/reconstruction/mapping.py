@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,21 +18,30 @@ from wakewise.evaluation import robust_similarity
 from wakewise.files import whole_folder
 from wakewise.interfaces import Progress
 from wakewise.reconstruction.colmap import call, no_stderr, pycolmap, settle, workroom
+from wakewise.reconstruction.fixed import map_at_poses
 from wakewise.reconstruction.guided import Poses
+from wakewise.reconstruction.own_lenses import LEAST_POINTS, OwnLenses, heaps, own_lenses, set_cameras
 from wakewise.reconstruction.photos import PhotoStore
 from wakewise.reconstruction.seeded import Seeded, map_from_poses
 from wakewise.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
+from wakewise.reconstruction.solving import BUNDLE_ITERATIONS, NEVER, solve, solve_again
+from wakewise.reconstruction.verdict import doubts, evidence, known_doubts
 
-# Most iterations of a bundle adjustment; fewer registered photos than that are a failure.
-BUNDLE_ITERATIONS, MIN_REGISTERED = 100, 3
+# Fewer registered photos are a failure; of fewer, lenses are not looked into.
+MIN_REGISTERED, LEAST_FOR_CHECK = 3, 5
+MOST_OPINION_PCT, MOST_FOCAL_RATIO, MOST_FOCAL_SPREAD_PCT = 10.0, 1.05, 5.0
+"""What a lens of its own for each photo may change: camera places in percent of their spread, focal lengths."""
 # Largest reprojection errors that are let pass, one after the other, until the mean is small enough (COLMAP's own: 4).
 CUTS_PX = (2.0, 1.5, 1.0, 0.75)
 MIN_ANGLE_DEG = 1.5
-GROWTH = 1.4
 # OpenCV's remap takes no wider image.
 MOST_COLUMNS = 30_000
-NEVER = 2**31 - 1
-MAPPINGS = {"poses": "from known poses", "incremental": "photo by photo", "global": "all photos at once"}
+MAPPINGS = {
+    "known": "at the known cameras",
+    "poses": "from known poses",
+    "incremental": "photo by photo",
+    "global": "all photos at once",
+}
 """Ways to a sparse model, in words."""
 # No photo sees sharply from nearer, and none of a scan from farther: beyond, the positions are hardly in metres.
 SENSIBLE_RANGE_M = (0.01, 1000.0)
@@ -48,6 +58,7 @@ def map_photos(
     progress: Progress,
     store: PhotoStore | None = None,
     poses: Poses | None = None,
+    fixed: Poses | None = None,
 ) -> dict[str, Any]:
     """Structure from motion; keep the largest model, bring it to the reference positions, write it whole.
 
@@ -67,6 +78,8 @@ def map_photos(
     poses : dict, optional
         Rough R_WC, shape (3, 3), and p_WC_m, shape (3,), by photo name, to begin the model from (see `seeded`); where
         the result does not pass, the model is built from the photos alone.
+    fixed : dict, optional
+        The same, known so well that they stay as they are, with their lenses (see `fixed`).
 
     Returns
     -------
@@ -81,29 +94,53 @@ def map_photos(
     StageError
         If too few photos register or the model cannot be aligned.
     """
-    with workroom(sparse, 2.0 * database.stat().st_size) as room:
+    with workroom(sparse, 4.0 * database.stat().st_size) as room:
         # A copy, as even reading makes COLMAP write into it.
         copy = Path(shutil.copyfile(database, room / "database.db"))
         if settings.position_priors and references is not None:
             _write_priors(copy, references, settings.prior_sigma_m)
-        seeded = Seeded(model=None, refusal=None)
-        if poses is not None:
+        seeded, given = Seeded(model=None, refusal=None), None
+        if fixed is not None:
+            given = map_at_poses(copy, fixed, photos, progress)
+        elif poses is not None:
             seeded = map_from_poses(copy, poses, settings, photos, progress)
-        model, way = seeded.model, MAPPINGS["poses"]
-        if model is None:
-            models = _solve(folder, copy, room, settings, photos, progress)
-            model = max(models.values(), key=lambda one: one.num_reg_images(), default=None)
+        models, way = [seeded.model] if seeded.model is not None else [], MAPPINGS["poses"]
+        if given is not None:
+            models, way = [given.model], MAPPINGS["known"]
+        elif not models:
+            models = solve(folder, copy, room, settings, photos, progress)
+            if models and models[0].num_reg_images() < photos:
+                models = solve_again(folder, copy, room, settings, models, progress)
             way = MAPPINGS["global" if settings.mapper == "global" else "incremental"]
-    if model is None:
-        raise StageError(
-            f"mapping: none of the {photos} photos register; they show too little in common or were taken "
-            "from one place"
-        )
-    registered = model.num_reg_images()
-    least = min(MIN_REGISTERED, photos)
-    if registered < least:
-        raise StageError(f"mapping: {registered} of {photos} photos register, at least {least} must")
-    _tighten(model, settings)
+        least = min(MIN_REGISTERED, photos)
+        if not models:
+            raise StageError(
+                f"mapping: none of the {photos} photos register; they show too little in common or were taken "
+                "from one place"
+            )
+        own, regrouped = None, None
+        if settings.lens_check and photos >= LEAST_FOR_CHECK and given is None:
+            own = own_lenses(folder, copy, room, settings, photos, progress)
+            regrouped = _by_own_lens(copy, own) if settings.refine_camera else None
+            if regrouped is not None:
+                set_cameras(copy, regrouped)
+                models = solve(folder, copy, room, settings, photos, progress) or models
+                way = MAPPINGS["incremental"]
+        model = models[0]
+        registered = model.num_reg_images()
+        if registered < least:
+            raise StageError(f"mapping: {registered} of {photos} photos register, at least {least} must")
+        uncut_px, before = float(model.compute_mean_reprojection_error()), model.compute_num_observations()
+        if given is None:
+            _tighten(model, settings)
+        cut_pct = 100.0 * (1.0 - model.compute_num_observations() / max(before, 1))
+        found = evidence(model, copy)
+        left = left_out(model, copy)
+    opinion_pct = None if own is None else _second_opinion_pct(model, own)
+    if given is None:
+        wrong = doubts(found, uncut_px=uncut_px, cut_pct=cut_pct) + lens_doubts(model, own, opinion_pct)
+    else:
+        wrong = known_doubts(found, error_px=uncut_px, kept_pct=given.kept_pct)
     figures: dict[str, Any] = {
         "cameras_rmse_mm": None,
         "cameras_max_mm": None,
@@ -112,17 +149,30 @@ def map_photos(
         "surface_distance_m": None,
         "suspicion": None,
     }
-    if references is not None:
+    if given is not None:
+        figures |= {"scale": 1.0} | _plausibility(model)
+    elif references is not None:
         figures = _align(model, references) | _plausibility(model)
     colour_points(model, store or PhotoStore(folder), settings.threads)
     error_px = float(model.compute_mean_reprojection_error())
+    if error_px >= settings.reprojection_px and given is None:
+        wrong.append(f"mean reprojection error {error_px:.2f} px, {settings.reprojection_px:g} px was wished for")
     figures |= {
         "mapping": way,
         "poses_refused": seeded.refusal,
         "registered_images": registered,
         "points": model.num_points3D(),
         "reprojection_px": error_px,
-        "reprojection_met": error_px < settings.reprojection_px,
+        "reprojection_uncut_px": uncut_px,
+        "cut_pct": cut_pct,
+        "reprojection_met": not wrong,
+        "doubts": wrong,
+        **asdict(found),
+        "second_opinion_pct": opinion_pct,
+        "lenses": _lenses(model),
+        "lenses_split": regrouped is not None,
+        "left_out": left,
+        "sub_models": [one.num_reg_images() for one in models],
         "track_length": float(model.compute_mean_track_length()),
         "focal_px": float(np.median([camera.mean_focal_length() for camera in model.cameras.values()])),
     }
@@ -131,67 +181,93 @@ def map_photos(
     return figures
 
 
-def _solve(
-    folder: Path,
-    database: Path,
-    scratch: Path,
-    settings: ReconstructionSettings,
-    photos: int,
-    progress: Progress,
-) -> dict[int, pycolmap.Reconstruction]:
-    """Every model that comes about, by COLMAP's number."""
-    done = [0]
+def _by_own_lens(database: Path, own: OwnLenses) -> list[tuple[tuple[str, ...], pycolmap.Camera]] | None:
+    """Photos by lens where those that share one turn out to have several; None where they do not.
 
-    def one_more() -> None:
-        done[0] += 1
+    Of a lens that was split, a photo that has no focal length of its own is of none of the parts: it gets its own.
+    """
+    link = pycolmap.Database.open(database)
+    try:
+        cameras = {camera.camera_id: camera for camera in link.read_all_cameras()}
+        images = link.read_all_images()
+    finally:
+        link.close()
+    out = []
+    for number, camera in cameras.items():
+        names = [image.name for image in images if image.camera_id == number]
+        parts = heaps({name: own.lenses[name] for name in names if name in own.lenses})
+        if len(parts) > 1:
+            placed = {name for part in parts for name in part}
+            out += [(part, camera) for part in parts] + [((name,), camera) for name in names if name not in placed]
+    return out or None
 
-    def watch() -> None:
-        progress(min(done[0], photos), photos, "mapping")
 
-    out = scratch / "models"
-    out.mkdir()
-    if settings.mapper == "global":
-        options = pycolmap.GlobalPipelineOptions()
-        options.num_threads = settings.threads
-        options.random_seed = RANDOM_SEED
-        options.mapper.random_seed = RANDOM_SEED
-        options.mapper.num_threads = settings.threads
-        adjustment = options.mapper.bundle_adjustment
-        adjustment.ceres.solver_options.max_num_iterations = BUNDLE_ITERATIONS
-        adjustment.refine_focal_length = adjustment.refine_extra_params = settings.refine_camera
-        # It takes no cancellation token: an interrupt waits for its end.
-        found = call(lambda **_: pycolmap.global_mapping(database, folder, out, options=options), "mapping", watch)
-        return dict(found)
-    options = pycolmap.IncrementalPipelineOptions()
-    options.num_threads = settings.threads
-    options.random_seed = RANDOM_SEED
-    options.mapper.random_seed = RANDOM_SEED
-    options.min_model_size = min(3, photos)
-    options.ba_refine_focal_length = options.ba_refine_extra_params = settings.refine_camera
-    options.mapper.abs_pose_refine_focal_length = options.mapper.abs_pose_refine_extra_params = settings.refine_camera
-    if photos == 2:
-        # There is no third photo to confirm a point, nor another pair to begin with.
-        options.triangulation.ignore_two_view_tracks = False
-        options.mapper.init_min_tri_angle = 2.0
-        options.mapper.init_min_num_inliers = 30
-    options.max_num_models = 5
-    options.extract_colors = False
-    # The whole model is adjusted again when it has grown by two fifths. By a tenth, COLMAP's own, took twice as long on
-    # 72 photos and gave the same cameras: those of the photos between are adjusted with their neighbours all the same.
-    options.ba_global_frames_ratio = options.ba_global_points_ratio = GROWTH
-    # Two threads sum in any order, so that the same photos gave a few other points; they took as long as one, too.
-    options.ba_min_num_residuals_for_cpu_multi_threading = NEVER
-    options.ba_global_max_num_iterations = BUNDLE_ITERATIONS
-    if settings.position_priors:
-        options.use_prior_position = True
-        options.use_robust_loss_on_prior_position = True
-    return dict(
-        call(
-            partial(pycolmap.incremental_mapping, database, folder, out, options=options, next_image_callback=one_more),
-            "mapping",
-            watch,
+def _second_opinion_pct(model: pycolmap.Reconstruction, own: OwnLenses) -> float | None:
+    """How far cameras are from where they are with a lens for each photo, rms, in percent of their spread."""
+    mine = {image.name: image.projection_center() for image in model.images.values() if image.has_pose}
+    both = sorted(mine.keys() & own.centres.keys())
+    if len(both) < LEAST_FOR_CHECK:
+        return None
+    a, b = (np.array([centres[name] for name in both]) for centres in (own.centres, mine))
+    try:
+        similarity, _ = robust_similarity(a, b, np.random.default_rng(RANDOM_SEED))
+    except InputError:
+        return None
+    error = np.linalg.norm(similarity.apply(a) - b, axis=1)
+    return 100.0 * float(np.sqrt((error**2).mean()) / np.sqrt(((b - b.mean(axis=0)) ** 2).sum(axis=1).mean()))
+
+
+def lens_doubts(model: pycolmap.Reconstruction, own: OwnLenses | None, opinion_pct: float | None) -> list[str]:
+    """Reasons not to trust a model that come from mapping with a lens for each photo."""
+    if own is None:
+        return []
+    out = []
+    if opinion_pct is not None and opinion_pct > MOST_OPINION_PCT:
+        out.append(
+            f"with a lens for each photo the cameras come out {opinion_pct:.0f} % of their spread elsewhere, "
+            f"{MOST_OPINION_PCT:g} % is sound: several lenses, or photos that do not tell the lens"
         )
-    )
+    for camera in model.cameras.values():
+        names = [i.name for i in model.images.values() if i.camera_id == camera.camera_id and i.name in own.lenses]
+        sure = [own.lenses[name].focal_px for name in names if own.lenses[name].points >= LEAST_POINTS]
+        if len(sure) >= LEAST_FOR_CHECK:
+            ratio = float(np.median(sure)) / camera.mean_focal_length()
+            spread_pct = 100.0 * float(np.std(np.log(sure)))
+            if abs(np.log(ratio)) > np.log(MOST_FOCAL_RATIO) or spread_pct > MOST_FOCAL_SPREAD_PCT:
+                out.append(
+                    f"lens of {names[0]}: {camera.mean_focal_length():.0f} px, its {len(sure)} photos by themselves "
+                    f"have {np.median(sure):.0f} px and scatter by {spread_pct:.0f} %; a zoom, or several lenses"
+                )
+    return out
+
+
+def _lenses(model: pycolmap.Reconstruction) -> list[dict[str, Any]]:
+    """Which registered photos each lens took: focal length, size and names."""
+    out = []
+    for camera in model.cameras.values():
+        names = sorted(i.name for i in model.images.values() if i.camera_id == camera.camera_id and i.has_pose)
+        if names:
+            size = {"width": camera.width, "height": camera.height}
+            out.append({"focal_px": float(camera.mean_focal_length()), **size, "photos": names})
+    return sorted(out, key=lambda one: str(one["photos"][0]))
+
+
+def left_out(model: pycolmap.Reconstruction, database: Path) -> list[dict[str, Any]]:
+    """Each photo that found no place, with the photo that it shares most verified matches with."""
+    placed = {image.name for image in model.images.values() if image.has_pose}
+    link = pycolmap.Database.open(database)
+    try:
+        names = {image.image_id: image.name for image in link.read_all_images()}
+        pair_ids, counts = link.read_two_view_geometry_num_inliers()
+    finally:
+        link.close()
+    best: dict[str, tuple[int, str]] = {name: (0, "") for name in names.values() if name not in placed}
+    for pair_id, count in zip(pair_ids, counts, strict=True):
+        one, two = (names[number] for number in pycolmap.pair_id_to_image_pair(pair_id))
+        for name, other in ((one, two), (two, one)):
+            if name in best and int(count) > best[name][0]:
+                best[name] = (int(count), other)
+    return [{"name": n, "partner": other or None, "matches": count} for n, (count, other) in sorted(best.items())]
 
 
 def _write_priors(database: Path, references: dict[str, Array], sigma_m: float) -> None:
@@ -296,6 +372,8 @@ MAX_MISFIT = 0.25
 def _plausibility(model: pycolmap.Reconstruction) -> dict[str, Any]:
     """How far the cameras are from what they see, and a word where that cannot be metres."""
     points = np.array([point.xyz for point in model.points3D.values()])
+    if len(points) == 0:
+        return {"surface_distance_m": None, "suspicion": None}
     rows = np.random.default_rng(0).choice(len(points), size=min(len(points), 2000), replace=False)
     depths = []
     for image in model.images.values():

@@ -8,12 +8,17 @@ import zlib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from wakewise.errors import EnvironmentFailure, InputError
+from wakewise.reconstruction.exif import exif_words
+
+if TYPE_CHECKING:
+    from wakewise.reconstruction.masks import Masks
 
 Image = NDArray[np.uint8]
 SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff")
@@ -21,6 +26,13 @@ MIN_PHOTOS = 2
 # Decoded photos that are kept for the stages after the first; more are decoded again.
 KEPT_BYTES = 400_000_000
 PNG = b"\x89PNG\r\n\x1a\n"
+# What cameras leave beside photographs, and what it is; named when it is passed over.
+_OTHERS = {
+    "video": (".mp4", ".mov", ".avi", ".mkv", ".mts", ".m4v", ".webm", ".insv", ".360"),
+    "HEIC": (".heic", ".heif", ".hif", ".avif"),
+    "RAW": (".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".rw2", ".raf", ".gpr", ".pef", ".srw", ".raw"),
+    "other images": (".webp", ".gif", ".jp2", ".jxl", ".psd", ".exr", ".hdr"),
+}
 # How files begin, and the suffixes that say so: COLMAP goes by the suffix.
 _BEGINNINGS = {
     b"\xff\xd8\xff": ("JPEG", (".jpg", ".jpeg")),
@@ -33,19 +45,24 @@ _BEGINNINGS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Photo:
-    """One photograph: file name, size in pixels, and a digest of its bytes."""
+    """One photograph: name below its folder, size in pixels, a digest of its bytes, what EXIF says of its camera."""
 
     name: str
     width: int
     height: int
     digest: str
+    camera: str = ""
 
 
 class PhotoStore:
-    """Photos of a folder, decoded once: kept as long as they are small enough together, else decoded at every call."""
+    """Photos of a folder, decoded once: kept as long as they are small enough together, else decoded at every call.
+
+    `masks` say what of them is not to be looked at.
+    """
 
     def __init__(self, folder: Path, most_bytes: int = KEPT_BYTES) -> None:
         self.folder = folder
+        self.masks: Masks | None = None
         self._left = most_bytes
         self._kept: dict[str, Image] = {}
         self._lock = threading.Lock()
@@ -83,7 +100,8 @@ class PhotoStore:
 def read_photos(folder: Path, store: PhotoStore | None = None, threads: int = 2) -> tuple[Photo, ...]:
     """Check every photograph of a folder by decoding it; sorted by name. Other files beside them are left alone.
 
-    What was decoded goes to `store`.
+    Where the folder holds no photographs but folders of them, as of the cameras of a rig, theirs are read, and are
+    named `folder/file`. What was decoded goes to `store`.
 
     Raises
     ------
@@ -95,18 +113,18 @@ def read_photos(folder: Path, store: PhotoStore | None = None, threads: int = 2)
         found = "is a file" if folder.exists() else "does not exist"
         raise InputError(f"{folder}: {found}; a folder of photos ({allowed}) is needed")
     files = sorted(p for p in folder.iterdir() if p.is_file() and not p.name.startswith("."))
-    images = [p for p in files if p.suffix.lower() in SUFFIXES]
+    images = [p for p in files if p.suffix.lower() in SUFFIXES] or _below(folder)
     if not images:
         inside = sorted(p.name for p in folder.iterdir() if p.is_dir() and not p.name.startswith("."))
         found = "is empty"
         if files:
             found = f"holds no photos ({files[0].name} is none)"
         elif inside:
-            found = f"holds only folders ({', '.join(inside[:3])}), whose photos are not looked for"
+            found = f"holds only folders ({', '.join(inside[:3])}) without photos"
         raise InputError(f"{folder}: {found}; at least {MIN_PHOTOS} photos ({allowed}) are needed")
     with ThreadPoolExecutor(threads) as pool:
         try:
-            photos = tuple(pool.map(lambda path: _read_photo(path, store), images))
+            photos = tuple(pool.map(lambda path: _read_photo(folder, path, store), images))
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
@@ -115,7 +133,32 @@ def read_photos(folder: Path, store: PhotoStore | None = None, threads: int = 2)
     return photos
 
 
-def _read_photo(path: Path, store: PhotoStore | None) -> Photo:
+def _below(folder: Path) -> list[Path]:
+    """Photographs of the folders in a folder."""
+    inside = sorted(p for p in folder.iterdir() if p.is_dir() and not p.name.startswith("."))
+    return [
+        p
+        for one in inside
+        for p in sorted(one.iterdir())
+        if p.is_file() and not p.name.startswith(".") and p.suffix.lower() in SUFFIXES
+    ]
+
+
+def passed_over(folder: Path) -> dict[str, int]:
+    """How many files beside the photographs hold pictures that are not read, by kind: video, HEIC, RAW, others.
+
+    In the folder itself, and in those in it where the photographs lie in them.
+    """
+    folders = [folder]
+    if not any(p.is_file() and p.suffix.lower() in SUFFIXES for p in folder.iterdir()):
+        folders += [p for p in folder.iterdir() if p.is_dir() and not p.name.startswith(".")]
+    files = [p for one in folders for p in one.iterdir() if p.is_file() and not p.name.startswith(".")]
+    suffixes = [p.suffix.lower() for p in files]
+    counts = {kind: sum(suffix in wanted for suffix in suffixes) for kind, wanted in _OTHERS.items()}
+    return {kind: count for kind, count in counts.items() if count}
+
+
+def _read_photo(folder: Path, path: Path, store: PhotoStore | None) -> Photo:
     data = path.read_bytes()
     if data.startswith(b"\xff\xd8") and not jpeg_is_whole(data):
         raise InputError(
@@ -131,10 +174,12 @@ def _read_photo(path: Path, store: PhotoStore | None) -> Photo:
         raise InputError(f"{path}: holds an image of another kind than JPEG, PNG, BMP or TIFF; save it as one of these")
     if path.suffix.lower() not in suffixes:
         raise InputError(f"{path}: holds a {kind} image, so its name must end in {suffixes[0]}, not {path.suffix}")
+    name = path.relative_to(folder).as_posix()
     if store is not None:
-        store.keep(path.name, image)
+        store.keep(name, image)
     height, width = image.shape[:2]
-    return Photo(name=path.name, width=width, height=height, digest=hashlib.blake2b(data, digest_size=16).hexdigest())
+    digest = hashlib.blake2b(data, digest_size=16).hexdigest()
+    return Photo(name=name, width=width, height=height, digest=digest, camera=exif_words(data))
 
 
 def without_duplicates(photos: tuple[Photo, ...]) -> tuple[tuple[Photo, ...], int]:

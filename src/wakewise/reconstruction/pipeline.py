@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from contextlib import nullcontext
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -16,35 +15,28 @@ from wakewise.errors import InputError
 from wakewise.files import write_json
 from wakewise.interfaces import Progress, no_progress
 from wakewise.processes import alone
-from wakewise.reconstruction.colmap import pycolmap
-from wakewise.reconstruction.dense import densify
-from wakewise.reconstruction.features import check_sizes, database_bytes, match_photos
 from wakewise.reconstruction.guided import Poses
+from wakewise.reconstruction.known_cameras import KnownCameras, match_known
+from wakewise.reconstruction.lens_groups import group_photos, known_groups, named_lenses
 from wakewise.reconstruction.lenses import Lens
-from wakewise.reconstruction.mapping import map_photos
-from wakewise.reconstruction.meshing import mesh_points
-from wakewise.reconstruction.pairs import BAND_NEIGHBOURS, POSE_NEIGHBOURS, Pairs, choose_pairs
-from wakewise.reconstruction.patchmatch import patch_match, require_cuda
-from wakewise.reconstruction.photos import Photo, PhotoStore, read_photos, without_duplicates
+from wakewise.reconstruction.look_alike import LOOK_ALIKES
+from wakewise.reconstruction.mapping import MAPPINGS
+from wakewise.reconstruction.masks import read_masks
+from wakewise.reconstruction.meshing import mesh_model
+from wakewise.reconstruction.pairs import BAND_NEIGHBOURS, POSE_NEIGHBOURS, by_looks, choose_pairs
+from wakewise.reconstruction.patchmatch import require_cuda
+from wakewise.reconstruction.photos import Photo, PhotoStore, passed_over, read_photos, without_duplicates
 from wakewise.reconstruction.references import match_references
+from wakewise.reconstruction.scale.stage import scale_model
 from wakewise.reconstruction.settings import ReconstructionSettings
-from wakewise.reconstruction.stages import StageResult, fingerprint, make_folder, need_room, read_stamp, run_stage
+from wakewise.reconstruction.stage_keys import stage_key
+from wakewise.reconstruction.stages import StageResult, make_folder, run_stage, withdraw
+from wakewise.reconstruction.steps import dense_step, map_step, match_step
 from wakewise.reconstruction.views import Ball
+from wakewise.reconstruction.wishes import Wishes
 
-# Part of every stage's fingerprint: raise it when a stage's result changes for the same input.
-VERSION = 7
-_STAGES = {
-    "match": ("detector", "max_features", "first_octave"),
-    "map": (
-        "mapper",
-        "refine_camera",
-        "reprojection_px",
-        "position_priors",
-        "prior_sigma_m",
-    ),
-    "dense": ("dense", "dense_px", "dense_zoom", "stereo_paths", "stereo_partners", "agreeing_views"),
-    "mesh": ("mesh_depth",),
-}
+LATER = ("scale_bars", "dense_points", "depth_maps", "point_spacing_mm", "mesh_vertices", "mesh_faces")
+"""Figures of stages that may not be asked for."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,11 +45,18 @@ class Model:
 
     pairs, verified_pairs, posed_pairs: of photos that were matched, that show the same, and those of them that were
     matched along epipolar lines of known poses. mapping: how the sparse model came about; poses_refused: why not from
-    known poses where that was tried. reprojection_px: mean over all observations. cameras_rmse_mm: distance of
-    registered cameras from their references after the similarity, None without references. reprojection_met: whether
-    the mean is below what the settings wish. duplicates: photos left out because another has the same bytes. suspicion:
-    a word where lengths cannot be metres. stages_s: what each stage took when it ran; `skipped` were done before.
-    wall_s: this call. A model without references has no scale, so its lengths are None.
+    known poses where that was tried. reprojection_px: mean over all observations that were kept; reprojection_uncut_px:
+    before the last cuts, which took cut_pct of them. cameras_rmse_mm: distance of registered cameras from their
+    references after the similarity, None without references. reprojection_met: whether the mean is below what the
+    settings wish and nothing speaks against the model; doubts: what does, in words. The figures that this rests on:
+    `verdict.Evidence`, and second_opinion_pct, how far cameras move, of their spread, when each photo has a lens of its
+    own. lenses: name, focal length, size and photos of each; lenses_split: whether photos that seemed to share one
+    turned out not to. left_out: each photo without a place, its best partner and their matches. sub_models: photos in
+    each model that came about; the first is kept. duplicates: photos left out because another has the same bytes.
+    passed_over: films and other files that are not read. suspicion: a word where lengths cannot be metres. stages_s:
+    what each stage took when it ran; `skipped` were done before.
+    wall_s: this call. scale_bars: what bars say of the scale, see `scale.stage.scale_model`.
+    A model without references has no scale, so its lengths are None.
     """
 
     images: int
@@ -66,6 +65,20 @@ class Model:
     points: int
     reprojection_px: float
     reprojection_met: bool
+    reprojection_uncut_px: float
+    cut_pct: float
+    doubts: list[str]
+    observations_per_photo: float
+    coverage_pct: float
+    angle_deg: float
+    agreeing_pairs_pct: float | None
+    held_out_px: float | None
+    second_opinion_pct: float | None
+    lenses: list[dict[str, Any]]
+    lenses_split: bool
+    left_out: list[dict[str, Any]]
+    sub_models: list[int]
+    passed_over: dict[str, int]
     track_length: float
     focal_px: float
     features_per_image: float
@@ -81,8 +94,9 @@ class Model:
     scale: float | None
     surface_distance_m: float | None
     suspicion: str | None
-    dense_points: int
-    depth_maps: int
+    scale_bars: dict[str, Any] | None
+    dense_points: int | None
+    depth_maps: int | None
     point_spacing_mm: float | None
     mesh_vertices: int | None
     mesh_faces: int | None
@@ -94,9 +108,15 @@ class Model:
         """All figures as plain values for JSON, with a reason (`why`) for each that is null."""
         figures = {**asdict(self), "skipped": list(self.skipped)}
         reason = {
+            "dense_points": "no dense points were asked for",
+            "depth_maps": "no dense points were asked for",
+            "scale_bars": "no bars were given",
             "mesh_vertices": "no mesh was asked for, or it is made after the figures",
             "mesh_faces": "no mesh was asked for, or it is made after the figures",
             "suspicion": "nothing looks suspicious",
+            "agreeing_pairs_pct": "no pair of registered photos has matches enough",
+            "held_out_px": "no point is seen by three photos",
+            "second_opinion_pct": "lenses were not looked into, or too few photos have a place in both models",
             "poses_refused": "the model came from known poses, or none were given, or hardly a pair fitted them",
         }
         why = {
@@ -104,6 +124,11 @@ class Model:
             for key, value in figures.items()
             if value is None
         }
+        if self.mapping == MAPPINGS["known"]:
+            why |= {
+                key: "the cameras are as they were given" for key in why if key.startswith(("cameras_", "reference_"))
+            }
+            why |= {key: "the cameras that were given were not doubted" for key in why if key == "second_opinion_pct"}
         return figures | {"why": why}
 
 
@@ -113,11 +138,14 @@ def reconstruct(
     settings: ReconstructionSettings | None = None,
     *,
     focal_px: float | None = None,
-    lens: Lens | None = None,
+    lens: Lens | Mapping[str, Lens] | None = None,
+    lens_patterns: Mapping[str, str] | None = None,
     pairs: Sequence[tuple[str, str]] | None = None,
     reference_positions: dict[str, Array] | None = None,
     reference_rotations: dict[str, Array] | None = None,
     region: tuple[Array, float] | None = None,
+    known: KnownCameras | None = None,
+    wishes: Wishes | None = None,
     progress: Progress = no_progress,
 ) -> Model:
     """Photos to a model in `out`: database.db, sparse/, dense.ply, mesh.ply, reconstruction.json.
@@ -130,8 +158,11 @@ def reconstruct(
         Folder of photographs.
     focal_px : float, optional
         Focal length in pixels to start from; it is refined.
-    lens : Lens, optional
-        Camera that took all the photos, such as a trial's in its cameras.txt; refined unless the settings say no.
+    lens : Lens or mapping, optional
+        Camera that took all the photos, such as a trial's in its cameras.txt, or one by name of a group; refined unless
+        the settings say no.
+    lens_patterns : mapping, optional
+        Names of lenses and shell patterns of their photos' names; see `lens_groups.group_photos`.
     pairs : sequence of two photo names, optional
         Which photos to match; else the settings choose.
     reference_positions : dict, optional
@@ -141,6 +172,11 @@ def reconstruct(
         chosen, matched and mapped from the poses, unless the settings say no or the photos say that they do not fit.
     region : (centre, radius), optional
         What the dense model is wanted of, in the frame of the references: shape (3,) in m, and m.
+    known : KnownCameras, optional
+        Poses and lenses of photos, in place of references and lenses: kept as they are, or where mapping begins, as the
+        settings say.
+    wishes : Wishes, optional
+        Bars that give scale, masks, a box to cut to, the last stage.
     progress : callable
         Called with (done, total, note) in units of a stage's own work.
 
@@ -159,24 +195,42 @@ def reconstruct(
     settings = settings or ReconstructionSettings()
     if settings.dense == "patch-match":
         require_cuda()
-    store = PhotoStore(photos)
+    wishes, store = wishes or Wishes(), PhotoStore(photos)
     found, duplicates = without_duplicates(read_photos(photos, store, settings.threads))
+    strangers: tuple[Photo, ...] = ()
+    fixed = known is not None and settings.known_cameras == "fixed"
+    if known is not None:
+        if reference_positions is not None or reference_rotations is not None or focal_px is not None:
+            raise InputError("cameras: known cameras are references and lenses; give no others beside them")
+        known = match_known(known, found)
+        reference_positions, reference_rotations = known.positions, known.rotations
+        if fixed:
+            strangers = tuple(photo for photo in found if photo.name not in known.positions)
+            found = tuple(photo for photo in found if photo.name in known.positions)
     names = [photo.name for photo in found]
+    store.masks = read_masks(photos, found, wishes.masks)
     if focal_px is not None and not (np.isfinite(focal_px) and focal_px > 0):
         raise InputError(f"focal length: {focal_px:g} px, must be above 0")
-    if lens is not None:
-        if focal_px is not None:
-            raise InputError("camera: give either a focal length or a calibrated camera, not both")
-        check_sizes(found, lens)
-    references = None if reference_positions is None else match_references(reference_positions, names)
+    if lens is not None and focal_px is not None:
+        raise InputError("camera: give either a focal length or a calibrated camera, not both")
+    groups = group_photos(found, lens_patterns, lens)
+    if known is not None and (fixed or known.lenses):
+        told = {photo: group.lens for group in groups for photo in group.photos if group.lens is not None}
+        groups = known_groups(found, told | known.lenses)
+    references = reference_positions
+    if references is not None and not fixed:
+        references = match_references(references, names)
     if settings.position_priors and references is None:
         raise InputError("position priors: need known camera positions")
     ball = _ball(region, references)
     axes = None if reference_rotations is None else {name: R[:, 2] for name, R in reference_rotations.items()}
     poses = _poses(settings, references, reference_rotations)
-    known = None if poses is None else {n: [*R.ravel().tolist(), *p.tolist()] for n, (R, p) in poses.items()}
+    if fixed and known is not None:
+        poses = {name: (known.rotations[name], known.positions[name]) for name in names}
+    begun = None if poses is None else {n: [*R.ravel().tolist(), *p.tolist()] for n, (R, p) in poses.items()}
     near = POSE_NEIGHBOURS if poses is None else BAND_NEIGHBOURS
     listed = choose_pairs(names, settings, references, axes, near) if pairs is None else [(a, b) for a, b in pairs]
+    alike = LOOK_ALIKES if pairs is None and poses is None and by_looks(len(names), settings) else 0
     make_folder(out)
     database, sparse, dense = out / "database.db", out / "sparse", out / "dense.ply"
 
@@ -185,46 +239,78 @@ def reconstruct(
         results["match"] = run_stage(
             out,
             "match",
-            _key(
+            stage_key(
                 settings,
                 "match",
                 "",
                 [asdict(photo) for photo in found],
                 focal_px,
-                lens and lens.numbers(),
+                [[g.name, g.photos, g.lens and g.lens.numbers()] for g in groups],
                 listed,
-                known,
+                begun,
+                alike,
+                *([] if store.masks is None else [store.masks.digests]),
             ),
             (database,),
-            lambda: _match(store, found, database, settings, focal_px, lens, listed, poses, progress),
+            lambda: match_step(
+                store, found, database, settings, focal_px, groups, listed, poses, fixed, alike, progress
+            ),
         )
         fit = 2 * results["match"].figures["posed_pairs"] >= results["match"].figures["pairs"]
         placed = None if references is None else {name: position.tolist() for name, position in references.items()}
         results["map"] = run_stage(
             out,
             "map",
-            _key(settings, "map", results["match"].key, placed),
+            stage_key(settings, "map", results["match"].key, placed, fixed),
             (sparse / "images.bin",),
-            lambda: _map(store, database, sparse, settings, len(found), references, poses if fit else None, progress),
+            lambda: map_step(
+                store,
+                database,
+                sparse,
+                settings,
+                len(found),
+                references,
+                poses if fit or fixed else None,
+                fixed,
+                progress,
+            ),
         )
+        bars, metric = wishes.bars, references is not None or wishes.bars is not None
+        if bars is None:
+            withdraw(out, "scale", "map")
+        else:
+            results["scale"] = run_stage(
+                out,
+                "scale",
+                stage_key(settings, "scale", results["map"].key, bars.key()),
+                (sparse / "images.bin",),
+                lambda: scale_model(store, sparse, bars, settings.threads, progress, keep=references is not None),
+            )
         place = None if ball is None else [ball.centre_W_m.tolist(), ball.radius_m]
-        results["dense"] = run_stage(
-            out,
-            "dense",
-            _key(settings, "dense", results["map"].key, place),
-            (dense,),
-            lambda: _densify(store, sparse, dense, settings, ball, progress),
-        )
-        if settings.mesh:
+        cut = [] if wishes.crop is None else [wishes.crop.key()]
+        if wishes.until != "sparse":
+            results["dense"] = run_stage(
+                out,
+                "dense",
+                stage_key(settings, "dense", results.get("scale", results["map"]).key, place, *cut),
+                (dense,),
+                lambda: dense_step(store, sparse, dense, settings, ball, fixed, wishes.crop, progress),
+            )
+        if settings.mesh and wishes.until == "mesh":
             results["mesh"] = mesh_model(out, settings, progress)
-    figures: dict[str, Any] = {"mesh_vertices": None, "mesh_faces": None}
+    figures: dict[str, Any] = dict.fromkeys(LATER)
     for result in results.values():
         figures |= result.figures
-    if references is None:
+    figures["lenses"] = named_lenses(figures["lenses"], groups)
+    figures["left_out"] = figures["left_out"] + [
+        {"name": photo.name, "partner": None, "matches": 0, "why": "no known camera"} for photo in strangers
+    ]
+    if not metric:
         figures["point_spacing_mm"] = None
     model = Model(
-        images=len(found),
+        images=len(found) + len(strangers),
         duplicates=duplicates,
+        passed_over=passed_over(photos),
         wall_s=time.perf_counter() - start,
         stages_s={name: result.wall_s for name, result in results.items()},
         skipped=tuple(name for name, result in results.items() if result.skipped),
@@ -232,108 +318,6 @@ def reconstruct(
     )
     write_json(out / "reconstruction.json", model.summary())
     return model
-
-
-def mesh_model(
-    out: Path, settings: ReconstructionSettings, progress: Progress = no_progress, *, held: bool = False
-) -> StageResult:
-    """Make mesh.ply of a model whose dense points are there, unless it was made of them already.
-
-    No figure of a model needs its surface, so this may come after all that does. `held`: the process that started this
-    one keeps others out of the folder.
-
-    Raises
-    ------
-    InputError
-        If there are no dense points of a reconstruction.
-    StageError
-        If no surface comes out of them.
-    EnvironmentFailure
-        If the disk is full, or a file cannot be read or written.
-    """
-    dense, mesh = out / "dense.ply", out / "mesh.ply"
-    known = read_stamp(out, "dense")
-    if not known or not dense.is_file():
-        raise InputError(f"{out}: holds no dense points of a reconstruction (dense.ply, stages/dense.json)")
-    spacing = 1e-3 * known["figures"]["point_spacing_mm"]
-    with nullcontext() if held else alone(out):
-        return run_stage(
-            out,
-            "mesh",
-            _key(settings, "mesh", known["key"]),
-            (mesh,),
-            lambda: mesh_points(dense, mesh, settings, spacing_m=spacing, progress=progress),
-        )
-
-
-def _key(settings: ReconstructionSettings, stage: str, before: str, *parts: Any) -> str:
-    """Fingerprint of all that a stage's result hangs on; `before` is that of the stage before."""
-    used = {field: getattr(settings, field) for field in _STAGES[stage]}
-    return fingerprint(VERSION, pycolmap.__version__, stage, before, used, parts)
-
-
-def _match(
-    store: PhotoStore,
-    photos: tuple[Photo, ...],
-    database: Path,
-    settings: ReconstructionSettings,
-    focal_px: float | None,
-    lens: Lens | None,
-    pairs: Pairs,
-    poses: Poses | None,
-    progress: Progress,
-) -> dict[str, Any]:
-    need_room(database.parent, database_bytes(len(photos), len(pairs), settings), "match")
-    return match_photos(
-        store.folder,
-        photos,
-        database,
-        settings,
-        focal_px=focal_px,
-        pairs=pairs,
-        progress=progress,
-        store=store,
-        lens=lens,
-        poses=poses,
-    )
-
-
-def _map(
-    store: PhotoStore,
-    database: Path,
-    sparse: Path,
-    settings: ReconstructionSettings,
-    photos: int,
-    references: dict[str, Array] | None,
-    poses: Poses | None,
-    progress: Progress,
-) -> dict[str, Any]:
-    # Points and tracks are a part of what the database holds; it is copied.
-    need_room(sparse.parent, 2.0 * database.stat().st_size, "map")
-    return map_photos(
-        store.folder,
-        database,
-        sparse,
-        settings,
-        photos=photos,
-        references=references,
-        progress=progress,
-        store=store,
-        poses=poses,
-    )
-
-
-def _densify(
-    store: PhotoStore,
-    sparse: Path,
-    dense: Path,
-    settings: ReconstructionSettings,
-    region: Ball | None,
-    progress: Progress,
-) -> dict[str, Any]:
-    if settings.dense == "patch-match":
-        return patch_match(store.folder, sparse, dense, settings, region=region, progress=progress)
-    return densify(store.folder, sparse, dense, settings, region=region, progress=progress, store=store)
 
 
 def _poses(

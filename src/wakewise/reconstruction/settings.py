@@ -24,10 +24,11 @@ class ReconstructionSettings(Settings):
     first_octave: Literal[-1, 0] = Field(
         default=-1, description="-1 doubles the photo before looking for features, for real photos; 0 is 4 times faster"
     )
-    matching: Literal["auto", "exhaustive", "sequential", "poses"] = Field(
+    matching: Literal["auto", "exhaustive", "sequential", "look-alike", "poses"] = Field(
         default="auto",
-        description="which photos to match: all pairs, neighbours in order of name (and laps by ever wider steps), or "
-        "neighbours by known camera poses; auto takes poses if known, else all pairs of a small set",
+        description="which photos to match: all pairs, neighbours in order of name (and laps by ever wider steps), "
+        "these and those that look alike, or neighbours by known camera poses; auto takes poses if known, else all "
+        "pairs up to 80 photos and look-alikes beyond",
     )
     mapper: Literal["poses", "incremental", "global"] = Field(
         default="poses",
@@ -45,6 +46,11 @@ class ReconstructionSettings(Settings):
         description="fit focal length and distortion to the photos, from EXIF or a given camera on; false keeps a "
         "given camera as it is",
     )
+    lens_check: bool = Field(
+        default=True,
+        description="map once more with a lens for each photo, which tells photos of several lenses that nobody told "
+        "of, and parts them",
+    )
     position_priors: bool = Field(
         default=False, description="let known camera positions pull at the model, instead of only placing it"
     )
@@ -53,6 +59,11 @@ class ReconstructionSettings(Settings):
         gt=0.0,
         le=100.0,
         description="standard deviation of a known camera position, m, where priors pull",
+    )
+    known_cameras: Literal["fixed", "priors"] = Field(
+        default="fixed",
+        description="what known poses and lenses of photos are: as they are, or where mapping begins from, for the "
+        "photos to correct",
     )
     dense: Literal["stereo", "patch-match"] = Field(
         default="stereo", description="dense points by semi-global stereo, or by COLMAP's patch-match, which needs CUDA"
@@ -69,7 +80,13 @@ class ReconstructionSettings(Settings):
     )
     agreeing_views: int = Field(default=2, ge=1, le=10, description="other depth maps that must agree with a point")
     mesh: bool = Field(default=True, description="make a surface mesh from the dense points")
-    mesh_depth: int = Field(default=9, ge=6, le=12, description="greatest octree depth of the Poisson surface")
+    mesh_depth: int = Field(
+        default=9,
+        ge=6,
+        le=12,
+        description="greatest octree depth of the Poisson surface across the subject, which holds nine tenths of the "
+        "points",
+    )
     threads: int = Field(
         default=2, ge=1, le=64, description="threads of feature extraction, matching, mapping and stereo"
     )

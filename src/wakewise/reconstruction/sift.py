@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from wakewise.arrays import BoolArray
 from wakewise.reconstruction.photos import Image, PhotoStore
 from wakewise.reconstruction.settings import ReconstructionSettings
 
@@ -62,6 +63,15 @@ def photo_features(image: Image, settings: ReconstructionSettings) -> Features:
         np.concatenate([place, more], axis=1).astype(np.float32)[keep],
         np.clip(np.rint(512.0 * root), 0, 255).astype(np.uint8)[keep],
     )
+
+
+def within(features: Features, mask: BoolArray | None) -> Features:
+    """Features less those whose pixel a mask, shape (h, w), hides."""
+    if mask is None:
+        return features
+    column, row = np.floor(features.keypoints[:, :2]).astype(np.int64).T
+    kept = mask[np.clip(row, 0, mask.shape[0] - 1), np.clip(column, 0, mask.shape[1] - 1)]
+    return Features(features.keypoints[kept], features.descriptors[kept])
 
 
 def stretched(grey: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -73,6 +73,14 @@ def run_stage(
     return StageResult(figures=figures, wall_s=wall_s, key=key, skipped=False)
 
 
+def withdraw(folder: Path, name: str, changed: str) -> None:
+    """Forget a stage that is no longer asked for; the stage whose files it changed is done again."""
+    stamps = folder / "stages"
+    if (stamps / f"{name}.json").exists():
+        (stamps / f"{changed}.json").unlink(missing_ok=True)
+        (stamps / f"{name}.json").unlink()
+
+
 def need_room(folder: Path, size_bytes: float, name: str) -> None:
     """Check for room before a stage whose library ends the whole process when the disk is full, as COLMAP's does.
 

@@ -105,8 +105,8 @@ def pair_depth(
         return None
     c_one = np.array([-left, -top], dtype=np.float64)
     c_two = c_one + np.array([zero, 0.0])
-    a = _resample(photos[i], one, R, focal, c_one, (width, height))
-    b = _resample(photos[j], two, R, focal, c_two, (width, height))
+    a = resample(photos[i], one, R, focal, c_one, (width, height))
+    b = resample(photos[j], two, R, focal, c_two, (width, height))
     matcher = cv2.StereoSGBM.create(
         lowest,
         count,
@@ -194,7 +194,7 @@ def _window(view: View, R_CW: Array, focal: float, region: Ball | None) -> tuple
     return left, top, width, height
 
 
-def _resample(photo: Image, view: View, R_CW: Array, focal: float, centre_px: Array, size: tuple[int, int]) -> Image:
+def resample(photo: Image, view: View, R_CW: Array, focal: float, centre_px: Array, size: tuple[int, int]) -> Image:
     """The photo as a pinhole camera of the same centre turned to R_CW would have taken it."""
     # COLMAP has pixel centres at +0.5, OpenCV at 0.
     K = np.array(

@@ -6,7 +6,8 @@ say figures in words, `page.py` is HTML with its style and script, `figures.py`,
 `looks.py` and `scene3d.py` are the pictures, `ink.py` their colours, `limits.py` what the water gets wrong, `trim.py`
 what ballast the flight lacked, `coverage.py` what its photographs saw. Studies have pages of their own: `wake.py` with
 `wake_plots.py`, `target.py`, `gentle.py`, `operator.py`, `degradation.py`; `vehicle/` is a vehicle's, `log.py` with
-`log_plots.py` a real vehicle's log's.
+`log_plots.py` a real vehicle's log's, `look.py` that of a look at photographs, `photo_model/` that of the model made
+from them.
 """
 
 from typing import TYPE_CHECKING

@@ -53,7 +53,7 @@ def _headline(facts: dict[str, Any]) -> str:
         for name, value in (("log", facts["file"]), ("format", facts["format"]), ("vehicle", facts["vehicle"]))
     )
     why = (
-        f"Wash is D, the weighted sum of squared speeds at {escape(facts['points'])}, by the wake model "
+        f"Wash is D, the weighted sum of squared speeds at points {escape(facts['points'])}, by the wake model "
         f"{escape(facts['wake_model'])}; the same forces and moments, shared among the thrusters otherwise."
     )
     bad = facts["bad_records"]

@@ -29,7 +29,7 @@ from wakewise.reports.ink import (
 Lines = list[tuple[str, Array, str]]
 SHARES = (("flown", "as flown", CORAL), ("least", "least thrusts", SAND), ("gentle", "gentle", TEAL))
 MIDDLE_US = 1500.0
-LEAST_SPAN = {"sticks": 1.0, "depth": 0.5, "roll": 20.0, "heading": 20.0, "battery": 1.0}
+LEAST_SPAN = {"sticks": 1.0, "depth": 0.5, "roll": 20.0, "heading": 20.0, "place": 1.0, "battery": 1.0}
 """Smallest scales that are drawn: less than these is noise."""
 
 
@@ -39,7 +39,7 @@ def column(rows: pl.DataFrame, name: str) -> Array:
 
 
 def dive(rows: pl.DataFrame, narrow: bool = False) -> Figure | None:
-    """Sticks, depth, attitude and voltage on one clock; modes named above, shaded while armed."""
+    """Sticks, depth, attitude, place and voltage on one clock; modes named above, shaded while armed."""
     panels = [(label, lines) for label, lines in _panels(rows) if any(np.isfinite(y).any() for _, y, _ in lines)]
     if not panels:
         return None
@@ -75,7 +75,7 @@ def thrusts(rows: pl.DataFrame, names: Sequence[str], narrow: bool = False) -> F
     """Flown and gentle thrusts over time, one row each."""
     parts = [
         (title, np.stack([column(rows, f"{share}_{i + 1}_N") for i in range(len(names))]))
-        for share, title in (("flown", "as flown"), ("gentle", "gentle, same wrench"))
+        for share, title in (("thrust", "as flown"), ("gentle", "gentle, same wrench"))
     ]
     return _strip(rows, parts, names, "thrust (N)", 1e-6, narrow)
 
@@ -107,6 +107,8 @@ def _panels(rows: pl.DataFrame) -> Iterator[tuple[str, Lines]]:
     # A line that jumps from 360 to 0 is no turn.
     heading[1:][np.abs(np.diff(heading)) > 180.0] = np.nan
     yield "heading\n(deg)", [("heading", heading, SLATE)]
+    places = (("north", "est_x_m", TEAL), ("east", "est_y_m", CORAL))
+    yield "place (m)", [(name, column(rows, found), colour) for name, found, colour in places]
     yield "battery (V)", [("battery", column(rows, "voltage_V"), SLATE)]
 
 

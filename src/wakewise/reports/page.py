@@ -103,10 +103,11 @@ def scene_box(html: str, legend: str, poster: str = "") -> str:
     )
 
 
-def fold(title: str, content: str, note: str = "") -> str:
+def fold(title: str, content: str, note: str = "", folded: bool = False) -> str:
     """A part with a heading that can be folded; a phone folds it at first."""
     aside = f"<span>{escape(note)}</span>" if note else ""
-    return f'<details class="fold" open><summary>{escape(title)}{aside}</summary>{content}</details>'
+    way = "" if folded else " open"
+    return f'<details class="fold"{way}><summary>{escape(title)}{aside}</summary>{content}</details>'
 
 
 def chip(colour: str, name: str) -> str:

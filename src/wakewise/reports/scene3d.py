@@ -59,7 +59,7 @@ def scene_html(trial: Trial, errors: ModelErrors | None) -> str | None:
         return None
     # viser greets on standard output, which belongs to the command line's own answer.
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-        with _unheard():
+        with unheard():
             server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
             scene = server.scene
@@ -78,7 +78,7 @@ def scene_html(trial: Trial, errors: ModelErrors | None) -> str | None:
 
 
 @contextlib.contextmanager
-def _unheard() -> Iterator[None]:
+def unheard() -> Iterator[None]:
     """Keep viser's server from listening: nobody is to connect, and a report needs no port, not even a local one."""
 
     @contextlib.asynccontextmanager

@@ -1,0 +1,280 @@
+"""The report of a model from photographs: whether it can be trusted, the model, its scale, every photograph."""
+
+from __future__ import annotations
+
+import json
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from wakewise.arrays import IntArray
+from wakewise.errors import InputError
+from wakewise.files import write_text
+from wakewise.reconstruction.photo_facts import ModelFacts, model_facts
+from wakewise.reports.ink import TEAL, dress, new_figure
+from wakewise.reports.page import chip, fold, missing, plot, scene_box, section, tile, whole_page
+from wakewise.reports.photo_model.scene import model_scene
+from wakewise.reports.words import number
+
+PARTS = (
+    ("model", "Model"),
+    ("scale", "Scale"),
+    ("matches", "Matches"),
+    ("photos", "Photographs"),
+    ("cut", "Cut"),
+    ("figures", "Figures"),
+)
+_LONG = 12
+
+
+def write_model_report(model: Path, photos: Path) -> Path:
+    """Write report.html into the folder of a model that `wakewise reconstruct` made; it opens with no network.
+
+    Raises
+    ------
+    InputError
+        If the folder holds no such model.
+    """
+    try:
+        figures = json.loads((model / "reconstruction.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        raise InputError(f"{model}: holds no reconstruction.json that can be read") from None
+    facts = model_facts(model)
+    path = model / "report.html"
+    write_text(path, model_page(model.resolve().name, figures, facts, model_scene(model, photos, facts)))
+    return path
+
+
+def model_page(name: str, figures: dict[str, Any], facts: ModelFacts, scene: str | None) -> str:
+    """HTML of the report."""
+    links = "".join(f'<a href="#{anchor}">{title}</a>' for anchor, title in PARTS)
+    body = (
+        f'<header class="top">{_headline(name, figures)}</header>'
+        f'<nav class="parts" aria-label="parts"><div>{links}</div></nav><main>{_model(figures, facts, scene)}'
+        f"{_scale(figures)}{_matches(facts)}{_photos(figures, facts)}{_cut(figures)}{_figures(figures)}</main>"
+        "<footer><p>The model's files are beside this page: sparse/ (COLMAP), dense.ply, mesh.ply, mesh.glb.</p>"
+        "</footer>"
+    )
+    return whole_page(f"{name} · model", body)
+
+
+def _headline(name: str, figures: dict[str, Any]) -> str:
+    doubts = figures["doubts"]
+    images, placed = figures["images"], figures["registered_images"]
+    said = "The model is doubtful" if doubts else f"A sound model of {placed} of {images} photographs"
+    reasons = "".join(f'<p class="why">{escape(line)}</p>' for line in doubts)
+    return (
+        f'<p class="eyebrow"><span>model <b>{escape(name)}</b></span></p>'
+        f'<h1 class="{"bad" if doubts else "good"}"><span class="mark"></span>{escape(said)}</h1>{reasons}'
+        f'<dl class="tiles">{_tiles(figures)}</dl>'
+    )
+
+
+def _tiles(figures: dict[str, Any]) -> str:
+    bars, scale = figures.get("scale_bars"), figures.get("scale")
+    placed, images = figures["registered_images"], figures["images"]
+    if bars is not None and bars["used"]:
+        size = tile("scale", f"± {number(bars['uncertainty_pct'], 2)}", "%", f"by {len(bars['bars'])} bars")
+    elif scale is not None:
+        size = tile("scale", number(figures["cameras_rmse_mm"]), "mm", "cameras from their references, rms")
+    else:
+        size = tile("scale", "–", "", "no bars, no reference cameras")
+    spacing = figures.get("point_spacing_mm")
+    dense = figures.get("dense_points")
+    faces = figures.get("mesh_faces")
+    note = "apart: no scale" if spacing is None else f"{number(spacing, 2)} mm apart"
+    surface = "not asked for" if faces is None else "triangles"
+    cut = f"mean; {figures['reprojection_uncut_px']:.2f} before {figures['cut_pct']:.0f} % was cut"
+    return (
+        tile("photographs placed", str(placed), f"of {images}", "have a place in the model", _state(placed == images))
+        + tile("error", f"{figures['reprojection_px']:.2f}", "px", cut)
+        + size
+        + tile("sparse points", _count(figures["points"]), "", f"in {figures['track_length']:.1f} photos each")
+        + tile("dense points", "–" if dense is None else _count(dense), "", "not asked for" if dense is None else note)
+        + tile("surface", "–" if faces is None else _count(faces), "", surface)
+    )  # fmt: skip
+
+
+def _state(good: bool) -> str:
+    return "ok" if good else "off"
+
+
+def _count(value: int) -> str:
+    return f"{value:,}".replace(",", " ") if value < 1_000_000 else f"{value / 1e6:.2f} M"
+
+
+def _model(figures: dict[str, Any], facts: ModelFacts, scene: str | None) -> str:
+    lead = (
+        "Turn it by dragging, come nearer by the wheel. Surface, points and photographs can be switched in the scene's "
+        f"tree. Its cameras were found {figures['mapping']}."
+    )
+    placed = sum(photo.p_WC is not None for photo in facts.photos)
+    legend = chip("#d9562b", f"{placed} photographs") + chip("#8fa0a6", f"{_count(len(facts.points))} sparse points")
+    content = missing("the model", "no photograph has a place") if scene is None else scene_box(scene, legend)
+    return section("model", "The model", lead, content)
+
+
+def _scale(figures: dict[str, Any]) -> str:
+    bars = figures.get("scale_bars")
+    if bars is None and figures.get("scale") is None:
+        lead = "The model has no scale: its lengths mean nothing by themselves."
+        how = (
+            "<p>Lay two or more bars between coded targets into the scene (<code>--bar A,B,LENGTH</code>), or give the "
+            "places of the cameras (<code>--reference-cameras</code>).</p>"
+        )
+        return section("scale", "Scale", lead, how)
+    if bars is None:
+        return section(
+            "scale", "Scale", "From the places of the cameras that were given.", _facts(_references(figures))
+        )
+    lead = (
+        f"From {len(bars['bars'])} bars between coded targets, uncertain by {number(bars['uncertainty_pct'], 2)} %."
+        if bars["used"]
+        else f"From reference cameras; by the bars, lengths are {bars['model_off_pct']:+.3f} % off."
+    )
+    head = _row(("bar", "stated", "in the model", "off", "by the other bars", "photos"), "th", "tlrrrr")
+    rows = "".join(
+        _row(
+            (
+                bar["name"],
+                f"{1e3 * bar['length_m']:.2f} ± {1e3 * bar['sigma_m']:.2f} mm",
+                f"{1e3 * bar['found_m']:.2f} mm",
+                f"{round(bar['off_mm'], 2) + 0.0:+.2f} mm",
+                "only one" if bar["check_pct"] is None else f"{bar['check_pct']:+.3f} %",
+                str(bar["photos"]),
+            ),
+            "td",
+            "tlrrrr",
+        )
+        for bar in bars["bars"]
+    )
+    table = f"<table><thead>{head}</thead><tbody>{rows}</tbody></table>"
+    targets = "".join(
+        _row(
+            (
+                str(one["target"]),
+                str(one["photos"]),
+                f"{one['error_px']:.2f} px",
+                f"{np.mean(one['sides_mm']):.2f} mm",
+                ", ".join(f"{value:.4f}" for value in one["middle_m"]),
+            ),
+            "td",
+            "trrrl",
+        )
+        for one in bars["targets"]
+    )
+    if targets:
+        head = _row(("target", "photos", "error", "side", "middle, m"), "th", "trrrl")
+        inner = f"<table><thead>{head}</thead><tbody>{targets}</tbody></table>"
+        table += fold(f"Targets ({bars['family']})", inner, f"{len(bars['targets'])}")
+    return section("scale", "Scale", lead, table)
+
+
+def _references(figures: dict[str, Any]) -> list[tuple[str, str]]:
+    return [
+        ("cameras from their references", f"{number(figures['cameras_rmse_mm'])} mm rms, "
+         f"{number(figures['cameras_max_mm'])} mm at most"),
+        ("references that fit", str(figures["reference_inliers"])),
+        ("surface", f"{number(figures['surface_distance_m'])} m from the cameras"),
+    ]  # fmt: skip
+
+
+def _facts(rows: list[tuple[str, str]]) -> str:
+    return f'<dl class="facts">{"".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in rows)}</dl>'
+
+
+def _row(cells: tuple[str, ...], tag: str, kinds: str) -> str:
+    classes = {"t": "", "l": "", "r": ' class="num"'}
+    inner = [f"<{tag}{classes[k]}>{escape(cell)}</{tag}>" for cell, k in zip(cells, kinds, strict=True)]
+    return f"<tr>{''.join(inner)}</tr>"
+
+
+def _matches(facts: ModelFacts) -> str:
+    partners = (facts.matches > 0).sum(axis=1)
+    lead = (
+        f"Each photograph shares verified matches with {int(np.median(partners))} others (median). Breaks in the band "
+        "along the diagonal are where a path was interrupted; blocks away from it are where it came back."
+    )
+    return section(
+        "matches",
+        "What is matched with what",
+        lead,
+        plot(match_figure(facts.matches), "verified matches between photographs", "Photographs in order of name; the "
+             "darker, the more matches.", "fewer than two photographs"),
+    )  # fmt: skip
+
+
+def match_figure(matches: IntArray) -> Figure | None:
+    """Matrix of verified matches, shape (n, n), as a picture; None for fewer than two photographs."""
+    count = len(matches)
+    if count < 2:
+        return None
+    figure = new_figure(9.6, 5.0)
+    axes = figure.subplots()
+    dress(axes, x="photograph", y="photograph", grid="")
+    i, j = np.nonzero(matches)
+    strength = np.sqrt(matches[i, j] / matches.max())
+    size = (280.0 / count) ** 2
+    axes.scatter(i + 1, j + 1, s=size, marker="s", c=TEAL, alpha=0.15 + 0.85 * strength, linewidths=0)
+    axes.set_xlim(0.5, count + 0.5)
+    axes.set_ylim(count + 0.5, 0.5)
+    axes.set_aspect("equal")
+    return figure
+
+
+def _photos(figures: dict[str, Any], facts: ModelFacts) -> str:
+    left = {one["name"]: one for one in figures["left_out"]}
+    head = _row(
+        ("photograph", "place", "features", "points seen", "error", "partners", "focal length"), "th", "tlrrrrr"
+    )
+    rows = []
+    for k, photo in enumerate(facts.photos):
+        partners = int((facts.matches[k] > 0).sum())
+        place = "yes"
+        if photo.p_WC is None:
+            best = left.get(photo.name)
+            place = f"none; {best['matches']} matches with {best['partner']}" if best and best["partner"] else "none"
+        error = "–" if photo.error_px is None else f"{photo.error_px:.2f} px"
+        cells = (photo.name, place, str(photo.features), str(photo.observations), error, str(partners),
+                 f"{photo.focal_px:.0f} px")  # fmt: skip
+        rows.append(_row(cells, "td", "tlrrrrr"))
+    table = f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody></table>"
+    lead = "Errors are means over the sparse points that a photograph sees, each point's over all that see it."
+    content = fold("Every photograph", table, f"{len(rows)}") if len(rows) > _LONG else table
+    return section("photos", "Photographs", lead, content)
+
+
+def _cut(figures: dict[str, Any]) -> str:
+    rows = [
+        ("observations cut", f"{figures['cut_pct']:.1f} %, error {figures['reprojection_uncut_px']:.2f} px before and "
+         f"{figures['reprojection_px']:.2f} px after"),
+        ("photographs without a place", ", ".join(one["name"] for one in figures["left_out"][:20]) or "none"),
+        ("copies left out", str(figures["duplicates"])),
+        ("models that came about", ", ".join(f"{count} photos" for count in figures["sub_models"]) or "–"),
+        ("files not read", ", ".join(f"{n} of {kind}" for kind, n in figures["passed_over"].items()) or "none"),
+    ]  # fmt: skip
+    return section("cut", "What was cut", "What the model rests on no longer, and why it may be missed.", _facts(rows))
+
+
+def _figures(figures: dict[str, Any]) -> str:
+    why = figures.get("why", {})
+    rows = ""
+    for key, value in figures.items():
+        if isinstance(value, (dict, list)) or key == "why":
+            continue
+        said = why.get(key, "no reason was given") if value is None else _plain(value)
+        kind = "" if value is None else ' class="num"'
+        rows += f'<tr><td class="key">{escape(key)}</td><td{kind}>{escape(said)}</td></tr>'
+    stages = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in figures["stages_s"].items())
+    table = f'<table class="main"><tbody>{rows}</tbody></table>'
+    lead = f"As in reconstruction.json. Stages took: {stages}."
+    return section("figures", "All figures", escape(lead), fold("All figures", table))
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return number(value) if isinstance(value, float) else str(value)
