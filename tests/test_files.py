@@ -1,5 +1,6 @@
 """Files: whole or not there."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,29 @@ def test_a_block_that_fails_leaves_nothing(tmp_path: Path) -> None:
         raise KeyboardInterrupt
     assert path.read_text() == '{\n  "rmse_mm": 1.5\n}\n'
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_lasts_is_on_the_disk_before_it_has_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """First the file's content is settled, then it is named, then the folder that holds the name is settled."""
+    told: list[str] = []
+    replace, settle = Path.replace, os.fsync
+
+    def replaced(path: Path, target: Path) -> Path:
+        told.append("named")
+        return replace(path, target)
+
+    def settled(handle: int) -> None:
+        there = Path(f"/proc/self/fd/{handle}").resolve() if Path("/proc/self/fd").is_dir() else None
+        told.append("settled" if there is None else "folder" if there.is_dir() else f"file of {there.stat().st_size}")
+        settle(handle)
+
+    monkeypatch.setattr(Path, "replace", replaced)
+    monkeypatch.setattr(os, "fsync", settled)
+    write_json(tmp_path / "figures.json", 1.5, lasting=True)
+    if "settled" in told:  # no /proc: only the order is seen
+        assert told == ["settled", "named", "settled"]
+    else:
+        assert told == ["file of 4", "named", "folder"]
 
 
 def test_a_folder_appears_whole(tmp_path: Path) -> None:

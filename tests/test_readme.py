@@ -5,13 +5,15 @@ import re
 import shlex
 from pathlib import Path
 
+import polars as pl
 import pytest
 import typer
 
 from wakewise.cli.main import app
 
 ROOT = Path(__file__).parents[1]
-PAGES = ["README.md", "CONTRIBUTING.md", "docs/README.md", "docs/python.md", "docs/extending.md", "docs/worlds.md"]
+PAGES = ["README.md", "CONTRIBUTING.md"]
+PAGES += [f"docs/{name}.md" for name in ("README", "python", "extending", "worlds", "reproduce", "campaigns")]
 
 
 def blocks(page, language=""):
@@ -111,6 +113,31 @@ def test_the_python_of_docs_python_runs(tmp_path, monkeypatch):
     exec("\n".join(told).replace("duration_s=13.0", "duration_s=1.0"), names)
     assert names["flight"].figures["target_speed_mean_m_s"] >= 0.0
     assert names["gentle"].gap < 1e-6
+
+
+def test_the_python_of_docs_campaigns_runs(tmp_path, monkeypatch, capsys):
+    """The statistics run on a campaign's table, and what needs a cluster is Python at least."""
+    monkeypatch.chdir(tmp_path)
+    rows = [
+        {
+            "target": "brain",
+            "world": "mud",
+            "seed": seed,
+            "method": method,
+            "target_speed_mean_m_s": mm_s * 1e-3 + noise,
+        }
+        for method, mm_s in (("dp", 8.0), ("unaware", 9.0), ("wake-aware", 3.0))
+        for seed, noise in enumerate((0.0, 1e-4, -2e-4, {"dp": 3e-4, "unaware": 1e-4, "wake-aware": 0.0}[method]))
+    ]
+    pl.DataFrame(rows).write_parquet("trials.parquet")
+    ran = [block for block in blocks("docs/campaigns.md", "python") if "trials.parquet" in block]
+    assert len(ran) == 1
+    exec(ran[0], {})
+    assert re.findall(r"^(-\d\.\d) mm/s against (\w+)", capsys.readouterr().out, re.MULTILINE) == [
+        ("-5.1", "dp"),
+        ("-6.0", "unaware"),
+    ]
+    assert len([ast.parse(block) for block in blocks("docs/campaigns.md", "python")]) == 4
 
 
 def bare(text):

@@ -17,8 +17,11 @@ _MOST_HEAD_LINES, _LONGEST_LINE = 1000, 10_000
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """Give a temporary path beside `path`, same suffix; rename it into place if the block ends well, else remove it."""
+def whole_file(path: Path, lasting: bool = False) -> Iterator[Path]:
+    """Give a temporary path beside `path`, same suffix; rename it into place if the block ends well, else remove it.
+
+    What is `lasting` is there, whole, after a power cut too: file and folder are on the disk when the block is left.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(prefix=half_done(path.stem), suffix=path.suffix, dir=path.parent)
     os.close(handle)
@@ -26,9 +29,27 @@ def whole_file(path: Path) -> Iterator[Path]:
     try:
         yield temporary
         temporary.chmod(0o644)
+        if lasting:
+            settle(temporary)
         temporary.replace(path)
+        if lasting:
+            settle(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def settle(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk (fsync)."""
+    try:
+        handle = os.open(path, os.O_RDONLY)
+    except PermissionError:  # Windows opens no folders
+        if path.is_dir():
+            return
+        raise
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 @contextmanager
@@ -46,15 +67,15 @@ def whole_folder(path: Path) -> Iterator[Path]:
         shutil.rmtree(temporary, ignore_errors=True)
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write `text` whole or not at all."""
-    with whole_file(path) as temporary:
+def write_text(path: Path, text: str, lasting: bool = False) -> None:
+    """Write `text` whole or not at all; `lasting` as in `whole_file`."""
+    with whole_file(path, lasting) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
-def write_json(path: Path, value: Any) -> None:
-    """Write JSON whole or not at all; NaN and infinity are refused, since JSON has none."""
-    write_text(path, json.dumps(value, indent=2, allow_nan=False) + "\n")
+def write_json(path: Path, value: Any, lasting: bool = False) -> None:
+    """Write JSON whole or not at all; NaN and infinity are refused, since JSON has none. `lasting` as above."""
+    write_text(path, json.dumps(value, indent=2, allow_nan=False) + "\n", lasting)
 
 
 def broken_promise(path: Path) -> str | None:

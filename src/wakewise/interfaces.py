@@ -132,6 +132,14 @@ class ScalarGrid:
         highest = float(self.values.max(initial=0.0))
         return highest if self.outer is None else max(highest, self.outer.largest)
 
+    def largest_near(self, p_W_m: Array, reach_m: float) -> float:
+        """Largest value that either grid may have within reach of a place, shape (3,); 0 where there is no grid."""
+        low = np.floor((p_W_m - reach_m - self.origin_W_m) / self.spacing_m).astype(np.int64)
+        high = np.ceil((p_W_m + reach_m - self.origin_W_m) / self.spacing_m).astype(np.int64) + 1
+        near = self.values[tuple(slice(max(0, a), max(0, b)) for a, b in zip(low, high, strict=True))]
+        highest = float(near.max(initial=0.0))
+        return highest if self.outer is None else max(highest, self.outer.largest_near(p_W_m, reach_m))
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FlakeCloud:

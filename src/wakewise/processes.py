@@ -19,7 +19,7 @@ _held: set[tuple[Path, int]] = set()
 
 def half_done(stem: str) -> str:
     """How the name of a temporary file or folder of this process begins, to which eight random characters are added."""
-    return f".{stem}.w{os.getpid()}-{_start(os.getpid()):x}."
+    return f".{stem}.w{os.getpid()}-{start_of(os.getpid()):x}."
 
 
 def sweep(folder: Path) -> None:
@@ -45,7 +45,7 @@ def is_running(pid: int, start: int) -> bool:
         return False
     except PermissionError:  # another user's
         pass
-    return _start(pid) in (start, 0)
+    return start_of(pid) in (start, 0)
 
 
 @contextmanager
@@ -90,7 +90,7 @@ def _take(folder: Path) -> int:
             with suppress(FileNotFoundError):
                 if os.fstat(handle).st_ino == path.stat().st_ino:
                     os.truncate(handle, 0)
-                    os.write(handle, f"{os.getpid()} {_boot()}\n".encode())
+                    os.write(handle, f"{os.getpid()} {boot_id()}\n".encode())
                     return handle
         except BaseException:
             os.close(handle)
@@ -113,16 +113,20 @@ def _locked(handle: int) -> bool:
     return True
 
 
-def _start(pid: int) -> int:
-    """When a process started, in the kernel's ticks; 0 where the system does not say."""
+def start_of(pid: int) -> int:
+    """When a process started, in the kernel's ticks; 0 where the system does not say, -1 if it has ended.
+
+    One that has ended has a number still while nobody has asked how.
+    """
     try:
         facts = Path("/proc", str(pid), "stat").read_text(encoding="utf-8", errors="replace")
     except OSError:
         return 0
-    return int(facts.rpartition(")")[2].split()[19])
+    words = facts.rpartition(")")[2].split()
+    return -1 if words[0] in ("Z", "X") else int(words[19])
 
 
-def _boot() -> str:
+def boot_id() -> str:
     """Which start of the computer this is."""
     try:
         return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="utf-8").strip()

@@ -42,7 +42,7 @@ class Listed:
     name : str
         Its full name, as in wakewise.planning.kernels.horizon.
     types : tuple
-        Of its arguments, in the words of `wakewise.compiled.type_of`.
+        Of its arguments, in the words of `wakewise.numba_kernels.type_of`.
     job : str
         The first of `JOBS` that calls it.
     cost_s : float
@@ -264,7 +264,7 @@ def _made_from(job: str) -> str:
     import llvmlite.binding as llvm
     import numba
 
-    from wakewise.compiled import digest
+    from wakewise.numba_kernels import digest
 
     root = Path(__file__).resolve().parent
     whole = sha256(f"{numba.__version__} {sys.version_info[:2]} {llvm.get_host_cpu_name()}".encode())
@@ -277,7 +277,7 @@ def _made_from(job: str) -> str:
 
 def _compile_what_is_asked(asked: Iterable[str], answers: IO[str]) -> None:
     """Compile the kernels that lines of JSON name, and answer each line with one."""
-    from wakewise.compiled import type_from
+    from wakewise.numba_kernels import type_from
 
     # Looking for garbage is a fifth of Numba's time in Python; done seldom, it costs memory that goes with the process.
     gc.freeze()

@@ -30,7 +30,7 @@ def test_a_log_becomes_a_folder(capsys: Capture, tmp_path: Path, monkeypatch: py
     assert said["directions"] == list(made_logs.DIRECTIONS)
     assert said["saved_pct"] > 50.0
     rows = pl.read_parquet(out / "steps.parquet")
-    assert {"time_s", "stick_forward", "servo_1_us", "depth_m", "flown_1_N", "gentle_8_N", "saved_pct"} <= set(
+    assert {"time_s", "stick_forward", "servo_1_us", "depth_m", "thrust_1_N", "gentle_8_N", "saved_pct"} <= set(
         rows.columns
     )
     assert json.loads((out / "log.json").read_text())["rows"] == len(rows)
@@ -44,6 +44,31 @@ def test_a_log_becomes_a_folder(capsys: Capture, tmp_path: Path, monkeypatch: py
     assert "saved" in told
     assert "no page: pip install" in told
     assert not (tmp_path / "other" / "report.html").exists()
+
+
+def test_a_logs_folder_goes_where_a_trials_goes(capsys: Capture, tmp_path: Path) -> None:
+    """Poses as TUM files and a ROS 2 bag with thrusts; of a log without places the bag holds thrusts, and no pose."""
+    pytest.importorskip("rosbags", reason="the extra `ros` is not installed")
+    for name, position in (("placed", True), ("blind", False)):
+        (tmp_path / f"{name}.tlog").write_bytes(made_logs.tlog(position=position))
+        assert run(["link", "log", str(tmp_path / f"{name}.tlog"), "--out", str(tmp_path / name), "--json"]) == 0
+    capsys.readouterr()
+    rows = pl.read_parquet(tmp_path / "placed" / "steps.parquet")
+    assert rows["est_x_m"][100] == pytest.approx(1.0, abs=1e-3)
+    assert rows["est_y_m"][100] == pytest.approx(-2.0, abs=1e-3)
+    blind = pl.read_parquet(tmp_path / "blind" / "steps.parquet")
+    assert blind["est_x_m"].null_count() == len(blind)
+    assert blind["est_z_m"][100] == pytest.approx(5.0, abs=1e-3)
+    assert run(["export", str(tmp_path / "placed"), "--to", "tum", "--json"]) == 0
+    poses = json.loads(capsys.readouterr().out)["poses"]
+    assert poses > 150
+    told = {}
+    for name in ("placed", "blind"):
+        assert run(["export", str(tmp_path / name), "--to", "rosbag2", "--json"]) == 0
+        told[name] = json.loads(capsys.readouterr().out)["messages"]
+    assert told["placed"] > told["blind"] > 300
+    assert run(["export", str(tmp_path / "blind"), "--to", "tum"]) == 2
+    assert "poses" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ the split thrusts (T+, T-) >= 0. The multipliers of the wrench give a lower boun
 
 from __future__ import annotations
 
-import daqp
 import numpy as np
 
 from wakewise.arrays import Array
@@ -31,6 +30,8 @@ def convex_allocation(
     weights : ndarray, shape (3,)
         (w_D, w_u, w_p).
     """
+    import daqp  # nobody else here needs it, and 32-bit computers have none
+
     alive = np.flatnonzero(upper > lower)
     m = len(alive)
     n = len(start)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import null_space
 
 from wakewise.arrays import Array, freeze, frozen
 from wakewise.errors import InputError
@@ -77,7 +76,8 @@ def compile_layout(B: Array, lower_N: Array, upper_N: Array) -> Layout:
         scaling = axis_scaling(B[:, alive])
         scaled = B[:, alive] * scaling[:, None]
         inverse[alive] = np.linalg.pinv(scaled, rcond=1e-9) * scaling
-        basis = null_space(scaled, rcond=1e-9)
+        _, sizes, rows = np.linalg.svd(scaled)
+        basis = rows[np.count_nonzero(sizes > 1e-9 * sizes[0]) :].T
         null = np.zeros((n, basis.shape[1]))
         null[alive] = basis
     if null.shape[1] > MOST_SPARE:

@@ -1,10 +1,11 @@
-"""What of a wrench can be made within limits: all of it, its largest share, or its axes in an order of priority."""
+"""What of a wrench can be made within limits: all of it, its largest share, or its axes in an order of priority.
+
+Solvers are imported where they are needed: layouts whose null space is lines need none, nor SciPy.
+"""
 
 from __future__ import annotations
 
-import daqp
 import numpy as np
-from scipy.optimize import linprog, nnls
 
 from wakewise.allocation.layout import Layout, axis_scaling
 from wakewise.allocation.search import box_range
@@ -60,6 +61,8 @@ def by_priority(layout: Layout, wrench_B: Array, groups: tuple[tuple[int, ...], 
     What a group has got is not given back for those after it (lexicographic least squares, one quadratic program per
     group). Moments are measured against forces at the thrusters' lever arm.
     """
+    import daqp
+
     n = layout.B.shape[1]
     alive = layout.upper_N > layout.lower_N
     if not np.any(alive):
@@ -125,6 +128,8 @@ def _box_scale(thrusts: Array, lower: Array, upper: Array) -> float:
 
 def _within_polytope(layout: Layout, thrusts: Array) -> tuple[Array, float]:
     """The same for null spaces in one piece: linear programming over (alpha, lambda), then the smallest lambda."""
+    from scipy.optimize import linprog
+
     Z = layout.null
     rows = np.vstack([np.column_stack([thrusts, Z]), np.column_stack([-thrusts, -Z])])
     limits = np.concatenate([layout.upper_N, -layout.lower_N])
@@ -166,6 +171,8 @@ def _least_shift(layout: Layout, thrusts: Array) -> Array | None:
     Least-distance programming by non-negative least squares (C. L. Lawson and R. J. Hanson, Solving Least Squares
     Problems, 1974, chapter 23).
     """
+    from scipy.optimize import nnls
+
     rows = np.vstack([layout.null, -layout.null])
     limits = np.concatenate([layout.lower_N - thrusts, thrusts - layout.upper_N])
     E = np.vstack([rows.T, limits])

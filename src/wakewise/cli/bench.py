@@ -9,6 +9,7 @@ import typer
 
 from wakewise.cli.bench_gentle import show_gentle
 from wakewise.cli.bench_operator import show_operator
+from wakewise.cli.bench_traps import show_traps
 from wakewise.cli.bench_worlds import show_worlds
 from wakewise.cli.console import Bars, print_json, shown
 from wakewise.cli.options import Json
@@ -48,7 +49,7 @@ Scenarios = Annotated[
     str,
     typer.Option(
         help="gentle: which, with commas between: orbit (both vehicles), orbit/paper, worlds, world/mud, paper (the "
-        "paper's own world); all if not given.",
+        "paper's own world); traps: by name; all if not given.",
         show_default=False,
     ),
 ]
@@ -153,6 +154,8 @@ def bench(
             show_operator(result)
         elif each == "worlds":
             show_worlds(result)
+        elif each == "traps":
+            show_traps(result)
         else:
             _show(result, "  ")
 

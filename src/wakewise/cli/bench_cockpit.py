@@ -55,8 +55,9 @@ def _latency(options: BenchOptions) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def _coverage(options: BenchOptions) -> tuple[dict[str, Any], dict[str, Any]]:
+    from wakewise.campaigns.versions import source_version
     from wakewise.operation import load_scenario
-    from wakewise.studies.flight_store import PHOTOGRAPHS, source_version, store_folder
+    from wakewise.studies.flight_store import PHOTOGRAPHS, store_folder
     from wakewise.trials import run_trial
     from wakewise.trials.coverage import measure_coverage
 

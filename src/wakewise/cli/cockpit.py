@@ -38,6 +38,16 @@ Host = Annotated[
         "--host", help="Address to listen at. Any but this computer's own asks for the token that is printed then."
     ),
 ]
+Origins = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--origin",
+        metavar="URL",
+        help="Where browsers ask for the page if a proxy stands before it, as BlueOS does: http://192.168.2.2; may be "
+        "given more than once. The token is asked of everybody then.",
+        show_default=False,
+    ),
+]
 Gamepad = Annotated[bool, typer.Option("--gamepad", help="Fly with a gamepad at this computer, too.")]
 Mapping = Annotated[
     Path | None,
@@ -62,6 +72,7 @@ def cockpit(
     sets: Sets = None,
     port: Port = 8765,
     host: Host = "127.0.0.1",
+    origin: Origins = None,
     gamepad: Gamepad = False,
     mapping: Mapping = None,
     no_browser: NoBrowser = False,
@@ -75,18 +86,19 @@ def cockpit(
     from wakewise.extras import need
 
     need("wakewise cockpit", "cockpit")
-    from wakewise.cockpit.gate import is_loopback
     from wakewise.cockpit.server import Server
     from wakewise.cockpit.session import Session
     from wakewise.operation import load_scenario
+    from wakewise.serving.gate import is_loopback, origin_of
 
+    origins = tuple(origin_of(text) for text in origin or ())
     changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, world=world)
     resolved = load_scenario(preset, scenario, changes)
     folder = out or default_folder(resolved, "cockpit")
     with ExitStack() as stack:
         device = stack.enter_context(_gamepad(mapping)) if gamepad or mapping is not None else None
         session = Session(resolved, folder, device=device, scene=is_loopback(host))
-        server = Server(session, host, port)
+        server = Server(session, host, port, origins=origins)
         server.start()
         stack.callback(server.stop)
         stack.callback(session.stop)

@@ -8,9 +8,10 @@ from __future__ import annotations
 import json
 import math
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, suppress
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,12 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
+
+
+HEARTBEAT_S = 30.0
+"""Longest silence of a stage whose progress goes into a pipe or a file."""
+INTERRUPTED = threading.Event()
+"""Set by Ctrl-C; whoever tells of progress afterwards is stopped, should the interrupt itself have been swallowed."""
 
 
 @cache
@@ -30,7 +37,8 @@ def _stderr() -> Console:
 class Bars:
     """A `Watch` that shows a progress bar while a stage runs and leaves one line behind it.
 
-    Where standard error is no terminal only that line is written. A stage that fails leaves nothing: the error speaks.
+    Where standard error is no terminal that line is written, and one now and then before it, so that a log shows life.
+    A stage that fails leaves nothing more: the error speaks.
     """
 
     @contextmanager
@@ -54,15 +62,46 @@ class Bars:
             task = progress.add_task(name, total=None, note="")
 
             def advance(done: float, total: float, note: str = "") -> None:
+                if INTERRUPTED.is_set():
+                    raise KeyboardInterrupt
                 progress.update(task, completed=done, total=total, note=note)
+                where[:] = [done, total, note]
 
-            yield advance
+            where: list[Any] = [0, 0, ""]
+            with nullcontext() if stderr.is_terminal else _heartbeat(name, where):
+                yield advance
         took_s = round(time.perf_counter() - began)
         stderr.print(f"[green]✓[/] {name:<12} {took_s // 60:>3}:{took_s % 60:02} min")
 
     def skipped(self, name: str) -> None:
         """Say that a stage was already done."""
         _stderr().print(f"[green]✓[/] {name:<12} [dim]already done")
+
+
+@contextmanager
+def _heartbeat(name: str, where: list[Any]) -> Iterator[None]:
+    """Write where a stage is (done, total, note) to standard error every half minute while the block runs.
+
+    By a thread of its own, as the work may not speak for longer than that.
+    """
+    over = threading.Event()
+    began = time.perf_counter()
+
+    def beat() -> None:
+        while not over.wait(HEARTBEAT_S):
+            done, total, note = where
+            took_s = round(time.perf_counter() - began)
+            share = f" {100.0 * done / total:.0f} %" if total else ""
+            with suppress(OSError, ValueError):  # nobody reads on
+                _stderr().print(f"  {name}{share} {note}, {took_s // 60}:{took_s % 60:02} min", markup=False)
+
+    thread = threading.Thread(target=beat, name="heartbeat", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
 
 
 def print_json(value: Any) -> None:

@@ -1,4 +1,4 @@
-"""`wakewise evaluate`: a cloud against a true mesh or against depth maps of surveyed cameras."""
+"""`wakewise evaluate`: a cloud against a true mesh, another cloud, or depth maps of surveyed cameras."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 Cloud = Annotated[Path, typer.Argument(help="Reconstructed points or mesh (PLY), in metres.")]
 Reference = Annotated[
     Path | None,
-    typer.Option("--reference", help="True surface, a mesh in the same frame and metres.", show_default=False),
-]
+    typer.Option("--reference", help="True surface in the same frame and metres: a mesh, or a cloud such as a laser "
+                 "scan's.", show_default=False),
+]  # fmt: skip
 Depths = Annotated[
     Path | None,
     typer.Option("--depth-maps", help="True depths instead: an .npz file with an array depth (n, h, w), m.",
@@ -47,6 +48,15 @@ Unit = Annotated[
 ]
 
 
+Thresholds = Annotated[
+    str | None,
+    typer.Option("--thresholds", metavar="LIST", help="Distances at which shares are counted: mm, as 0.5,1,2, or "
+                 "percent of the truth's extent, as 0.5%,1%; 0.25%,0.5%,1% if not given.", show_default=False),
+]  # fmt: skip
+Figures = tuple[dict[str, Any], dict[str, tuple[str, str]]]
+"""Values and what they are: unit and definition by key."""
+
+
 def evaluate(
     cloud: Cloud,
     reference: Reference = None,
@@ -54,6 +64,7 @@ def evaluate(
     cameras: Cameras = None,
     bed_z: Bed = None,
     unit_m: Unit = 1.0,
+    thresholds: Thresholds = None,
     no_icp: NoIcp = False,
     colours: Colours = None,
     json: Json = False,
@@ -65,17 +76,23 @@ def evaluate(
     from wakewise.reconstruction import read_cloud
 
     if (reference is None) == (depth_maps is None):
-        raise InputError("evaluate: give either --reference MESH or --depth-maps NPZ with --cameras FOLDER")
+        raise InputError("evaluate: give either --reference MESH or CLOUD, or --depth-maps NPZ with --cameras FOLDER")
     if not unit_m > 0.0:
         raise InputError(f"--unit-m {unit_m:g}: must be above 0")
+    if depth_maps is not None and thresholds is not None:
+        raise InputError("--thresholds: depth maps have their own, 5, 10, 20 and 50 mm")
     points = read_cloud(cloud).points_m
-    if reference is not None:
-        figures, definitions = _against_mesh(points, reference, cameras, bed_z, unit_m, not no_icp, colours)
-    else:
+    if reference is None:
         figures, definitions = _against_depths(points, depth_maps, cameras)
+    else:
+        figures, definitions = _against_reference(
+            cloud, points, reference, cameras, bed_z, unit_m, thresholds, not no_icp, colours
+        )
+    _remark(figures)
     if json:
         why = {key: "camera positions were not given (--cameras)" for key, value in figures.items() if value is None}
         why |= {key: "ICP was not wished for" for key in why if key.startswith("icp_")}
+        why |= {key: "the model is no mesh" for key in why if key == "model_faults"}
         units = {key: unit for key, (unit, _) in definitions.items()}
         print_json(
             figures | {"why": why, "units": units, "definitions": {k: text for k, (_, text) in definitions.items()}}
@@ -88,46 +105,144 @@ def evaluate(
     table.add_column("value", justify="right")
     table.add_column("what it is")
     for key, value in figures.items():
-        table.add_row(key, shown(value), definitions[key][1])
+        if not isinstance(value, (list, dict)) and key != "model_faults":
+            table.add_row(key, shown(value), definitions[key][1])
     print_table(table)
+    for share in figures.get("shares", ()):
+        typer.echo(
+            f"within {share['threshold_mm']:.3g} mm: {share['accuracy_pct']:.1f} % of the model, "
+            f"{share['completeness_pct']:.1f} % of the truth, F {share['f_score']:.1f}"
+        )
 
 
-def _against_mesh(
+def _remark(figures: dict[str, Any]) -> None:
+    """Faults of the meshes, and thresholds that say nothing of so small a thing, on standard error."""
+    from wakewise.evaluation.soundness import MeshFaults
+    from wakewise.evaluation.thresholds import TELLING_PCT
+
+    for key, name in (("reference_faults", "reference"), ("model_faults", "model")):
+        for words in MeshFaults(**figures[key]).words() if figures.get(key) else ():
+            typer.echo(f"wakewise: {name}: {words}", err=True)
+    extent = figures.get("extent_mm")
+    if extent is not None and "completeness_pct" in figures and 0.01 * TELLING_PCT * extent < 3.0:
+        typer.echo(
+            f"wakewise: 3 mm are {300.0 / extent:.0f} % of this object's {extent:.0f} mm: completeness_pct, f_score "
+            "and success say little, see the shares (--thresholds)",
+            err=True,
+        )
+
+
+def _against_reference(
+    cloud: Path,
     points: Array,
     reference: Path,
     cameras: Path | None,
     bed_z: float | None,
     unit_m: float,
+    thresholds: str | None,
     icp: bool,
     colours: Path | None,
-) -> tuple[dict[str, Any], dict[str, tuple[str, str]]]:
-    import numpy as np
-
+) -> Figures:
+    """Against a mesh, or against a cloud where the file has no faces."""
+    from wakewise.errors import StageError
     from wakewise.extras import need
 
     need("wakewise evaluate", "photos", only=("embreex", "small_gicp"))
-    from wakewise.evaluation import SURFACE_DEFINITIONS, Crop, compare_surface, error_colours, suspicious_scale
-    from wakewise.reconstruction import Cloud as Points
-    from wakewise.reconstruction import read_reference_cameras, write_cloud
-    from wakewise.targets import read_mesh
+    import numpy as np
 
-    mesh = read_mesh(reference)
+    from wakewise.evaluation import error_colours
+    from wakewise.reconstruction import Cloud as Points
+    from wakewise.reconstruction import write_cloud
+
+    try:
+        figures, definitions, aligned, error_mm = _measured(
+            cloud, points, reference, cameras, bed_z, unit_m, thresholds, icp
+        )
+    except StageError as fault:
+        if bed_z is not None:
+            raise
+        raise StageError(f"{fault}; if the model holds the bed that the object stands on, say where: --bed-z") from None
+    if colours is not None:
+        none = np.zeros_like(aligned)
+        write_cloud(colours, Points(points_m=aligned, normals=none, colours=error_colours(error_mm)))
+    return figures, definitions
+
+
+def _measured(
+    cloud: Path,
+    points: Array,
+    reference: Path,
+    cameras: Path | None,
+    bed_z: float | None,
+    unit_m: float,
+    thresholds: str | None,
+    icp: bool,
+) -> tuple[dict[str, Any], dict[str, tuple[str, str]], Array, Array]:
+    """Figures, definitions, the aligned model and its errors in mm."""
+    import numpy as np
+
+    from wakewise.evaluation import (
+        CLOUD_DEFINITIONS,
+        MESH_REFERENCE_DEFINITIONS,
+        SURFACE_DEFINITIONS,
+        Crop,
+        compare_clouds,
+        compare_surface,
+        extent_m,
+        mesh_faults,
+        read_thresholds,
+        suspicious_scale,
+    )
+    from wakewise.evaluation.surface import suspicious_extent
+    from wakewise.reconstruction import read_cloud, read_reference_cameras
+    from wakewise.targets import read_mesh
+    from wakewise.targets.mesh import READABLE_SUFFIXES, FacelessFileError
+
+    mesh = None
+    if reference.suffix.lower() in READABLE_SUFFIXES or not reference.is_file():
+        try:
+            mesh = read_mesh(reference)
+        except FacelessFileError:
+            mesh = None
+    if mesh is None:
+        if cameras is not None:
+            raise InputError(f"--cameras: what they saw of {reference} is not known, it has no faces")
+        truth = unit_m * read_cloud(reference).points_m
+        if (words := suspicious_extent(points, truth)) is not None:
+            raise InputError(f"{words} (--unit-m)")
+        wanted = read_thresholds(thresholds, 1e3 * extent_m(truth))
+        found = compare_clouds(points, truth, wanted, bed_z_m=bed_z, icp=icp)
+        figures = dataclasses.asdict(found.score) | {"shares": [dataclasses.asdict(one) for one in found.shares]}
+        return figures, CLOUD_DEFINITIONS, found.points_W_m, found.error_mm
     if unit_m != 1.0:
         mesh = dataclasses.replace(mesh, vertices_m=unit_m * mesh.vertices_m)
     suspicion = suspicious_scale(points, mesh)
     if suspicion is not None:
         raise InputError(f"{suspicion} (--unit-m)")
     centres = np.array(list(read_reference_cameras(cameras).values())) if cameras else None
-    found = compare_surface(points, mesh, crop=Crop(bed_z_m=bed_z), camera_centres_W_m=centres, icp=icp)
-    if colours is not None:
-        none = np.zeros_like(found.points_W_m)
-        write_cloud(colours, Points(points_m=found.points_W_m, normals=none, colours=error_colours(found.error_mm)))
-    return dataclasses.asdict(found.score), SURFACE_DEFINITIONS
+    extent_mm = 1e3 * extent_m(mesh.vertices_m)
+    wanted = read_thresholds(thresholds, extent_mm)
+    try:
+        compared = compare_surface(
+            points, mesh, crop=Crop(bed_z_m=bed_z), camera_centres_W_m=centres, icp=icp, thresholds_mm=wanted
+        )
+    except InputError as fault:
+        raise InputError(f"{fault}; --bed-z {bed_z:g} is its height, z down" if bed_z is not None else fault) from None
+    try:
+        own: dict[str, int] | None = dataclasses.asdict(mesh_faults(read_mesh(cloud)))
+    except InputError:
+        own = None
+    more = {
+        "extent_mm": extent_mm,
+        "shares": [dataclasses.asdict(one) for one in compared.shares],
+        "reference_faults": dataclasses.asdict(mesh_faults(mesh)),
+        "model_faults": own,
+    }
+    definitions = SURFACE_DEFINITIONS | MESH_REFERENCE_DEFINITIONS
+    return dataclasses.asdict(compared.score) | more, definitions, compared.points_W_m, compared.error_mm
 
 
-def _against_depths(
-    points: Array, depth_maps: Path | None, cameras: Path | None
-) -> tuple[dict[str, Any], dict[str, tuple[str, str]]]:
+def _against_depths(points: Array, depth_maps: Path | None, cameras: Path | None) -> Figures:
     from wakewise.evaluation import DEPTH_DEFINITIONS, compare_depths, read_depth_views
 
     if depth_maps is None or cameras is None:

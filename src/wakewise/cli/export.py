@@ -1,4 +1,4 @@
-"""`wakewise export`: a trial, or a vehicle's allocation matrix, as files that other tools open."""
+"""`wakewise export`: a trial, a folder of trials, or a vehicle's allocation matrix, as files that other tools open."""
 
 from __future__ import annotations
 
@@ -8,13 +8,17 @@ from typing import Annotated
 import typer
 
 from wakewise.cli.console import print_json
+from wakewise.cli.export_dataset import DatasetWords, export_dataset
 from wakewise.cli.options import Json
 from wakewise.errors import InputError
 
 Trial = Annotated[
-    Path | None, typer.Argument(metavar="trial", help="Folder of a trial that was flown.", show_default=False)
+    Path | None,
+    typer.Argument(
+        metavar="trial", help="Folder of a trial that was flown; dataset: of a campaign, too.", show_default=False
+    ),
 ]
-To = Annotated[str, typer.Option("--to", help="nerfstudio, colmap, tum, rosbag2, qgc-plan; auv_controllers.")]
+To = Annotated[str, typer.Option("--to", help="nerfstudio, colmap, tum, rosbag2, qgc-plan; dataset; auv_controllers.")]
 VehicleName = Annotated[
     str | None,
     typer.Option("--vehicle", help="auv_controllers: library name or vehicle YAML file.", show_default=False),
@@ -42,6 +46,34 @@ At = Annotated[
     str | None,
     typer.Option("--origin", metavar="LAT,LON", help="qgc-plan: the world's origin in degrees.", show_default=False),
 ]
+Licence = Annotated[
+    str | None,
+    typer.Option(
+        "--license", help="dataset: SPDX name, such as CC-BY-4.0, or the address of another.", show_default=False
+    ),
+]
+Creator = Annotated[
+    list[str] | None,
+    typer.Option("--creator", help="dataset: who made it; may be repeated.", show_default=False),
+]
+Name = Annotated[str | None, typer.Option("--name", help="dataset: its name; the folder's.", show_default=False)]
+Url = Annotated[str | None, typer.Option("--url", help="dataset: where it will be found.", show_default=False)]
+Date = Annotated[
+    str | None, typer.Option("--date", metavar="YYYY-MM-DD", help="dataset: of publication; today.", show_default=False)
+]
+Version = Annotated[
+    str | None, typer.Option("--version", metavar="X.Y.Z", help="dataset: its version; 1.0.0.", show_default=False)
+]
+Answers = Annotated[
+    Path | None,
+    typer.Option(
+        "--answers",
+        metavar="YAML",
+        help="dataset: answers that its data sheet asks for: purpose, funding, period, ethics, maintenance.",
+        show_default=False,
+    ),
+]
+Check = Annotated[bool, typer.Option("--check", help="dataset: hold a data set against its check sums instead.")]
 
 
 def export(
@@ -52,6 +84,14 @@ def export(
     poses: Poses = "true",
     origin: At = None,
     frame: Frame = "fsd",
+    licence: Licence = None,
+    creator: Creator = None,
+    name: Name = None,
+    url: Url = None,
+    date: Date = None,
+    version: Version = None,
+    answers: Answers = None,
+    check: Check = False,
     json: Json = False,
 ) -> None:
     """Export a trial to other tools: trainers of splats and NeRFs, COLMAP, evo, ROS 2, QGroundControl.
@@ -59,7 +99,28 @@ def export(
     Frames become those of the tool: OpenGL cameras and z up for nerfstudio, ENU and FLU in bags; COLMAP and TUM keep
     north-east-down. A plan has a waypoint per photograph at its depth; satellites place none of them to a decimetre.
     With --vehicle, write its allocation matrix as ROS 2's auv_controllers take it.
+
+    A data set takes all trials of a folder, what a controller could know apart from the truth, with Croissant metadata,
+    check sums and a data sheet; it goes on where it was cut off.
     """
+    words = DatasetWords(
+        licence=licence,
+        creators=tuple(creator or ()),
+        name=name,
+        url=url,
+        published=date,
+        version=version,
+        answers=answers,
+        check=check,
+    )
+    if to == "dataset":
+        if trial is None or vehicle is not None:
+            raise InputError("export --to dataset: give the folder of a campaign, of trials or of one, and no vehicle")
+        if origin is not None or poses != "true" or frame != "fsd":
+            raise InputError("export --to dataset: no --origin, --poses or --frame; it keeps all poses as they are")
+        export_dataset(trial, out, words, json)
+        return
+    words.refuse_beside(to or "FORMAT")
     if to == "auv_controllers":
         if vehicle is None or trial is not None:
             raise InputError("export --to auv_controllers: give --vehicle NAME and no trial")

@@ -7,7 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from wakewise.cli import link_ardusub, link_script, link_sitl
 from wakewise.cli.console import Bars, print_json, shown
+from wakewise.cli.link_meter import meter
+from wakewise.cli.link_points import Ahead, Points, WakeModelName, region_ahead, region_words
+from wakewise.cli.link_sensors import sensors
 from wakewise.cli.options import Json
 
 if TYPE_CHECKING:
@@ -18,6 +22,13 @@ if TYPE_CHECKING:
     from wakewise.vehicles import Vehicle
 
 app = typer.Typer(help="Real vehicles and what they recorded.", rich_markup_mode=None)
+app.command("meter")(meter)
+app.command("sensors")(sensors)
+
+app.command("ardusub")(link_ardusub.ardusub)
+app.command("script")(link_script.script)
+app.command("sitl")(link_sitl.sitl)
+app.command("stand-in")(link_sitl.stand_in)
 
 DEFAULT_VEHICLE = "bluerov2-heavy"
 
@@ -31,26 +42,6 @@ Flown = Annotated[
         help="Library name or vehicle YAML file of the vehicle that was flown; bluerov2-heavy if not given.",
         show_default=False,
     ),
-]
-Ahead = Annotated[
-    float,
-    typer.Option(
-        "--ahead",
-        metavar="M",
-        help="From the bow to the middle of a ball of 0.5 m across, which stands for the target.",
-    ),
-]
-Points = Annotated[
-    Path | None,
-    typer.Option(
-        "--points",
-        help="CSV with x_m, y_m, z_m from the middle of the vehicle (forward, right, down) and weight: what to spare "
-        "instead.",
-        show_default=False,
-    ),
-]
-WakeModelName = Annotated[
-    str, typer.Option("--wake-model", help="paper, paper-calibrated, fitted, linear, jet or jet-fitted.")
 ]
 Out = Annotated[
     Path | None, typer.Option("--out", help="Folder for table, figures and page; runs/log-NAME if not given.")
@@ -69,8 +60,9 @@ def log(
 ) -> None:
     """Read a vehicle's log, however damaged, and say what gentler thrusts would have spared at each instant.
 
-    Leaves steps.parquet (sticks, servo outputs, depth, attitude, thrusts, D on one clock), log.json, parameters.csv
-    and report.html. A bad record is a packet with a wrong checksum, or a stretch of bytes that is no record.
+    Leaves steps.parquet (sticks, servo outputs, depth, attitude, pose, thrusts, D on one clock), log.json,
+    parameters.csv and report.html: a folder that `wakewise export` takes to rosbag2 and tum like a trial's. A bad
+    record is a packet with a wrong checksum, or a stretch of bytes that is no record.
     """
     from wakewise.errors import InputError
     from wakewise.extras import has
@@ -80,7 +72,7 @@ def log(
     from wakewise.vehicles import load_vehicle
 
     chosen = load_vehicle(vehicle or DEFAULT_VEHICLE)
-    region = _region(chosen, ahead, points)
+    region = region_ahead(chosen, ahead, points)
     folder = out or Path("runs") / f"log-{file.stem}"
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--out {folder}: a file is there, a folder is needed")
@@ -93,7 +85,7 @@ def log(
     facts = {
         "vehicle": chosen.name,
         "wake_model": wake_model,
-        "points": str(points) if points else f"of a ball {ahead:g} m ahead of the bow",
+        "points": region_words(ahead, points),
         **log_facts(found, table, looked, why_not),
     }
     write_folder(folder, found, table, looked, facts)
@@ -108,20 +100,6 @@ def log(
         print_json(facts)
     else:
         _show(facts, folder, page)
-
-
-def _region(vehicle: Vehicle, ahead: float, points: Path | None) -> Region:
-    import numpy as np
-
-    from wakewise.cli.points import read_points
-    from wakewise.geometry import Pose
-    from wakewise.links.logs.hindsight import bow_points
-    from wakewise.targets import Region
-
-    if points is None:
-        return bow_points(vehicle, ahead)
-    places, weights = read_points(points, vehicle, Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])))
-    return Region(points_W_m=places, weights=weights, distance_m=np.zeros(len(places)))
 
 
 def _hindsight(

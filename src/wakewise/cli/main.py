@@ -17,6 +17,7 @@ from wakewise.cli import (
     allocate,
     bench,
     calibrate,
+    campaign,
     cockpit,
     colour,
     compare,
@@ -27,6 +28,7 @@ from wakewise.cli import (
     link,
     nerf,
     reconstruct,
+    reproduce,
     scan,
     tank,
     target,
@@ -35,6 +37,7 @@ from wakewise.cli import (
     warm,
     world,
 )
+from wakewise.cli.console import INTERRUPTED
 from wakewise.errors import InputError, MissingExtra, WakewiseError
 
 app = typer.Typer(
@@ -58,6 +61,7 @@ app.command("colour")(colour.colour)
 app.command("nerf")(nerf.nerf)
 app.command("allocate")(allocate.allocate)
 app.command("bench")(bench.bench)
+app.command("reproduce")(reproduce.reproduce)
 app.command("warm")(warm.warm)
 app.add_typer(vehicle.app, name="vehicle")
 app.add_typer(tank.app, name="tank")
@@ -65,6 +69,7 @@ app.add_typer(target.app, name="target")
 app.add_typer(wake.app, name="wake")
 app.add_typer(world.app, name="world")
 app.add_typer(link.app, name="link")
+app.add_typer(campaign.app, name="campaign")
 
 _INTERRUPTED = 130
 _TERMINATED = 143
@@ -171,11 +176,21 @@ def _terminate(*_: Any) -> None:
     raise KeyboardInterrupt
 
 
+def _interrupt(*_: Any) -> None:
+    """Ctrl-C: remembered as well as raised, since libraries that try imports or call back from C may swallow it."""
+    INTERRUPTED.set()
+    raise KeyboardInterrupt
+
+
 def main() -> None:
     """Entry point of the installed command."""
     if isinstance(sys.stdout, io.TextIOWrapper):  # a figure with a sign that the terminal lacks is still a figure
         sys.stdout.reconfigure(errors="replace")
     signal.signal(signal.SIGTERM, _terminate)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a job in the background has it ignored
+        signal.signal(signal.SIGINT, _interrupt)
     if numba_cache.CHOSEN is not None:
         _say(f"compiled code is kept in {numba_cache.CHOSEN}: the package's folder and the user's cache are read-only")
-    sys.exit(run())
+    code = run()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is said: an impatient Ctrl-C must not end it with a stack
+    sys.exit(code)

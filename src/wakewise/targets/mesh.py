@@ -24,6 +24,10 @@ LARGEST_COORDINATE = 1e9
 """Beyond this, in any unit, single precision has lost the shape of a target."""
 
 
+class FacelessFileError(InputError):
+    """A file of points without faces, which is no mesh but may be a cloud."""
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """A triangle mesh in metres; whose frame it is in is for the owner to say.
@@ -144,7 +148,9 @@ def read_mesh(path: Path | str) -> Mesh:
     path = Path(path)
     vertices, faces = _read(path)
     if len(faces) == 0:
-        raise InputError(f"{path}: no faces found, a target needs triangles (a point cloud must be meshed first)")
+        raise FacelessFileError(
+            f"{path}: no faces found, a target needs triangles (a point cloud must be meshed first)"
+        )
     if not np.all(np.isfinite(vertices)):
         raise InputError(f"{path}: a vertex is NaN or infinite, every coordinate must be finite")
     if len(vertices) and np.abs(vertices).max() > LARGEST_COORDINATE:

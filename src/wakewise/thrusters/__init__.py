@@ -7,10 +7,17 @@ them, `actuators.py` are the limits, losses and power that a simulation needs, `
 held at all, `thruster_facts.py` says it in words.
 """
 
-from wakewise.thrusters.actuators import electrical_power_W, saturate, scale_to_limits, thruster_lag
-from wakewise.thrusters.curve_library import library_curve
-from wakewise.thrusters.thrust_steps import ThrustSteps
-from wakewise.thrusters.thruster import Thruster
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from wakewise.doors import lazy_door
+
+if TYPE_CHECKING:
+    from wakewise.thrusters.actuators import electrical_power_W, saturate, scale_to_limits, thruster_lag
+    from wakewise.thrusters.curve_library import library_curve
+    from wakewise.thrusters.thrust_steps import ThrustSteps
+    from wakewise.thrusters.thruster import Thruster
 
 __all__ = [
     "ThrustSteps",
@@ -21,3 +28,5 @@ __all__ = [
     "scale_to_limits",
     "thruster_lag",
 ]
+
+lazy_door(__name__)

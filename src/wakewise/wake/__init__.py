@@ -12,14 +12,27 @@ paper's), `jets.py` (round turbulent jets), `floor.py` (their wall jets; `beds.p
 a vehicle's pose). `calibration.py`, `samples.py`, `scores.py` and `fit_file.py` fit a model to measured velocities.
 """
 
-from wakewise.wake.beds import bed_of, free_jet
-from wakewise.wake.cones import PaperJet, PowerJet
-from wakewise.wake.disturbance import disturbance, gram, incoherent, point_disturbance, split_roots
-from wakewise.wake.floor import FloorJet
-from wakewise.wake.gradients import Superposition, disturbance_slopes, gauss_newton, gram_with_derivatives, smooth_roots
-from wakewise.wake.jets import AxialJet, GaussianJet, RoundJet
-from wakewise.wake.models import WakeSettings, model_names, wake_model
-from wakewise.wake.view import WakeView
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from wakewise.doors import lazy_door
+
+if TYPE_CHECKING:
+    from wakewise.wake.beds import bed_of, free_jet
+    from wakewise.wake.cones import PaperJet, PowerJet
+    from wakewise.wake.disturbance import disturbance, gram, incoherent, point_disturbance, split_roots
+    from wakewise.wake.floor import FloorJet
+    from wakewise.wake.gradients import (
+        Superposition,
+        disturbance_slopes,
+        gauss_newton,
+        gram_with_derivatives,
+        smooth_roots,
+    )
+    from wakewise.wake.jets import AxialJet, GaussianJet, RoundJet
+    from wakewise.wake.models import WakeSettings, model_names, wake_model
+    from wakewise.wake.view import WakeView
 
 __all__ = [
     "AxialJet",
@@ -45,3 +58,5 @@ __all__ = [
     "split_roots",
     "wake_model",
 ]
+
+lazy_door(__name__)

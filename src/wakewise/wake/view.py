@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -12,11 +12,13 @@ from wakewise.compiled import njit
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.interfaces import WakeModel
-from wakewise.targets import Region
-from wakewise.vehicles import Vehicle
 from wakewise.wake.carried import Flow
 from wakewise.wake.disturbance import gram
 from wakewise.wake.gradients import Superposition
+
+if TYPE_CHECKING:
+    from wakewise.targets import Region
+    from wakewise.vehicles import Vehicle
 
 
 class Seen(NamedTuple):

@@ -1,0 +1,145 @@
+"""What may be asked of `wakewise reconstruct` besides photographs and cameras."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from wakewise.errors import InputError
+
+if TYPE_CHECKING:
+    from wakewise.reconstruction import Model, Wishes
+
+Until = Literal["sparse", "dense", "mesh"]
+
+BarOption = Annotated[
+    list[str] | None,
+    typer.Option("--bar", metavar="A,B,LENGTH[,SIGMA]", help="Distance between the middles of targets A and B in m, "
+                 "and its uncertainty; gives scale. May be repeated.", show_default=False),
+]  # fmt: skip
+BarsFile = Annotated[
+    Path | None,
+    typer.Option("--bars", metavar="FILE", help="YAML file of bars, targets' family and size, ChArUco board "
+                 "(docs/scale.md).", show_default=False),
+]  # fmt: skip
+MasksOption = Annotated[
+    Path | None,
+    typer.Option("--masks", metavar="FOLDER", help="Images named like the photos, black where nothing is to be looked "
+                 "at; else the photos' own transparency.", show_default=False),
+]  # fmt: skip
+Crop = Annotated[
+    tuple[float, float, float, float, float, float] | None,
+    typer.Option("--crop", metavar="X0 Y0 Z0 X1 Y1 Z1", help="Keep of cloud and mesh what lies in this box, in the "
+                 "model's units (m where it has scale).", show_default=False),
+]  # fmt: skip
+UntilOption = Annotated[Until | None, typer.Option("--until", help="Last stage; mesh if not said.", show_default=False)]
+
+LookOption = Annotated[
+    bool, typer.Option("--look", help="Look at the photos only: sharpness, light, overlap, what to shoot again.")
+]
+
+
+def wishes_of(
+    bar: list[str] | None,
+    bars: Path | None,
+    masks: Path | None,
+    crop: tuple[float, float, float, float, float, float] | None,
+    until: Until | None,
+) -> Wishes:
+    """All of them, checked."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    from wakewise.reconstruction import Box, Wishes
+    from wakewise.reconstruction.scale import Bars, parse_bar, read_bars
+
+    given = None if bars is None else read_bars(bars)
+    if bar:
+        listed = tuple(parse_bar(words) for words in bar)
+        given = Bars(bars=listed) if given is None else replace(given, bars=(*given.bars, *listed))
+    if masks is not None and not masks.is_dir():
+        raise InputError(f"--masks {masks}: is no folder; masks are images in a folder, named like the photos")
+    return Wishes(
+        bars=given,
+        masks=masks,
+        crop=None if crop is None else Box(low=np.array(crop[:3]), high=np.array(crop[3:])),
+        until=until or "mesh",
+    )
+
+
+def frames_of(photos: Path, out: Path) -> Path:
+    """The folder of photographs: what was given, or frames of the film that was given, which are counted."""
+    from wakewise.cli.console import Bars as Progress
+    from wakewise.reconstruction.film_frames import is_film, take_frames
+
+    if not is_film(photos):
+        return photos
+    with Progress().stage("frames") as progress:
+        folder, said = take_frames(photos, out, progress)
+    for line in said.lines():
+        typer.echo(f"wakewise: {line}", err=True)
+    return folder
+
+
+def look_first(photos: Path, out: Path, threads: int, json: bool) -> None:
+    """Leave `out/look.html` and `look.json`, and say what to shoot again."""
+    from wakewise.cli.console import Bars as Progress
+    from wakewise.cli.console import print_json
+    from wakewise.extras import need
+    from wakewise.files import write_json
+    from wakewise.reconstruction.look import look_at
+    from wakewise.reports.look import write_look
+
+    need("wakewise reconstruct --look", "reports")
+    if out.resolve() == photos.resolve():
+        raise InputError(f"{out}: is the folder of the photos, the look must go elsewhere")
+    with Progress().stage("look") as progress:
+        look, thumbs = look_at(photos, threads, progress)
+    write_json(out / "look.json", look.summary())
+    write_look(look, thumbs, out / "look.html", photos.resolve().name)
+    if json:
+        print_json(look.summary())
+        return
+    again = sum(bool(photo.faults) for photo in look.photos)
+    typer.echo(f"{len(look.photos)} photos, {look.groups[0]} hang together, {again} to look at again")
+    for line in look.advice:
+        typer.echo(f"  {line}")
+    typer.echo(f"page: {out / 'look.html'}")
+
+
+def write_report_of(out: Path, photos: Path) -> None:
+    """Leave `out/report.html`; without the packages that it needs, say so."""
+    from wakewise.cli.console import Bars as Progress
+    from wakewise.extras import has, how_to_install
+
+    if not has("reports"):
+        typer.echo(f"wakewise: no report, as it needs {how_to_install('reports')}", err=True)
+        return
+    from wakewise.reports.photo_model import write_model_report
+
+    with Progress().stage("report"):
+        write_model_report(out, photos)
+
+
+def scale_lines(model: Model) -> list[str]:
+    """What bars say, a line each."""
+    said = model.scale_bars
+    if said is None:
+        return []
+    head = f"scale: by {len(said['bars'])} bars, uncertain by {said['uncertainty_pct']:.3f} %"
+    if not said["used"]:
+        head = (
+            f"scale: from reference cameras; by the bars, lengths are {said['model_off_pct']:+.3f} % off "
+            f"(uncertain by {said['uncertainty_pct']:.3f} %)"
+        )
+    lines = [head.replace("1 bars", "1 bar")]
+    for bar in said["bars"]:
+        check = "" if bar["check_pct"] is None else f", {bar['check_pct']:+.3f} % from what the others say"
+        lines.append(
+            f"  bar {bar['name']}: {1e3 * bar['found_m']:.2f} mm, stated {1e3 * bar['length_m']:.2f} ± "
+            f"{1e3 * bar['sigma_m']:.2f} mm{check}"
+        )
+    return lines
