@@ -45,14 +45,15 @@ check: setup
 # Types are looked at beside the kernels and the tests, which leave a core idle now and then; what was found is said last.
 # A file at a time: what its tests share is made once, and its kernels are loaded by one of the two workers. Each has a
 # core, and the library of linear algebra would have all of them.
-# `make test` leaves out what is marked slow (ten seconds and more each); `make test-all` does not.
+# `make test` leaves out what is marked slow (ten seconds and more each) and draws the same examples each time;
+# `make test-all` leaves out nothing and draws new ones.
 test test-all: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports
 	@sh tools/browser.sh
 	@$(BIN)/mypy > $(VENV)/types.txt 2>&1 & types=$$!; \
-	$(BIN)/wakewise warm && OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder $(if $(filter test,$@),-m "not slow"); \
+	$(BIN)/wakewise warm && OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder $(if $(filter test,$@),-m "not slow" --hypothesis-profile=ci); \
 	tests=$$?; wait $$types; types=$$?; cat $(VENV)/types.txt; test $$tests -eq 0 -a $$types -eq 0
 
 bench: setup

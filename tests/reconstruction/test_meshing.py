@@ -7,7 +7,7 @@ import trimesh
 from wakewise.errors import EnvironmentFailure
 from wakewise.reconstruction import ReconstructionSettings, stages
 from wakewise.reconstruction.clouds import Cloud, write_cloud
-from wakewise.reconstruction.meshing import mesh_points, octree_depth, without_crumbs
+from wakewise.reconstruction.meshing import mesh_points, near_subject, octree_depth, without_crumbs
 
 
 def test_crumbs_go_and_everything_worth_showing_stays():
@@ -38,15 +38,23 @@ def test_a_surface_that_a_full_disk_cut_short_is_not_taken(tmp_path, monkeypatch
     assert [path.name for path in tmp_path.iterdir()] == ["dense.ply"]
 
 
-def test_far_points_do_not_make_the_mesh_coarse():
-    """A subject of 512 cells keeps its cell when one point in fifty lies ten times as far: the whole is deeper."""
+@pytest.mark.parametrize("reach", [1.2, 10.0, 1000.0])
+def test_far_points_do_not_make_the_mesh_coarse(reach):
+    """A subject of 512 cells keeps its cell when one point in fifty lies far off, however far: what is meshed ends."""
     rng = np.random.default_rng(0)
     subject = rng.uniform(0.0, 1.0, (20_000, 3))
-    far = rng.uniform(-5.0, 5.0, (400, 3))
+    far = rng.uniform(-0.5 * reach, 0.5 * reach, (400, 3))
+    every = np.concatenate([subject, far])
+    kept = every[near_subject(every)]
+    assert len(subject) <= len(kept) and (len(kept) < len(every)) == (reach > 4.0)
     for spacing in (0.01, 0.0002):
-        near = octree_depth(subject, spacing, 9)
-        both = octree_depth(np.concatenate([subject, far]), spacing, 9)
-        cell, with_far = 1.0 / 2**near, 10.0 / 2**both
+        cell = np.ptp(subject, axis=0).max() / 2 ** octree_depth(subject, spacing, 9)
+        with_far = np.ptp(kept, axis=0).max() / 2 ** octree_depth(kept, spacing, 9)
         assert with_far <= 1.5 * cell
+
+
+def test_the_octree_is_as_deep_as_the_points_are_dense():
+    """Cells of about a point spacing, and never more of them than were asked for."""
+    subject = np.random.default_rng(0).uniform(0.0, 1.0, (20_000, 3))
     assert octree_depth(subject, 0.01, 9) == 6 and octree_depth(subject, 0.0002, 9) == 9
     assert octree_depth(subject, 0.0002, 7) == 7

@@ -11,6 +11,7 @@ from wakewise import extras
 from wakewise.cli.main import run
 from wakewise.errors import InputError
 from wakewise.reconstruction import read_cloud
+from wakewise.reconstruction.meshing import FIGURES
 from wakewise.reconstruction.nerf import PROFILES, FieldSettings, build_field, pick_device, profile
 
 SHORT = FieldSettings(
@@ -102,7 +103,7 @@ def test_stages_leave_files_and_are_skipped_when_done(folder, tmp_path):
     (tmp_path / "points.ply").unlink()
     points = build_field(folder, folder / "images", tmp_path, SHORT, region=REGION, device="cpu", mesh=False)
     assert points["skipped"] == ["train", "views"]
-    assert points["why"] == {"mesh_vertices": "no mesh was asked for", "mesh_faces": "no mesh was asked for"}
+    assert points["why"] == dict.fromkeys(FIGURES, "no mesh was asked for")
     np.testing.assert_array_equal(read_cloud(tmp_path / "points.ply").points_m, cloud.points_m)
     fewer = SHORT.model_copy(update={"steps": 20})
     assert build_field(folder, folder / "images", tmp_path, fewer, region=REGION, device="cpu")["skipped"] == []

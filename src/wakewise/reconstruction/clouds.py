@@ -24,6 +24,10 @@ class Cloud:
     def __post_init__(self) -> None:
         freeze(self, points_m=(None, 3), normals=(None, 3), colours=(None, 3))
 
+    def only(self, kept: Array) -> Cloud:
+        """The points that a mask of shape (n,) keeps."""
+        return Cloud(points_m=self.points_m[kept], normals=self.normals[kept], colours=self.colours[kept])
+
 
 _FIELDS = [(k, "<f4") for k in ("x", "y", "z", "nx", "ny", "nz")] + [(k, "u1") for k in ("red", "green", "blue")]
 

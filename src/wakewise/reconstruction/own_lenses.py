@@ -22,10 +22,10 @@ from wakewise.reconstruction.solving import solve
 
 LEAST_POINTS, LEAST_PHOTOS = 40, 3
 """Sparse points from which on a photo's own focal length counts, and photos that make a lens of their own."""
-SEPARATION, LEAST_RATIO = 4.5, 1.02
+SEPARATION, LEAST_RATIO = 5.0, 1.02
 """Between two heaps' means, in standard deviations within them, and their ratio. A uniform spread cut in half has 3.5,
-a normal one 2.7 (from their moments), so that neither is taken for two lenses. Of n photos (1 + 8/n) times as much is
-asked, as a few lie in two heaps by chance."""
+a normal one 2.7 (from their moments). Of n photos (1 + 8/n) times as much is asked, as a few lie in two heaps by
+chance: of 1,500 draws of 10 to 40 photos, less than 1 % of uniform and .1 % of normal ones were still taken for two."""
 MOST_LENSES = 4
 
 

@@ -13,7 +13,7 @@ from scipy.spatial import KDTree
 from wakewise.errors import InputError, StageError
 from wakewise.interfaces import Progress
 from wakewise.processes import half_done
-from wakewise.reconstruction.clouds import Cloud, read_cloud, write_cloud
+from wakewise.reconstruction.clouds import read_cloud, write_cloud
 from wakewise.reconstruction.colmap import call, pycolmap
 from wakewise.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
 from wakewise.reconstruction.stages import need_room
@@ -79,8 +79,9 @@ def patch_match(
         keep = np.linalg.norm(cloud.points_m - region.centre_W_m, axis=1) <= region.radius_m
     if keep.sum() < 100:
         raise StageError(f"dense: {keep.sum()} points survive patch-match, at least 100 must")
-    points = cloud.points_m[keep]
-    write_cloud(out, Cloud(points_m=points, normals=cloud.normals[keep], colours=cloud.colours[keep]))
+    cloud = cloud.only(keep)
+    points = cloud.points_m
+    write_cloud(out, cloud)
     some = np.random.default_rng(RANDOM_SEED).choice(len(points), min(len(points), 2000), replace=False)
     spacing = float(np.median(np.asarray(KDTree(points).query(points[some], k=2)[0])[:, 1]))
     maps = len(pycolmap.Reconstruction(sparse).images)

@@ -22,6 +22,7 @@ from wakewise.reconstruction.lenses import Lens
 from wakewise.reconstruction.look_alike import LOOK_ALIKES
 from wakewise.reconstruction.mapping import MAPPINGS
 from wakewise.reconstruction.masks import read_masks
+from wakewise.reconstruction.meshing import FIGURES as MESH_FIGURES
 from wakewise.reconstruction.meshing import mesh_model
 from wakewise.reconstruction.pairs import BAND_NEIGHBOURS, POSE_NEIGHBOURS, by_looks, choose_pairs
 from wakewise.reconstruction.patchmatch import require_cuda
@@ -35,7 +36,7 @@ from wakewise.reconstruction.steps import dense_step, map_step, match_step
 from wakewise.reconstruction.views import Ball
 from wakewise.reconstruction.wishes import Wishes
 
-LATER = ("scale_bars", "dense_points", "depth_maps", "point_spacing_mm", "mesh_vertices", "mesh_faces")
+LATER = ("scale_bars", "dense_points", "depth_maps", "point_spacing_mm", *MESH_FIGURES)
 """Figures of stages that may not be asked for."""
 
 
@@ -100,6 +101,7 @@ class Model:
     point_spacing_mm: float | None
     mesh_vertices: int | None
     mesh_faces: int | None
+    mesh_points_left_out: int | None
     wall_s: float
     stages_s: dict[str, float]
     skipped: tuple[str, ...]
@@ -111,8 +113,7 @@ class Model:
             "dense_points": "no dense points were asked for",
             "depth_maps": "no dense points were asked for",
             "scale_bars": "no bars were given",
-            "mesh_vertices": "no mesh was asked for, or it is made after the figures",
-            "mesh_faces": "no mesh was asked for, or it is made after the figures",
+            **dict.fromkeys(MESH_FIGURES, "no mesh was asked for, or it is made after the figures"),
             "suspicion": "nothing looks suspicious",
             "agreeing_pairs_pct": "no pair of registered photos has matches enough",
             "held_out_px": "no point is seen by three photos",

@@ -10,7 +10,7 @@ import numpy as np
 
 from wakewise.arrays import Array, BoolArray, freeze
 from wakewise.errors import InputError, StageError
-from wakewise.reconstruction.clouds import Cloud, read_cloud, write_cloud
+from wakewise.reconstruction.clouds import read_cloud, write_cloud
 from wakewise.reconstruction.scale.bars import Bars
 
 LEAST_POINTS = 100
@@ -69,5 +69,5 @@ def cut_cloud(path: Path, box: Box) -> int:
             f"crop: {kept.sum()} of {len(kept)} points lie in the box, at least {LEAST_POINTS} must; nearly all lie "
             f"from {np.round(low, 4).tolist()} to {np.round(high, 4).tolist()}"
         )
-    write_cloud(path, Cloud(points_m=cloud.points_m[kept], normals=cloud.normals[kept], colours=cloud.colours[kept]))
+    write_cloud(path, cloud.only(kept))
     return int(kept.sum())

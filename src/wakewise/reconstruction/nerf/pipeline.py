@@ -13,6 +13,7 @@ from wakewise.errors import InputError, StageError
 from wakewise.files import write_json
 from wakewise.interfaces import Progress, no_progress
 from wakewise.reconstruction.clouds import write_cloud
+from wakewise.reconstruction.meshing import FIGURES as MESH_FIGURES
 from wakewise.reconstruction.meshing import mesh_points
 from wakewise.reconstruction.nerf.backend import pick_device
 from wakewise.reconstruction.nerf.geometry import depth_camera, depth_map, fuse_depth
@@ -63,7 +64,8 @@ def build_field(
     dict
         psnr_db, psnr_min_db, ssim (means over held-out views on the rectangle about the region), train_views,
         held_out_views, views (by name), loss, steps, rays_per_step, occupied_pct, points, point_spacing_mm,
-        mesh_vertices, mesh_faces, parameters, device, stages_s, skipped, wall_s, and why for what is None.
+        mesh_vertices, mesh_faces, mesh_points_left_out, parameters, device, stages_s,
+        skipped, wall_s, and why for what is None.
 
     Raises
     ------
@@ -153,7 +155,7 @@ def build_field(
                 progress=progress,
             ),
         )
-    figures: dict[str, Any] = {"mesh_vertices": None, "mesh_faces": None}
+    figures: dict[str, Any] = dict.fromkeys(MESH_FIGURES)
     for result in results.values():
         figures |= result.figures
     figures |= {
