@@ -120,9 +120,15 @@ def test_names_fit_without_folder_or_suffix_and_never_two(tmp_path):
         ),
         (
             "a.json",
-            '{"camera_model": "OPENCV_FISHEYE", "frames": [{"file_path": "a", "w": 2, "h": 2, "fl_x": 1, '
+            '{"camera_model": "EQUIRECTANGULAR", "frames": [{"file_path": "a", "w": 2, "h": 2, "fl_x": 1, '
             '"transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]}',
-            "OPENCV_FISHEYE",
+            "allowed is OPENCV, PINHOLE or OPENCV_FISHEYE",
+        ),
+        (
+            "a.json",
+            '{"camera_model": "OPENCV_FISHEYE", "p1": 0.1, "frames": [{"file_path": "a", "w": 2, "h": 2, "fl_x": 1, '
+            '"transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]}',
+            "p1, which the four coefficients of OPENCV_FISHEYE",
         ),
         ("images.txt", "1 1 0 0 0 0 0\n\n", "cameras.txt: does not exist"),
     ],

@@ -13,8 +13,8 @@ from wakewise.reconstruction.views import View
 OPENCV = np.array([700.0, 690.0, 480.0, 361.0, -0.21, 0.04, 0.002, -0.001])
 
 
-def view_of(params):
-    """A view at the origin, looking along z, with an OPENCV lens."""
+def view_of(params, fisheye=False):
+    """A view at the origin, looking along z, with an OPENCV lens or a fisheye."""
     return View(
         name="a.png",
         width=960,
@@ -30,6 +30,7 @@ def view_of(params):
         seen=np.zeros(0, np.int64),
         stretch=params[1] / params[0],
         bend=params[5:],
+        fisheye=fisheye,
     )
 
 
@@ -46,13 +47,20 @@ def test_a_view_bends_as_colmap_does_and_back():
 
 @pytest.mark.parametrize("model", LAYOUTS)
 def test_every_model_is_a_special_case(model):
-    """A camera of each known model projects as the OPENCV camera made of it."""
+    """A camera of each known model projects as the OPENCV camera, or the fisheye, made of it."""
     params = {3: [700.0, 470.0, 350.0], 4: [700.0, 470.0, 350.0, -0.1], 5: [700.0, 470.0, 350.0, -0.1, 0.02]}
-    given = {"PINHOLE": [700.0, 690.0, 470.0, 350.0], "OPENCV": OPENCV.tolist()}.get(model)
+    whole = {"PINHOLE": [700.0, 690.0, 470.0, 350.0], "OPENCV": OPENCV.tolist(), "OPENCV_FISHEYE": OPENCV.tolist()}
+    given = whole.get(model)
     camera = pycolmap.Camera.create_from_model_name(1, model, 700.0, 960, 720)
     camera.params = given or params[len(camera.params)]
     points = np.random.default_rng(2).uniform([-0.3, -0.3, 0.6], [0.3, 0.3, 0.9], (50, 3))
-    assert np.allclose(view_of(lens_of(camera).params).project(points)[0], camera.img_from_cam(points), atol=1e-9)
+    lens = lens_of(camera)
+    assert lens.fisheye == ("FISHEYE" in model)
+    ours = view_of(lens.params, lens.fisheye).project(points)[0]
+    assert np.allclose(ours, camera.img_from_cam(points), atol=1e-9)
+    again = pycolmap.Camera(model=lens.for_colmap()[0], width=960, height=720)
+    again.params = [float(word) for word in lens.for_colmap()[1].split(",")]
+    assert np.allclose(again.img_from_cam(points), ours, atol=1e-9)
 
 
 def test_a_trials_camera_is_read(tmp_path):

@@ -14,9 +14,12 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.geometry import matrix_from_quat
-from wakewise.reconstruction.lenses import COUNTS, LAYOUTS, Lens
+from wakewise.reconstruction.lenses import COUNTS, LAYOUTS, Lens, lens_from
 
-_MODELS = ("SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "OPENCV_FISHEYE", "FULL_OPENCV")
+_MODELS = (
+    *("SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "OPENCV_FISHEYE", "FULL_OPENCV", "FOV"),
+    *("SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE"),
+)
 """Names by number in binary files."""
 Pose = tuple[Array, Array]
 """R_WC, shape (3, 3), and p_WC, shape (3,)."""
@@ -51,7 +54,7 @@ def _lens(file: Path, model: str, width: int, height: int, params: Array) -> Len
         raise InputError(f"{file}: camera model {model} is not known here, allowed are {', '.join(LAYOUTS)}")
     if len(params) != COUNTS[model] or not np.isfinite(params).all():
         raise InputError(f"{file}: {len(params)} parameters, {model} has {COUNTS[model]}, all finite")
-    return Lens(width=width, height=height, params=np.append(params, 0.0)[list(LAYOUTS[model])])
+    return lens_from(model, width, height, params)
 
 
 def _pose(numbers: Array) -> Pose:

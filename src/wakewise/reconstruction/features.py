@@ -28,6 +28,8 @@ from wakewise.reconstruction.sift import PEAK_THRESHOLD, folder_features, within
 
 T = TypeVar("T")
 FEW_FEATURES = 150
+FISHEYE_FOCAL = 0.4
+"""Where a fisheye's focal length is unknown: this much of the longer side, which is 180 deg across a 4:3 diagonal."""
 EXTRACTION_BATCHES, MATCHING_BATCHES, LEAST_PAIRS = 12, 8, 120
 """Parts that the work is done in, for progress; descriptors are indexed anew in each, so few pairs are few parts."""
 
@@ -53,7 +55,8 @@ def match_photos(
     Parameters
     ----------
     focal_px : float, optional
-        Focal length to start from, in pixels of these photos; else from EXIF or 1.2 times the longer side.
+        Focal length to start from, in pixels of these photos; else from EXIF or 1.2 times the longer side, of a
+        fisheye .4 times.
     pairs : list of two photo names
         What to match.
     store : PhotoStore, optional
@@ -154,12 +157,14 @@ def _extract(
     done, total = 0, sum(len(group.photos) for group in groups)
     for group in groups:
         reader = pycolmap.ImageReaderOptions()
-        reader.camera_model = "SIMPLE_RADIAL"
+        fisheye = settings.lens == "fisheye"
+        reader.camera_model = "RADIAL_FISHEYE" if fisheye else "SIMPLE_RADIAL"
         if store.masks is not None:
             write_for_colmap(store.masks, list(group.photos), room / "masks")
             reader.mask_path = room / "masks"
-        if focal_px is not None:
-            reader.camera_params = f"{focal_px},{group.width / 2},{group.height / 2},0"
+        focal = FISHEYE_FOCAL * max(group.width, group.height) if fisheye and focal_px is None else focal_px
+        if focal is not None:
+            reader.camera_params = f"{focal},{group.width / 2},{group.height / 2},{'0,0' if fisheye else '0'}"
         if group.lens is not None:
             reader.camera_model, reader.camera_params = group.lens.for_colmap()
         work = _by_opencv if settings.detector == "opencv" else _by_colmap

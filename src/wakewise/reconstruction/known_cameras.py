@@ -27,7 +27,7 @@ _KINDS = (
 )
 _POSE = ("name", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
 _LENS = ("width", "height", "fx", "fy", "cx", "cy")
-_BEND = ("k1", "k2", "p1", "p2")
+_BEND, _FISHEYE_BEND = ("k1", "k2", "p1", "p2"), ("k1", "k2", "k3", "k4")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -165,15 +165,17 @@ def _read_nerfstudio(path: Path) -> KnownCameras:
 
 def _nerfstudio_lens(values: Mapping[str, Any]) -> Lens | None:
     model = str(values.get("camera_model", "OPENCV"))
-    if model not in ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE"):
-        raise ValueError(f"camera_model {model}, allowed is OPENCV or PINHOLE")
+    if model not in ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE", "OPENCV_FISHEYE"):
+        raise ValueError(f"camera_model {model}, allowed is OPENCV, PINHOLE or OPENCV_FISHEYE")
+    fisheye = model == "OPENCV_FISHEYE"
     if "w" not in values or "h" not in values:
         return None
     width, height = int(values["w"]), int(values["h"])
     if "fl_x" in values:
         fx = float(values["fl_x"])
     elif "camera_angle_x" in values:
-        fx = 0.5 * width / float(np.tan(0.5 * float(values["camera_angle_x"])))
+        half = 0.5 * float(values["camera_angle_x"])
+        fx = 0.5 * width / (half if fisheye else float(np.tan(half)))
     else:
         return None
     params = [
@@ -182,10 +184,12 @@ def _nerfstudio_lens(values: Mapping[str, Any]) -> Lens | None:
         float(values.get("cx", width / 2)),
         float(values.get("cy", height / 2)),
     ]
-    params += [float(values.get(key, 0.0)) for key in _BEND]
-    if any(float(values.get(key, 0.0)) != 0.0 for key in ("k3", "k4")):
-        raise ValueError("k3 or k4, which OpenCV's four coefficients do not have")
-    return Lens(width=width, height=height, params=np.array(params))
+    bend, others = (_FISHEYE_BEND, ("p1", "p2")) if fisheye else (_BEND, ("k3", "k4"))
+    params += [float(values.get(key, 0.0)) for key in bend]
+    for key in others:
+        if float(values.get(key, 0.0)) != 0.0:
+            raise ValueError(f"{key}, which the four coefficients of {model} do not have")
+    return Lens(width=width, height=height, params=np.array(params), fisheye=fisheye)
 
 
 def _read_table(path: Path) -> KnownCameras:

@@ -1,4 +1,4 @@
-"""A calibrated camera: focal lengths, principal point and distortion of COLMAP's OPENCV model, from its cameras.txt."""
+"""A calibrated camera as COLMAP's OPENCV or OPENCV_FISHEYE has it, from its cameras.txt."""
 
 from __future__ import annotations
 
@@ -14,24 +14,32 @@ from wakewise.errors import InputError, StageError
 if TYPE_CHECKING:  # cameras.txt is read without COLMAP, too
     from wakewise.reconstruction.colmap import pycolmap
 
-# Which parameters of COLMAP's models are fx, fy, cx, cy, k1, k2, p1, p2; -1 is a zero.
+# Which parameters of COLMAP's models are fx, fy, cx, cy, k1, k2, p1, p2, or of a fisheye's fx, fy, cx, cy, k1, k2, k3,
+# k4; -1 is a zero.
 LAYOUTS = {
     "SIMPLE_PINHOLE": (0, 0, 1, 2, -1, -1, -1, -1),
     "PINHOLE": (0, 1, 2, 3, -1, -1, -1, -1),
     "SIMPLE_RADIAL": (0, 0, 1, 2, 3, -1, -1, -1),
     "RADIAL": (0, 0, 1, 2, 3, 4, -1, -1),
     "OPENCV": (0, 1, 2, 3, 4, 5, 6, 7),
+    "SIMPLE_RADIAL_FISHEYE": (0, 0, 1, 2, 3, -1, -1, -1),
+    "RADIAL_FISHEYE": (0, 0, 1, 2, 3, 4, -1, -1),
+    "OPENCV_FISHEYE": (0, 1, 2, 3, 4, 5, 6, 7),
 }
-COUNTS = {"SIMPLE_PINHOLE": 3, "PINHOLE": 4, "SIMPLE_RADIAL": 4, "RADIAL": 5, "OPENCV": 8}
+COUNTS = {name: max(layout) + 1 for name, layout in LAYOUTS.items()}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Lens:
-    """Image size in pixels and `params`, shape (8,): fx, fy, cx, cy in pixels (centres at +0.5), k1, k2, p1, p2."""
+    """Image size in pixels and `params`, shape (8,): fx, fy, cx, cy in pixels (centres at +0.5), k1, k2, p1, p2.
+
+    Of a fisheye the last four are k1 to k4 (see `bending`).
+    """
 
     width: int
     height: int
     params: Array
+    fisheye: bool = False
 
     def __post_init__(self) -> None:
         freeze(self, params=(8,))
@@ -44,13 +52,15 @@ class Lens:
     def for_colmap(self) -> tuple[str, str]:
         """COLMAP's model and its parameters: no more of them than it takes, as each will be fitted to the photos."""
         fx, fy, cx, cy, *bend = (float(value) for value in self.params)
+        if self.fisheye:
+            return "OPENCV_FISHEYE", ",".join(repr(value) for value in (fx, fy, cx, cy, *bend))
         if fx == fy and not any(bend):
             return "SIMPLE_RADIAL", f"{fx!r},{cx!r},{cy!r},0"
         return "OPENCV", ",".join(repr(value) for value in (fx, fy, cx, cy, *bend))
 
     def numbers(self) -> list[float]:
-        """Size and parameters as plain numbers."""
-        return [float(value) for value in (self.width, self.height, *self.params)]
+        """Size, parameters and kind as plain numbers."""
+        return [float(value) for value in (self.width, self.height, *self.params, self.fisheye)]
 
 
 def lens_of(camera: pycolmap.Camera) -> Lens:
@@ -64,7 +74,7 @@ def lens_of(camera: pycolmap.Camera) -> Lens:
     name = str(camera.model.name)
     if name not in LAYOUTS:
         raise StageError(f"cameras: model {name} is not known here, allowed are {', '.join(LAYOUTS)}")
-    return Lens(width=camera.width, height=camera.height, params=_in_order(name, np.asarray(camera.params)))
+    return lens_from(name, camera.width, camera.height, np.asarray(camera.params))
 
 
 def read_lens(path: Path) -> Lens:
@@ -95,8 +105,10 @@ def read_lens(path: Path) -> Lens:
         raise InputError(f"{file}: holds something that is no number where the camera's numbers must be") from None
     if len(params) != COUNTS[row[1]] or not np.isfinite(params).all():
         raise InputError(f"{file}: {len(params)} parameters, {row[1]} has {COUNTS[row[1]]}, all finite")
-    return Lens(width=width, height=height, params=_in_order(row[1], params))
+    return lens_from(row[1], width, height, params)
 
 
-def _in_order(model: str, params: Array) -> Array:
-    return np.append(params, 0.0)[list(LAYOUTS[model])]
+def lens_from(model: str, width: int, height: int, params: Array) -> Lens:
+    """Lens of one of COLMAP's models in `LAYOUTS`, with as many parameters as it has."""
+    in_order = np.append(params, 0.0)[list(LAYOUTS[model])]
+    return Lens(width=width, height=height, params=in_order, fisheye=model.endswith("FISHEYE"))

@@ -41,6 +41,11 @@ class ReconstructionSettings(Settings):
         le=10.0,
         description="mean reprojection error to get below: outliers are cut ever more closely until it is met",
     )
+    lens: Literal["perspective", "fisheye"] = Field(
+        default="perspective",
+        description="kind of lens where no camera is given: fisheye where straight lines bend strongly (fields of view "
+        "above some 110 deg)",
+    )
     refine_camera: bool = Field(
         default=True,
         description="fit focal length and distortion to the photos, from EXIF or a given camera on; false keeps a "

@@ -9,9 +9,9 @@ from wakewise.reconstruction.settings import ReconstructionSettings
 from wakewise.reconstruction.stages import fingerprint
 
 # Part of every stage's fingerprint: raise it when a stage's result changes for the same input.
-VERSION = 9
+VERSION = 10
 STAGES: dict[str, tuple[str, ...]] = {
-    "match": ("detector", "max_features", "first_octave"),
+    "match": ("detector", "max_features", "first_octave", "lens"),
     "map": (
         "mapper",
         "refine_camera",

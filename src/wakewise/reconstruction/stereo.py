@@ -24,6 +24,8 @@ BLOCK = 5
 PENALTY_SMALL, PENALTY_LARGE = 8 * BLOCK**2, 32 * BLOCK**2
 MAX_DISPARITIES = 384
 MAX_TURN_DEG = 35.0
+MAX_SLOPE = 2.0
+"""Of rays in the rectified frame, 63 deg from its axis: what a fisheye sees beyond would be stretched past use."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -124,6 +126,10 @@ def pair_depth(
     d = disparity.astype(np.float32) / 16.0
     total = d + np.float32(zero)
     found = (d > lowest - 0.5) & (total > 0.0)
+    if one.fisheye:
+        # Much of the window lies outside of its photo: black there matches any black.
+        white = np.full(photos[i].shape[:2], 255, np.uint8)
+        found &= resample(white, one, R, focal, c_one, (width, height)) == 255
     depth = np.where(found, np.float32(focal * baseline) / np.where(found, total, 1.0), 0.0).astype(np.float32)
     keep = slice(pad_left, width - pad_right)
     c_one -= [pad_left, 0.0]
@@ -181,7 +187,7 @@ def _window(view: View, R_CW: Array, focal: float, region: Ball | None) -> tuple
     """Left, top, width and height in rectified pixels (principal point at 0) of what is worth matching."""
     corners = view.rays(np.array([[0.0, 0.0], [view.width, 0.0], [0.0, view.height], [view.width, view.height]]))
     rays = corners @ view.R_CW @ R_CW.T
-    uv = focal * rays[:, :2] / rays[:, 2:]
+    uv = focal * np.clip(rays[:, :2] / np.maximum(rays[:, 2:], 1e-3), -MAX_SLOPE, MAX_SLOPE)
     low, high = uv.min(axis=0), uv.max(axis=0)
     if region is not None:
         c = R_CW @ (region.centre_W_m - view.p_WC_m)
@@ -205,9 +211,10 @@ def resample(photo: Image, view: View, R_CW: Array, focal: float, centre_px: Arr
         ]
     )
     new_K = np.array([[focal, 0.0, centre_px[0]], [0.0, focal, centre_px[1]], [0.0, 0.0, 1.0]])
-    distortion = np.array([[view.radial, *view.bend, 0.0]])
     turn = R_CW @ view.R_CW.T
-    map_x, map_y = cv2.initUndistortRectifyMap(K, distortion, turn, new_K, size, cv2.CV_32FC1)
+    params = np.array([view.radial, *view.bend])
+    turned = cv2.fisheye.initUndistortRectifyMap if view.fisheye else cv2.initUndistortRectifyMap
+    map_x, map_y = turned(K, params, turn, new_K, size, cv2.CV_32FC1)
     shrink = view.focal_px / focal
     if shrink > 1.5:
         # Blur before thinning out pixels, else fine texture folds into noise.

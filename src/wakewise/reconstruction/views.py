@@ -9,6 +9,7 @@ import numpy as np
 
 from wakewise.arrays import Array, IntArray, freeze
 from wakewise.errors import StageError
+from wakewise.reconstruction.bending import bent, straight
 from wakewise.reconstruction.colmap import pycolmap
 from wakewise.reconstruction.lenses import lens_of
 
@@ -17,7 +18,6 @@ from wakewise.reconstruction.lenses import lens_of
 BEST_ANGLE_DEG, ANGLE_SPREAD_DEG = 13.0, 8.0
 ANGLES_DEG = (3.0, 35.0)
 MIN_SHARED = 20
-NEWTON_STEPS = 12
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,7 +35,8 @@ class Ball:
 class View:
     """One registered photo. R_CW and p_WC_m place the camera; depth limits in m hold for what it should see.
 
-    Of OpenCV's lens, `focal_px` is fx and `stretch` fy / fx; `radial` is k1 and `bend` the rest, k2, p1, p2.
+    Of OpenCV's lens, `focal_px` is fx and `stretch` fy / fx; `radial` is k1 and `bend` the rest: k2, p1, p2, or of a
+    fisheye k2, k3, k4.
     """
 
     name: str
@@ -52,6 +53,7 @@ class View:
     seen: IntArray
     stretch: float = 1.0
     bend: Array = field(default_factory=lambda: np.zeros(3))
+    fisheye: bool = False
 
     def __post_init__(self) -> None:
         freeze(self, centre_px=(2,), R_CW=(3, 3), p_WC_m=(3,), focus_W_m=(3,), bend=(3,))
@@ -69,39 +71,14 @@ class View:
         """Pixels, shape (n, 2), and depths, shape (n,), of points, shape (n, 3); pixels hold where the depth is > 0."""
         points = (np.asarray(points_W_m) - self.p_WC_m) @ self.R_CW.T
         xy = points[:, :2] / np.maximum(points[:, 2:], 1e-9)
-        return self.focals_px * self._bent(xy) + self.centre_px, points[:, 2]
+        images = bent(xy, np.append(self.radial, self.bend), fisheye=self.fisheye)
+        return self.focals_px * images + self.centre_px, points[:, 2]
 
     def rays(self, pixels: Array) -> Array:
         """Directions with unit z in the camera frame, shape (n, 3), of pixels, shape (n, 2), distortion undone."""
-        wanted = (np.asarray(pixels) - self.centre_px) / self.focals_px
-        k2, p1, p2 = self.bend
-        xy = wanted.copy()
-        for _ in range(NEWTON_STEPS):
-            x, y = xy.T
-            r2 = x * x + y * y
-            grown, slope = 1.0 + r2 * (self.radial + r2 * k2), self.radial + 2.0 * r2 * k2
-            a = grown + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x
-            b = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y
-            d = grown + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x
-            # Where the lens would fold the image over there is no ray: the step is kept small there, nothing is found.
-            determinant = np.maximum(a * d - b * b, 0.05)
-            ex, ey = (self._bent(xy) - wanted).T
-            xy = xy - np.stack([(d * ex - b * ey) / determinant, (a * ey - b * ex) / determinant], axis=1)
+        images = (np.asarray(pixels) - self.centre_px) / self.focals_px
+        xy = straight(images, np.append(self.radial, self.bend), fisheye=self.fisheye)
         return np.concatenate([xy, np.ones((len(xy), 1))], axis=1)
-
-    def _bent(self, xy: Array) -> Array:
-        """Distorted slopes of ideal ones (D. C. Brown, Photogrammetric Engineering 37(8), 1971, as OpenCV has it)."""
-        k2, p1, p2 = self.bend
-        x, y = xy.T
-        r2 = x * x + y * y
-        grown = 1.0 + r2 * (self.radial + r2 * k2)
-        return np.stack(
-            [
-                x * grown + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-                y * grown + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-            ],
-            axis=1,
-        )
 
 
 def camera_centres(sparse: Path) -> dict[str, Array]:
@@ -159,6 +136,7 @@ def read_views(sparse: Path, region: Ball | None) -> tuple[tuple[View, ...], Arr
                 seen=seen,
                 stretch=float(fy / fx),
                 bend=np.array(bend),
+                fisheye=lens.fisheye,
             )
         )
     if len(views) < 2:
