@@ -78,6 +78,7 @@ def test_the_gentle_thrusts_of_one_wrench_are_gentler_and_drawn(tmp_path):
     assert is_picture(tmp_path / "one_wrench.png")
 
 
+@pytest.mark.slow
 def test_ballast_is_advised_and_tried_in_the_tank(tmp_path):
     """Advice by the wake model, then two flights; less thrust to hold is less energy."""
     advice, before, after = run("ballast.py", tmp_path, "paper", SECONDS).splitlines()
@@ -87,6 +88,7 @@ def test_ballast_is_advised_and_tried_in_the_tank(tmp_path):
     assert energies[1] < energies[0]
 
 
+@pytest.mark.slow
 def test_many_vehicles_at_once_say_which_stiffness_is_best(tmp_path):
     """Too soft is carried off by the current, too stiff follows the noise; the best lies between."""
     median_mm = [float(mm) for mm in re.findall(r"(\d+) mm off", run("many_vehicles.py", tmp_path))]
@@ -134,6 +136,7 @@ def test_photographs_become_a_model_in_metres(tmp_path):
     assert (tmp_path / "runs" / "photographs" / "model" / "dense.ply").exists()
 
 
+@pytest.mark.slow
 def test_a_sweep_over_standoff_is_drawn(tmp_path):
     """A line for each method and standoff; farther off the water is stiller."""
     rows = run("standoff_sweep.py", tmp_path, SECONDS, "0.5", "0.9").splitlines()
@@ -143,6 +146,7 @@ def test_a_sweep_over_standoff_is_drawn(tmp_path):
     assert is_picture(tmp_path / "standoff_sweep.png")
 
 
+@pytest.mark.slow
 def test_an_own_target_is_flown_round(tmp_path):
     """A mesh made in the script stands on the bed and is flown round by both methods."""
     first, *flights = run("own_target.py", tmp_path, SECONDS).splitlines()

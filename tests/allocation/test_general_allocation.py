@@ -94,6 +94,7 @@ def test_a_larger_budget_closes_the_gap():
     assert gaps[2] <= 1e-5
 
 
+@pytest.mark.slow
 def test_boxes_and_lines_agree_where_both_apply():
     """On a null space that splits, branch and bound over the whole of it finds what the line searches find."""
     rng = np.random.default_rng(2)

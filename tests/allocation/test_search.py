@@ -34,6 +34,7 @@ def test_the_cost_kernel_equals_its_twin():
         )
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_no_point_of_a_dense_grid_lies_below_the_line_minimum(seed):

@@ -1,12 +1,14 @@
 """The paper's recipe, the planner's peer: where both converge they agree."""
 
 import numpy as np
+import pytest
 
 from wakewise.benches.paper_planner import PaperPlanner
 from wakewise.benches.planner import plan_model, problem_at
 from wakewise.planning.planner import Planner
 
 
+@pytest.mark.slow
 def test_paper_and_mm_agree_where_both_converge():
     """From the same start the paper's recipe, with its line search, ends within 2 % of the majoriser's cost."""
     case, start = problem_at(0.0, 1.5), np.zeros((20, 8))

@@ -9,6 +9,7 @@ from wakewise.errors import InputError
 from wakewise.trials.timing import BenchOptions
 
 
+@pytest.mark.slow
 def test_some_traps_are_right_or_said(capsys: pytest.CaptureFixture[str]) -> None:
     """A good set is right, mixed-up names are a failure in words; the table has a row each."""
     assert "traps" in BENCHES

@@ -80,6 +80,18 @@ def test_people_see_tables_and_reasons(cheap_work: Path, capsys: pytest.CaptureF
     assert "small: 6 of 8 trials done, 0 at work, 0 waiting, 2 failed" in capsys.readouterr().out
 
 
+def test_a_page_says_who_won(cheap_work: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """In the folder that is asked for; what is no factor is refused before anything is written."""
+    assert command(["campaign", "run", "small.yaml", "--workers", "2", "--json"]) == 0
+    capsys.readouterr()
+    assert command(["campaign", "page", "small.yaml", "--out", "there", "--json"]) == 0
+    told = _json(capsys)
+    assert Path(told["page"]).read_text(encoding="utf-8").count("<h1>") == 1
+    assert {one["figure"] for one in told["glances"]} == {"success", "target_speed_mean_m_s"}
+    assert command(["campaign", "page", "small.yaml", "--compare", "seed", "--out", "else"]) == 2
+    assert "allowed: method" in capsys.readouterr().err and not Path("else").exists()
+
+
 def test_more_seeds_are_made_beside_those_that_are_there(cheap_work: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Extending a campaign makes what is new; taking something out of it leaves its trials in the folder."""
     assert command(["campaign", "run", "small.yaml"]) == 0

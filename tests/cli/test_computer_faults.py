@@ -56,6 +56,7 @@ def test_an_output_without_signs_shows_the_rest() -> None:
     assert done.stdout.isascii()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",
     [["scan", "--out", "file/x"], ["target", "show", "branching", "--points", "30", "--out", "file/x.html"]],

@@ -51,6 +51,7 @@ def test_marks_are_shown_and_written_and_read_back(ball, tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["delicate_share_pct"] == pytest.approx(share)
 
 
+@pytest.mark.slow
 def test_a_page_and_a_picture_are_written(ball, tmp_path, capsys):
     """The page names no host; the picture is SVG; the table names thickness and share."""
     page, picture = tmp_path / "t.html", tmp_path / "t.svg"
@@ -90,6 +91,7 @@ def test_an_unknown_target_is_refused(capsys, tmp_path):
     assert "no such file" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_soft_target_tells_how_it_bends(ball, capsys):
     """Stems, frequency and the tip's way in four streams, which grows with the stream; a file's mesh has none of it."""
     assert run(["target", "show", "gorgonian", "--points", "20", "--json"]) == 0

@@ -84,6 +84,7 @@ def test_a_flight_without_a_hover_is_one_line(tmp_path: Path, capsys: Capsys) ->
     assert "cannot be read" in refusal(capsys, "--flight", str(broken))
 
 
+@pytest.mark.slow
 def test_a_weight_that_is_known_asks_for_floats(capsys: Capsys) -> None:
     """4 N heavy: floats, by effort, at no more speed at the target."""
     assert run(["vehicle", "trim", "--net-weight", "4", "--json"]) == 0

@@ -79,6 +79,7 @@ def test_rows_with_nan_are_named(data, capsys):
     assert "line 302: u_m_s is nan" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_validate_prints_the_demanded_keys_and_writes_a_page(tmp_path, capsys):
     """models, grid_convergence_pct and paper are there; the page needs no network."""
     out = tmp_path / "report"

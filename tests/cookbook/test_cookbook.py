@@ -94,6 +94,7 @@ def test_each_kind_is_found_by_its_name(installed: Path, tmp_path: Path) -> None
     assert astern.min() >= -1e-9
 
 
+@pytest.mark.slow
 def test_a_planner_that_believes_in_a_foreign_wake_keeps_it_off_the_target(installed: Path) -> None:
     """Without gradients of its own the model still steers plan and shares; D falls against the least thrusts."""
     scenario = ww.Scenario.preset("quick", **{"control.wake.model": "reef_parts:TopHat", "target.points": 60})

@@ -105,6 +105,7 @@ def test_noise_is_averaged_away():
     assert state.late == 0
 
 
+@pytest.mark.slow
 def test_the_filter_knows_how_wrong_it_is():
     """Told the sensors' own noise, its mean NEES over independent flights is within the 95 % bounds of chi-square.
 

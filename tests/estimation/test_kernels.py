@@ -78,6 +78,7 @@ def jacobian(function, mean, step=1e-5):
     return np.array(columns).T
 
 
+@pytest.mark.slow
 def test_the_covariance_moves_as_the_mean_does():
     """Without noise P becomes F P F', F by differences of the moved mean: exact, but 1 % for what varies in a step."""
     mean, thrusts, dt = random_mean(), RNG.normal(size=8), 0.01

@@ -256,6 +256,7 @@ def test_a_film_goes_on_where_it_stopped(flown: Path, tmp_path: Path, monkeypatc
     assert colours[3][2] < 90
 
 
+@pytest.mark.slow
 def test_the_view_from_outside_shows_the_vehicle_and_its_wash(flown: Path, tmp_path: Path) -> None:
     """Where the hull is, the picture differs from the still scene, and the wash adds light behind it."""
     film = make._Film(flown, 3, 2.0, "both")

@@ -41,6 +41,7 @@ for read in (lambda e: e.populations, lambda e: e.field(), lambda e: e.sums, lam
 """
 
 
+@pytest.mark.slow
 def test_a_graphics_card_does_what_the_processor_does():
     """Two steps of random water between walls and open faces, with a force: populations, field, sums and a line."""
     done = subprocess.run(

@@ -52,6 +52,7 @@ def test_the_recorder_keeps_poses_over_exposure_and_readout(flight):
         assert np.linalg.norm(first - before[-1]) < 0.01
 
 
+@pytest.mark.slow
 def test_photographs_do_not_hang_on_each_other(flight, tmp_path):
     """The second photograph is the same to the byte whether the first was made before it, or after, or never."""
     made = []

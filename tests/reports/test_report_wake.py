@@ -37,6 +37,7 @@ def test_the_page_says_that_the_printed_formula_fails(page):
     assert "Where the printed formula fails" in page
 
 
+@pytest.mark.slow
 def test_the_headline_says_which_model_to_use(result, page):
     """The model whose worst R2 over flows and regions is best; other figures, another answer; none good, no advice."""
     assert "Use jet-fitted." in page[page.index("<h1") : page.index("</h1>")]

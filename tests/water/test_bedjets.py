@@ -81,6 +81,7 @@ def test_a_steady_upright_jet_spreads_as_measured():
         assert half / r == pytest.approx(0.09, rel=0.10)
 
 
+@pytest.mark.slow
 def test_wall_jets_have_no_divergence_even_when_they_lean():
     """Central differences of the velocity sum to zero, relative to the velocity gradient."""
     rng = np.random.default_rng(5)

@@ -5,8 +5,8 @@ is plain values (`task.py`), its folder is the truth (`store.py`), and whoever m
 notes each attempt (`attempts.py`). Start reading in `run.py`, the driver's loop. An attempt is made in a process
 (`worker.py`) that a slot minds (`slot.py`, `memory.py`); an engine says where slots are: in processes of this computer
 (`engines.py`) or on a Dask cluster (`cluster.py`). `index.py` is a cache of the folders, `plan.py` what they were made
-for, `table.py` what came of them; `versions.py` says which source made a trial, and `statistics/` what figures of many
-trials say.
+for, `table.py` what came of them, `contest.py` what is compared with what and `glance.py` who won, with `pictures.py`
+for a page; `versions.py` says which source made a trial, and `statistics/` what figures of many trials say.
 """
 
 from typing import TYPE_CHECKING

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from wakewise.campaigns.pictures import keep_pictures
 from wakewise.campaigns.task import Figures, WorkProgress
 from wakewise.evaluation import flight_figures
 from wakewise.missions import SETTLING
@@ -26,7 +27,7 @@ from wakewise.trials.trial import run_trial
 from wakewise.trials.yardstick import add_yardsticks
 
 _FLIGHT = ("steps.parquet", "metrics.json", "scenario.yaml")
-"""What stays of a trial of which only figures are kept."""
+"""What stays of a trial of which only figures are kept, beside a few pictures."""
 _STAGES = ("compile", "plan", "fly", "photograph", "reconstruct", "evaluate", "mesh", "colours")
 _LOADING = 50  # first steps, whose solve times are those of loading
 
@@ -52,8 +53,9 @@ def model_stage(settings: Mapping[str, Any], folder: Path, progress: WorkProgres
     scenario = scenario_of(settings)
     keep = settings["keep"]
     trial = folder / "trial"
-    flown = scenario if keep == "all" else scenario.replace(**{"reconstruction.mesh": False})
-    figures = _plain(run_trial(flown, trial, _Stages(progress)))
+    parts = (scenario if keep == "all" else scenario.replace(**{"reconstruction.mesh": False})).parts()
+    figures = _plain(run_trial(parts, trial, _Stages(progress)))
+    keep_pictures(parts.target, trial, folder)
     if keep != "all":
         for entry in trial.iterdir():
             if entry.is_dir():

@@ -66,6 +66,19 @@ By = Annotated[
 Figures = Annotated[
     str, typer.Option(help="Figures to show, with commas between; the main ones if not given.", show_default=False)
 ]
+Compare = Annotated[
+    str,
+    typer.Option(
+        help="What is compared: method, target, world, vehicle or variation; the first that differs if not given.",
+        show_default=False,
+    ),
+]
+PageOut = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", help="File or folder to write; campaign.html in its folder if not given.", show_default=False
+    ),
+]
 Write = Annotated[
     Path | None,
     typer.Option("--write", help="Write all trials, a row each, as .parquet or .csv.", show_default=False),
@@ -134,7 +147,7 @@ def run_campaign(
         print_json(status(found) | {"folder": str(folder), "groups": group_table(found)})
     else:
         _show_groups(found, group_table(found))
-        typer.echo(f"folder: {folder}")
+        typer.echo(f"folder: {folder}; `wakewise campaign page {folder}` says who won, with pictures")
     if found.count("done") == 0 and found.count("failed"):
         raise InputError(f"{file}: every trial failed, the first: {status(found)['failures'][0]['reason']}")
 
@@ -174,6 +187,28 @@ def show_table(folder: Folder, by: By = "", figures: Figures = "", write: Write 
         print_json({"name": found.plan.name, "groups": groups, "failures": failures(found)})
         return
     _show_groups(found, groups)
+
+
+@app.command("page")
+def make_page(folder: Folder, compare: Compare = "", out: PageOut = None, json: Json = False) -> None:
+    """Write a page that says who won, by how much, how sure, at what price, and shows where it failed."""
+    from dataclasses import asdict
+
+    from wakewise.campaigns.contest import contest, places
+    from wakewise.campaigns.table import results
+    from wakewise.extras import need
+
+    need("the page of a campaign", "reports")
+    from wakewise.reports import write_campaign
+
+    place = _folder(folder)
+    found = results(place)
+    page = write_campaign(found, place, out, compare)
+    if json:
+        judged = contest(places(found, compare))
+        print_json({"page": str(page), "glances": [asdict(one) | {"sure": one.sure} for _, one in judged]})
+        return
+    typer.echo(f"page: {page}")
 
 
 @app.command("example")

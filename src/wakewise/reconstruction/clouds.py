@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from wakewise.arrays import Array, IntArray, freeze
+from wakewise.arrays import Array, BoolArray, IntArray, freeze
 from wakewise.errors import InputError
 from wakewise.files import broken_promise, whole_file
 
@@ -24,7 +24,7 @@ class Cloud:
     def __post_init__(self) -> None:
         freeze(self, points_m=(None, 3), normals=(None, 3), colours=(None, 3))
 
-    def only(self, kept: Array) -> Cloud:
+    def only(self, kept: BoolArray) -> Cloud:
         """The points that a mask of shape (n,) keeps."""
         return Cloud(points_m=self.points_m[kept], normals=self.normals[kept], colours=self.colours[kept])
 

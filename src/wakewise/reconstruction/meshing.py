@@ -13,7 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from wakewise.arrays import Array, IntArray
+from wakewise.arrays import Array, BoolArray, IntArray
 from wakewise.errors import InputError, StageError
 from wakewise.interfaces import Progress, no_progress
 from wakewise.processes import alone, half_done
@@ -131,11 +131,11 @@ def without_crumbs(faces: IntArray, vertices: int, share: float = 0.005) -> IntA
     return kept
 
 
-def near_subject(points_m: Array) -> Array:
+def near_subject(points_m: Array) -> BoolArray:
     """Mask of the points within the subject's box grown about its middle, shape (n,). One long axis rules all three."""
     low, high = np.percentile(points_m, SUBJECT_PCT, axis=0)
     half = 0.5 * REGION * float((high - low).max())
-    inside: Array = (np.abs(points_m - 0.5 * (low + high)) <= half).all(axis=1)
+    inside: BoolArray = (np.abs(points_m - 0.5 * (low + high)) <= half).all(axis=1)
     return inside
 
 

@@ -7,7 +7,8 @@ say figures in words, `page.py` is HTML with its style and script, `figures.py`,
 what ballast the flight lacked, `coverage.py` what its photographs saw. Studies have pages of their own: `wake.py` with
 `wake_plots.py`, `target.py`, `gentle.py`, `operator.py`, `degradation.py`; `vehicle/` is a vehicle's, `log.py` with
 `log_plots.py` a real vehicle's log's, `look.py` that of a look at photographs, `photo_model/` that of the model made
-from them.
+from them, `campaign.py` a campaign's and `reproduce/` that of the paper's tables (both with `methods_compared.py` and
+`trial_pictures.py`).
 """
 
 from typing import TYPE_CHECKING
@@ -15,10 +16,11 @@ from typing import TYPE_CHECKING
 from wakewise.doors import lazy_door
 
 if TYPE_CHECKING:
+    from wakewise.reports.campaign import write_campaign
     from wakewise.reports.compare import write_comparison
     from wakewise.reports.draft import Draft
     from wakewise.reports.report import begin_report, write_report
 
-__all__ = ["Draft", "begin_report", "write_comparison", "write_report"]
+__all__ = ["Draft", "begin_report", "write_campaign", "write_comparison", "write_report"]
 
 lazy_door(__name__, "reports", "photos")

@@ -52,6 +52,7 @@ class Light:
         return ScalarGrid(origin_W_m=np.zeros(3), spacing_m=0.05, values=np.random.default_rng(0).random((30, 30, 20)))
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_flight(tmp_path: Path) -> None:
     """A photograph a second: from the second minute to the fifth less is added than half a minute of rows would take;
     kept in memory they would take some 20 MB. All of it is in the folder in the end.

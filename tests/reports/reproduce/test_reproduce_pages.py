@@ -10,15 +10,17 @@ import numpy as np
 import polars as pl
 import pytest
 
+from wakewise.campaigns.pictures import MODEL
 from wakewise.campaigns.task import Outcome, Task
+from wakewise.reports.methods_compared import methods_compared, profiles
 from wakewise.reports.reproduce import plots, write_pages, write_results
 from wakewise.reports.reproduce.results import standalone_svg
 from wakewise.reports.reproduce.words import machine, reproduced
 from wakewise.studies.reproduce.blocks import TABLE, Wish, blocks_of
 from wakewise.studies.reproduce.flights import SERIES
+from wakewise.studies.reproduce.judged import JUDGED
 from wakewise.studies.reproduce.rows import Made
 from wakewise.studies.reproduce.run import _figures, _Growing
-from wakewise.studies.reproduce.scans import MODEL
 
 
 def table(name, figures, trials=4, worlds=None):
@@ -115,6 +117,7 @@ def test_what_is_met_only_in_the_papers_own_water_is_told_apart(tables):
     assert any("R2 near the axis" in line and "oracle" in line for line in could_not)
 
 
+@pytest.mark.slow
 def test_markdown_has_a_page_for_each_table_and_plots_that_are_pictures(tables, tmp_path):
     """SVG that any reader takes, the same for the same figures."""
     store = _store(tables, tmp_path / "store")
@@ -162,9 +165,9 @@ def test_results_are_written_whole_and_small_or_not_at_all(tables, tmp_path, mon
 
 def test_plots_of_nothing_are_none():
     """No trial, no picture."""
-    assert plots.methods_compared("dynamic", [], []) is None
+    assert methods_compared(JUDGED["dynamic"], [], []) is None
     assert plots.over_time({}) is None
-    assert plots.profiles("dynamic", []) is None
+    assert profiles(JUDGED["dynamic"], []) is None
     assert plots.obedience([]) is None
     assert plots.agreement([]) is None
 
@@ -178,7 +181,7 @@ def test_the_machine_is_told_without_a_name():
 
 def test_every_flown_table_has_a_plot_of_its_methods(tables):
     """Named as the paper's method comparison."""
-    figure = plots.methods_compared("station", tables["station"]["places"], tables["station"]["rows"])
+    figure = methods_compared(JUDGED["station"], tables["station"]["places"], tables["station"]["rows"])
     assert "wake-aware" in standalone_svg(figure)
     assert set(TABLE) >= set(tables)
 

@@ -93,6 +93,7 @@ def test_the_strength_is_found_apart_from_the_width():
     assert fit.half_width_slope == pytest.approx(0.12, rel=0.15)
 
 
+@pytest.mark.slow
 def test_the_error_falls_with_minutes():
     """As the root of the number of flakes, by the fit's own word and in truth over some draws."""
     few, many = ([fitted(0.13, pairs, seed) for seed in (3, 4, 5)] for pairs in (8, 60))

@@ -1,7 +1,6 @@
 """The paper's tables beside ours: one page with pictures (`page.py`), or Markdown and small plots (`results.py`).
 
-`words.py` says in both what was found, `plots.py` redraws the paper's figures from our data, `pictures.py` shows
-trials.
+`words.py` says in both what was found, `plots.py` redraws the paper's figures from our data.
 """
 
 from wakewise.reports.reproduce.page import write_pages

@@ -9,11 +9,13 @@ from typing import Any
 
 from wakewise.arrays import Array
 from wakewise.files import write_text
-from wakewise.reports.page import error_scale, fold, missing, panel, plot, section, whole_page
-from wakewise.reports.reproduce import pictures, plots, words
+from wakewise.reports.methods_compared import methods_compared, price, profiles, won
+from wakewise.reports.page import fold, missing, plot, section, whole_page
+from wakewise.reports.reproduce import plots, words
+from wakewise.reports.trial_pictures import worst_panels
 from wakewise.reports.words import number
 from wakewise.studies.reproduce.flights import read_series
-from wakewise.studies.reproduce.glance import CIRCULAR, JUDGED, glances, tally, worst_trials
+from wakewise.studies.reproduce.judged import CIRCULAR, JUDGED, glances, tally
 from wakewise.studies.reproduce.quoted import UNKNOWN
 from wakewise.studies.reproduce.waters import water
 
@@ -93,7 +95,7 @@ def _glance(tables: Mapping[str, Mapping[str, Any]]) -> str:
             circular = " (circular)" if one.world in CIRCULAR else ""
             rows.append(
                 f'<tr><td><a href="#{name}">{name}</a></td><td>{escape(one.world)}{circular}</td>'
-                f"<td>{escape(words.won(one))}</td><td>{escape(words.price(one))}</td>"
+                f"<td>{escape(won(one))}</td><td>{escape(price(one))}</td>"
                 f'<td class="num">{one.trials}</td></tr>'
             )
     if not rows:
@@ -122,7 +124,7 @@ def _table(table: Mapping[str, Any], store: Path) -> str:
     if name == "station":
         parts.append(_temporal(places, store))
     if name in _SCANNED:
-        parts.append(_worst(name, places, store))
+        parts.append(worst_panels(JUDGED[name], places, store))
     if table["failures"]:
         items = "".join(f"<li>{escape(f['trial'])}: {escape(str(f['reason']))}</li>" for f in table["failures"])
         parts.append(fold("Failed trials", f"<ul>{items}</ul>", f"{len(table['failures'])}"))
@@ -145,12 +147,13 @@ def _drawn(table: Mapping[str, Any]) -> str:
         caption = "By w_track. Above and left of the dashed lines the paper's claim is met."
         parts.append(plot(drawn[0], "obedience and wash", caption, narrow=drawn[1]))
     elif name in JUDGED:
-        drawn = (plots.methods_compared(name, places, rows), plots.methods_compared(name, places, rows, narrow=True))
+        measure = JUDGED[name]
+        drawn = (methods_compared(measure, places, rows), methods_compared(measure, places, rows, narrow=True))
         caption = "Dots are trials, diamonds means with their interval, black ticks the paper's figures."
         parts.append(plot(drawn[0], f"methods compared, {name}", caption, narrow=drawn[1]))
-    profile = plots.profiles(name, places)
-    if profile is not None and name in ("dynamic", "station"):
-        narrow = plots.profiles(name, places, narrow=True)
+    profile = profiles(JUDGED[name], places) if name in ("dynamic", "station") else None
+    if profile is not None:
+        narrow = profiles(JUDGED[name], places, narrow=True)
         caption = "Share of trials that are at least so good; the curve that rises first is the better method."
         parts.append(plot(profile, f"performance profiles, {name}", caption, narrow=narrow))
     return "".join(parts)
@@ -254,19 +257,6 @@ def _temporal(places: Sequence[Mapping[str, Any]], store: Path) -> str:
             drawn = (plots.over_time(series), plots.over_time(series, narrow=True))
             caption = f"{world}, the first seed: true thrusts, the target's water, D by what is believed of the jets."
             parts.append(plot(drawn[0], f"thrusts and disturbance over time, {world}", caption, narrow=drawn[1]))
-    return "".join(parts)
-
-
-def _worst(name: str, places: Sequence[Mapping[str, Any]], store: Path) -> str:
-    """The worst trial of each method: what its camera saw, and its model."""
-    parts = []
-    for world in dict.fromkeys(place["world"] for place in places):
-        worst = worst_trials(name, world, places)
-        seen, modelled = pictures.before_after(worst, store), pictures.models(worst, store)
-        if seen:
-            parts.append(panel(f"Before and after, {world}", "Each method's worst trial.", "", seen))
-        scale = error_scale("error (mm)")
-        parts.append(panel(f"Worst models, {world}", "Coloured by distance to the true surface.", scale, modelled))
     return "".join(parts)
 
 

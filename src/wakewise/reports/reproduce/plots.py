@@ -10,65 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wakewise.arrays import Array
-from wakewise.campaigns.statistics import performance_profile, stratified_bootstrap
 from wakewise.reports.figures import NARROW_IN, WIDTH_IN
 from wakewise.reports.ink import CORAL, INK, LINE, MUTED, SAND, SLATE, TEAL, VIOLET, dress, key, new_figure
-from wakewise.studies.reproduce.glance import JUDGED
+from wakewise.reports.methods_compared import colour_of
 
-Place = Mapping[str, Any]
 Row = Mapping[str, Any]
-COLOURS = {
-    "manual": SAND,
-    "dp": CORAL,
-    "unaware": SLATE,
-    "smooth": VIOLET,
-    "wake-aware": TEAL,
-    "the paper's recipe": CORAL,
-}
-_FEWEST = 3  # of fewer trials a profile is a staircase of nothing
-_MOST_BEYOND = 4.0  # a trial worse than so many times the median of all is drawn at the edge
-
-
-def colour_of(method: str) -> str:
-    """The same on every plot."""
-    return COLOURS.get(method.split(",", maxsplit=1)[0], MUTED)
-
-
-def methods_compared(table: str, places: Sequence[Place], rows: Sequence[Row], narrow: bool = False) -> Figure | None:
-    """A panel per world: each trial a dot, the mean with its interval, the paper's figure a tick."""
-    if table not in JUDGED:
-        return None
-    figure, words, scale, _ = JUDGED[table]
-    worlds = [w for w in dict.fromkeys(p["world"] for p in places) if _known(places, w, figure)]
-    methods = list(dict.fromkeys(place["method"] for place in places))
-    if not worlds:
-        return None
-    across = 1 if narrow else len(worlds)
-    height = 0.34 * len(methods) + 1.0
-    drawn = new_figure(NARROW_IN, height * len(worlds)) if narrow else new_figure(WIDTH_IN, height + 0.3)
-    panels = drawn.subplots(len(worlds) if narrow else 1, across, squeeze=False).ravel()
-    rng = np.random.default_rng(0)
-    for number_, (axes, world) in enumerate(zip(panels, worlds, strict=True)):
-        dress(axes, x=words, grid="x")
-        for place, method in enumerate(methods):
-            values = scale * np.array([v for _, v in _known(places, world, figure, method)])
-            quoted = _quoted(rows, world, method, figure)
-            if quoted is not None:
-                axes.plot([scale * quoted] * 2, [place - 0.34, place + 0.34], color=INK, linewidth=2.0, zorder=1)
-            if not len(values):
-                continue
-            colour = colour_of(method)
-            spread = place + rng.uniform(-0.14, 0.14, len(values))
-            axes.plot(values, spread, "o", color=colour, markersize=4, alpha=0.45, linewidth=0)
-            mean, ends = stratified_bootstrap(values, [t for t, _ in _known(places, world, figure, method)])
-            axes.plot([mean], [place], "D", color=colour, markersize=7, zorder=3)
-            if ends is not None:
-                axes.plot(ends, [place, place], color=colour, linewidth=2.4, zorder=2)
-        axes.set_ylim(len(methods) - 0.5, -0.5)
-        axes.set_yticks(range(len(methods)), methods if narrow or number_ == 0 else [""] * len(methods))
-        axes.set_xlim(left=0.0)
-        axes.set_title(world, loc="left", color=INK, fontsize=10.5)
-    return drawn
 
 
 def over_time(series: Mapping[str, Mapping[str, Array]], narrow: bool = False) -> Figure | None:
@@ -98,37 +44,6 @@ def over_time(series: Mapping[str, Mapping[str, Array]], narrow: bool = False) -
     for axes in panels:
         axes.axvspan(0.0, begins_s, color=LINE, alpha=0.35, linewidth=0)
     key(water, loc="upper right", ncols=count)
-    return drawn
-
-
-def profiles(table: str, places: Sequence[Place], narrow: bool = False) -> Figure | None:
-    """Share of trials that are at least so good, by method, a panel per world; failed trials never are."""
-    if table not in JUDGED or not JUDGED[table][3]:
-        return None
-    figure, words, scale, _ = JUDGED[table]
-    methods = dict.fromkeys(place["method"] for place in places)
-    worlds = [
-        world
-        for world in dict.fromkeys(place["world"] for place in places)
-        if all(len(_known(places, world, figure, method)) >= _FEWEST for method in methods)
-    ]
-    if not worlds:
-        return None
-    drawn = new_figure(NARROW_IN, 2.6 * len(worlds)) if narrow else new_figure(WIDTH_IN, 3.0)
-    panels = drawn.subplots(len(worlds) if narrow else 1, 1 if narrow else len(worlds), squeeze=False).ravel()
-    for axes, world in zip(panels, worlds, strict=True):
-        dress(axes, x=f"at most, {words}", y="share of trials", grid="both")
-        every = scale * np.array([v for _, v in _known(places, world, figure)])
-        top = min(float(every.max()), _MOST_BEYOND * float(np.median(every))) * 1.05
-        steps = np.linspace(0.0, top, 200)
-        for method in dict.fromkeys(p["method"] for p in places if p["world"] == world):
-            own = [p for p in places if p["world"] == world and p["method"] == method]
-            values = [scale * float(p["figures"][figure]) if _has(p, figure) else np.nan for p in own]
-            axes.plot(steps, performance_profile(values, steps), color=colour_of(method), label=method, linewidth=1.6)
-        axes.set_ylim(0.0, 1.03)
-        axes.set_xlim(0.0, top)
-        axes.set_title(world, loc="left", color=INK, fontsize=10.5)
-    key(panels[0], loc="lower right")
     return drawn
 
 
@@ -196,25 +111,3 @@ def agreement(rows: Sequence[Row], narrow: bool = False) -> Figure | None:
         axes.set_title(words, loc="left", color=INK, fontsize=10.5)
     key(panels[0], loc="lower left")
     return drawn
-
-
-def _known(places: Sequence[Place], world: str, figure: str, method: str | None = None) -> list[tuple[str, float]]:
-    """Target and value of the trials that have it."""
-    return [
-        (place["target"], float(place["figures"][figure]))
-        for place in places
-        if place["world"] == world and (method is None or place["method"] == method) and _has(place, figure)
-    ]
-
-
-def _has(place: Place, figure: str) -> bool:
-    value = place["figures"].get(figure)
-    return value is not None and bool(np.isfinite(float(value)))
-
-
-def _quoted(rows: Sequence[Row], world: str, method: str, figure: str) -> float | None:
-    """The paper's mean of this figure, in the trial's unit of our rows."""
-    for row in rows:
-        if (row["world"], row["method"], row["key"], row["reading"]) == (world, method, figure, "mean"):
-            return None if row["paper"] is None else float(row["paper"])
-    return None

@@ -16,15 +16,18 @@ import polars as pl
 from matplotlib.figure import Figure
 
 from wakewise.arrays import Array
+from wakewise.campaigns.glance import worst_trials
 from wakewise.campaigns.statistics import smallest_effect
 from wakewise.files import whole_file, write_text
 from wakewise.reports.ink import CARD, CORAL, INK, LINE, MUTED, SAND, SLATE, TEAL, VIOLET
-from wakewise.reports.reproduce import pictures, plots, words
+from wakewise.reports.methods_compared import methods_compared, price, profiles, won
+from wakewise.reports.reproduce import plots, words
+from wakewise.reports.trial_pictures import sheet
 from wakewise.reports.words import number
 from wakewise.studies.reproduce.comparison import COLUMNS, command_of
 from wakewise.studies.reproduce.comparison import tables as compared_tables
 from wakewise.studies.reproduce.flights import read_series
-from wakewise.studies.reproduce.glance import CIRCULAR, JUDGED, glances, worst_trials
+from wakewise.studies.reproduce.judged import CIRCULAR, JUDGED, glances
 from wakewise.studies.reproduce.quoted import UNKNOWN
 from wakewise.studies.reproduce.waters import water
 
@@ -112,7 +115,7 @@ def _index(tables: Mapping[str, Mapping[str, Any]], note: str) -> str:
     for name, table in tables.items():
         for one in glances(name, table["places"]):
             circular = " (circular)" if one.world in CIRCULAR else ""
-            lines.append(f"| {name} | {one.world}{circular} | {words.won(one)} | {words.price(one)} |")
+            lines.append(f"| {name} | {one.world}{circular} | {won(one)} | {price(one)} |")
     lines += [
         "",
         "## How",
@@ -185,8 +188,8 @@ def _worst(table: Mapping[str, Any], store: Path, out: Path) -> list[str]:
     """The worst trial of each method in each world: its photographs and model, or which it was."""
     name, lines = table["table"], []
     for world in table["worlds"]:
-        worst = worst_trials(name, world, table["places"])
-        drawn = pictures.sheet(worst, store) if any("rmse_mm" in place["figures"] for place in worst.values()) else None
+        worst = worst_trials(JUDGED[name], world, table["places"])
+        drawn = sheet(worst, store) if any("rmse_mm" in place["figures"] for place in worst.values()) else None
         if drawn is not None:
             file = f"{name}-worst-{world}.jpg"
             with whole_file(out / file) as temporary:
@@ -215,10 +218,10 @@ def _plots(table: Mapping[str, Any], store: Path) -> list[tuple[str, Figure]]:
         drawn.append(("agreement", plots.agreement(rows)))
     elif name == "operator":
         drawn.append(("obedience", plots.obedience(rows)))
-    else:
-        drawn.append(("methods", plots.methods_compared(name, places, rows)))
+    elif name in JUDGED:
+        drawn.append(("methods", methods_compared(JUDGED[name], places, rows)))
     if name == "dynamic":
-        drawn.append(("profiles", plots.profiles(name, places)))
+        drawn.append(("profiles", profiles(JUDGED[name], places)))
     if name == "station":
         for world in table["worlds"]:
             series: dict[str, dict[str, Array]] = {}

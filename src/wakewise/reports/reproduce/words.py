@@ -9,46 +9,11 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from wakewise.reports.words import number
-from wakewise.studies.reproduce.glance import Glance, tally
+from wakewise.studies.reproduce.judged import tally
 
-_ALIKE = 0.005
-"""Costs that differ by less are told as the same."""
 Row = Mapping[str, Any]
 Table = Mapping[str, Any]
 _PACKAGES = ("wakewise", "numpy", "scipy", "numba", "pycolmap", "embreex", "daqp", "osqp", "opencv-python-headless")
-
-
-def won(glance: Glance) -> str:
-    """Who won, by how much, how sure."""
-    value = number(glance.means[glance.winner])
-    if glance.rival is None:
-        return f"{glance.winner}: {value} {glance.words}."
-    if glance.means[glance.winner] == glance.means[glance.rival]:
-        return f"{glance.winner} and {glance.rival} are even: {value} {glance.words} each."
-    said = f"{glance.winner} is best with {value} {glance.words}"
-    if glance.less_pct is not None:
-        ends = (
-            ""
-            if glance.interval_pct is None
-            else f" ({number(glance.interval_pct[0])} to {number(glance.interval_pct[1])})"
-        )
-        said += f", {number(abs(glance.less_pct))} %{ends} better than {glance.rival}"
-    return f"{said}; {glance.sure}."
-
-
-def price(glance: Glance) -> str:
-    """What the winner costs, and where trials failed."""
-    said = []
-    if glance.energy_ratio is not None:
-        alike = abs(glance.energy_ratio - 1.0) < _ALIKE
-        much = "as much energy as" if alike else f"{number(glance.energy_ratio)} times the energy of"
-        said.append(f"It takes {much} {glance.rival}.")
-    lost = {method: count for method, count in glance.failed.items() if count}
-    if lost:
-        said.append("Failed: " + ", ".join(f"{method} {count}" for method, count in lost.items()) + ".")
-    elif glance.trials:
-        said.append("No trial failed.")
-    return " ".join(said)
 
 
 def met_of(tables: Mapping[str, Sequence[Row]]) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.arrays import Array
+from wakewise.campaigns.glance import by_target
 from wakewise.campaigns.statistics import (
     WORST,
     Interval,
@@ -207,14 +208,6 @@ def _less_pct(claim: Claim, trials: Trials) -> Row | None:
         "improvement": better,
         "pairs_for_80_pct": None if test.d_z is None or test.d_z == 0.0 else pairs_needed(test.d_z),
     }
-
-
-def by_target(values: Mapping[Known, float], which: Iterable[Known]) -> dict[str, list[float]]:
-    """Values by target."""
-    found: dict[str, list[float]] = {}
-    for known in which:
-        found.setdefault(known[0], []).append(values[known])
-    return found
 
 
 def _share_pct(claim: Claim, trials: Trials) -> Row | None:

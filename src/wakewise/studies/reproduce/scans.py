@@ -1,29 +1,25 @@
 """Work of a campaign: one whole scan and its model, of which the pictures that a page shows are kept.
 
-What stays in the trial's folder: `metrics.json`; `model.npz`, points of the model with their errors; three photographs,
-0, 5 and 10 s after the first. The rest, some fifty megabytes, goes.
+What stays in the trial's folder is `metrics.json` and what a page shows (see `wakewise.campaigns.pictures`); the rest,
+some fifty megabytes, goes.
 """
 
 from __future__ import annotations
 
-import json
 import shutil
 import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
-import polars as pl
 
-from wakewise.errors import StageError
-from wakewise.evaluation import Crop, compare_surface
+from wakewise.campaigns.pictures import keep_pictures
+from wakewise.evaluation import Crop
 from wakewise.evaluation.extent import area_and_volume
-from wakewise.files import whole_file, write_json
+from wakewise.files import write_json
 from wakewise.interfaces import Progress
 from wakewise.operation import Parts, Scenario
-from wakewise.reconstruction import read_cloud
 from wakewise.targets import read_mesh
 from wakewise.trials import run_trial
 
@@ -51,10 +47,6 @@ FIGURES = (
     "fallbacks",
     "duration_s",
 )
-PICTURES_AT_S = (0.0, 5.0, 10.0)
-"""After the first photograph, as the paper shows before and after."""
-WIDE_PX, POINTS = 480, 40_000
-MODEL = "model.npz"
 
 
 def scan_one(settings: Mapping[str, Any], folder: Path, progress: Progress) -> dict[str, Any]:
@@ -81,19 +73,9 @@ def scan_one(settings: Mapping[str, Any], folder: Path, progress: Progress) -> d
     if extent:
         figures |= _extent(parts, place)
     write_json(folder / "metrics.json", told)
-    _keep_model(parts, place, folder)
-    _keep_photographs(place, folder)
+    keep_pictures(parts.target, place, folder)
     shutil.rmtree(place)
     return figures | {"cpu_s": time.process_time() - began}
-
-
-def photographs_of(folder: Path) -> list[tuple[float, Path]]:
-    """Times after the first photograph and files that a scan left."""
-    try:
-        listed = json.loads((folder / "photographs.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return []
-    return [(float(one["after_s"]), folder / one["file"]) for one in listed]
 
 
 def _extent(parts: Parts, place: Path) -> dict[str, float | None]:
@@ -106,42 +88,6 @@ def _extent(parts: Parts, place: Path) -> dict[str, float | None]:
         return found | {"area_cm2": None, "volume_cm3": None}
     model_area, model_volume = area_and_volume(read_mesh(path), crop)
     return found | {"area_cm2": 1e4 * model_area, "volume_cm3": 1e6 * model_volume}
-
-
-def _keep_model(parts: Parts, place: Path, folder: Path) -> None:
-    """Points of the model with their errors in mm, thinned, for a picture."""
-    try:
-        compared = compare_surface(
-            read_cloud(place / "dense.ply").points_m, parts.target.mesh, crop=Crop(bed_z_m=parts.target.bed_z_m)
-        )
-    except (StageError, OSError):
-        return
-    every = max(1, len(compared.points_W_m) // POINTS)
-    with whole_file(folder / MODEL) as temporary, temporary.open("wb") as file:
-        np.savez_compressed(
-            file,
-            points_m=compared.points_W_m[::every].astype(np.float32),
-            error_mm=compared.error_mm[::every].astype(np.float32),
-        )
-
-
-def _keep_photographs(place: Path, folder: Path) -> None:
-    """The photographs nearest to `PICTURES_AT_S`, small."""
-    listed = pl.read_csv(place / "images.csv").sort("time_s")
-    times = listed["time_s"].to_numpy() - float(listed["time_s"][0])
-    kept = []
-    for wished in PICTURES_AT_S:
-        row = int(np.argmin(np.abs(times - wished)))
-        image = cv2.imread(str(place / "images" / listed["name"][row]), cv2.IMREAD_COLOR)
-        if image is None:
-            continue
-        size = (WIDE_PX, round(WIDE_PX * image.shape[0] / image.shape[1]))
-        name = f"photograph-{wished:g}s.jpg"
-        coded = cv2.imencode(".jpg", cv2.resize(image, size, interpolation=cv2.INTER_AREA))[1]
-        with whole_file(folder / name) as temporary:
-            temporary.write_bytes(coded.tobytes())
-        kept.append({"after_s": float(times[row]), "file": name})
-    write_json(folder / "photographs.json", kept)
 
 
 def _plain(value: Any) -> float | None:

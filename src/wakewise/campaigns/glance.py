@@ -1,36 +1,32 @@
-"""A table at a glance: who won, by how much, how sure, at what price, where it failed."""
+"""Methods compared at a glance: who won, by how much, how sure, at what price, where it failed."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from wakewise.campaigns.statistics import WORST, paired_test, probability_of_improvement, stratified_bootstrap
 from wakewise.campaigns.statistics.intervals import ratio_of_sums
-from wakewise.studies.reproduce.rows import by_target
 
 Place = Mapping[str, Any]
-"""A trial as `run.place_of` tells of it."""
-JUDGED: dict[str, tuple[str, str, float, bool]] = {
-    "dynamic": ("rmse_mm", "mm RMSE", 1.0, True),
-    "success": ("success", "% of models", 100.0, False),
-    "station": ("target_speed_mean_m_s", "mm/s at the target", 1e3, True),
-    "ablation": ("target_speed_mean_m_s", "mm/s at the target", 1e3, True),
-    "sediment": ("rmse_mm", "mm RMSE", 1.0, True),
-    "flow": ("piv_speed_m_s", "mm/s by PIV", 1e3, True),
-    "field": ("rmse_mm", "mm RMSE", 1.0, True),
-    "operator": ("target_speed_mean_m_s", "mm/s at the target", 1e3, True),
-    "comparison": ("target_speed_mean_m_s", "mm/s at the target", 1e3, True),
-}
-"""By table the figure that it is judged by, its unit in words, the factor to that, and whether less is better."""
+"""A trial: world, method, target, seed, folder below the store, figures, and reason if it failed."""
+
+
+class Measure(NamedTuple):
+    """A figure that methods are judged by, its unit in words, the factor to that, and whether less is better."""
+
+    figure: str
+    words: str
+    scale: float
+    less: bool
 
 
 @dataclass(frozen=True, kw_only=True)
 class Glance:
-    """One world of a table in a few words.
+    """Methods in one world in a few words.
 
     `means` are in the unit of `words`, worst last; `less_pct` is how much better the winner is than `rival`, the best
     of the others, with its interval; `energy_ratio` what it costs over the rival; `failed` counts trials by method.
@@ -62,17 +58,9 @@ class Glance:
         return "sure, the interval does not hold zero"
 
 
-def glances(table: str, places: Sequence[Place]) -> list[Glance]:
-    """One for each world of a table, over the trials that all of its methods have; none of tables without methods."""
-    if table not in JUDGED:
-        return []
-    found = (glance(table, world, places) for world in dict.fromkeys(place["world"] for place in places))
-    return [one for one in found if one is not None]
-
-
-def glance(table: str, world: str, places: Sequence[Place]) -> Glance | None:
-    """A table in one world; None where no seed was flown by all."""
-    figure, words, scale, less = JUDGED[table]
+def glance(measure: Measure, world: str, places: Sequence[Place]) -> Glance | None:
+    """Methods in one world; None where no seed was flown by all."""
+    figure, words, scale, less = measure
     here = [place for place in places if place["world"] == world]
     values: dict[str, dict[tuple[str, int], float]] = {}
     energy: dict[str, dict[tuple[str, int], float]] = {}
@@ -124,11 +112,9 @@ def glance(table: str, world: str, places: Sequence[Place]) -> Glance | None:
     )
 
 
-def worst_trials(table: str, world: str, places: Sequence[Place]) -> dict[str, Place]:
+def worst_trials(measure: Measure, world: str, places: Sequence[Place]) -> dict[str, Place]:
     """The worst trial of each method in a world: one that failed, else the one with the worst figure."""
-    if table not in JUDGED:
-        return {}
-    figure, _, _, less = JUDGED[table]
+    figure, _, _, less = measure
 
     def badness(place: Place) -> float:
         value = place["figures"].get(figure)
@@ -142,25 +128,9 @@ def worst_trials(table: str, world: str, places: Sequence[Place]) -> dict[str, P
     return found
 
 
-CIRCULAR = ("paper",)
-"""Worlds whose water is the planner's own model: what is met there alone is told apart."""
-
-
-def tally(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, int]:
-    """How many of the figures that the paper quotes are met, each counted once, however many worlds or flows it has.
-
-    `quoted`: figures with a value of the paper and one of ours; `met`: in some world that is not circular; `surely`:
-    there with the whole interval on that side; `circular`: in a circular world alone.
-    """
-    found: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
-    for name, rows in tables.items():
-        for row in rows:
-            if row["paper"] is not None and row["met"] is not None:
-                found.setdefault((name, row["method"], row["figure"]), []).append(row)
-    fair = {key: [row for row in rows if row["met"] and row["world"] not in CIRCULAR] for key, rows in found.items()}
-    return {
-        "quoted": len(found),
-        "met": sum(bool(rows) for rows in fair.values()),
-        "surely": sum(any(row["sure"] for row in rows) for rows in fair.values()),
-        "circular": sum(not fair[key] and any(row["met"] for row in rows) for key, rows in found.items()),
-    }
+def by_target(values: Mapping[tuple[str, int], float], which: Iterable[tuple[str, int]]) -> dict[str, list[float]]:
+    """Values by target, of those that are known by target and seed."""
+    found: dict[str, list[float]] = {}
+    for known in which:
+        found.setdefault(known[0], []).append(values[known])
+    return found

@@ -1,10 +1,10 @@
-"""Pictures of trials: photographs 0, 5 and 10 s after the first, and the model with its errors."""
+"""Pictures of each method's worst trial: photographs 0, 5 and 10 s after the first, and the model with its errors."""
 
 from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -14,15 +14,36 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from wakewise.arrays import Array
+from wakewise.campaigns.glance import Measure, Place, worst_trials
+from wakewise.campaigns.pictures import MODEL, photographs_of
 from wakewise.reports.ink import data_uri, error_colours
+from wakewise.reports.page import error_scale, panel
 from wakewise.reports.views import SIDES, Frame, draw_cloud
 from wakewise.reports.words import number
-from wakewise.studies.reproduce.scans import MODEL, photographs_of
 
 PIXELS = 260
 _SHEET = ("north", "east", "above")
 """Sides of a model that a sheet has room for, by the last word of their names."""
 _ROW_IN, _WIDE_IN, _DPI, _QUALITY = 1.75, 9.0, 100, 82
+
+
+def worst_panels(measure: Measure, places: Sequence[Place], store: Path) -> str:
+    """The worst trial of each method in each world: what its camera saw, and its model; empty where none was kept."""
+    parts = []
+    for world in dict.fromkeys(place["world"] for place in places):
+        worst = worst_trials(measure, world, places)
+        if not any(
+            (store / place["folder"] / MODEL).is_file() or photographs_of(store / place["folder"])
+            for place in worst.values()
+        ):
+            continue
+        seen = before_after(worst, store)
+        if seen:
+            parts.append(panel(f"Before and after, {world}", "Each method's worst trial.", "", seen))
+        scale = error_scale("error (mm)")
+        title = f"Worst models, {world}"
+        parts.append(panel(title, "Coloured by distance to the true surface.", scale, models(worst, store)))
+    return "".join(parts)
 
 
 def before_after(worst: Mapping[str, Mapping[str, Any]], store: Path) -> str:
