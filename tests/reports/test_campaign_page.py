@@ -13,13 +13,13 @@ from wakewise.reports import write_campaign
 from wakewise.reports.campaign import campaign_page
 
 
-def campaign(seeds=6, worlds=("mud",), waiting=0, factor="method", names=("dp", "<ours>")):
-    """Models of two methods, the second better; one of its models did not come about."""
+def campaign(seeds=6, worlds=("mud",), waiting=0, factor="method", names=("dp", "<ours>"), lost=True):
+    """Models of two methods, the second better; maybe one of its models did not come about."""
     made = []
     for world in worlds:
         for seed in range(1, seeds + 1):
             for place, name in enumerate(names):
-                rmse = None if place and seed == seeds and seeds > 5 else 3.0 - place + 0.02 * seed
+                rmse = None if place and seed == seeds and lost else 3.0 - place + 0.02 * seed
                 figures = {"rmse_mm": rmse, "target_speed_mean_m_s": 0.02 / (1 + place), "energy_kJ": 1.0 + place}
                 key = f"{world}-{seed}-{place}"
                 entry = Entry(
@@ -67,7 +67,7 @@ def test_the_page_says_who_won_and_shows_the_worst(tmp_path):
 
 def test_several_worlds_are_counted_in_the_headline(tmp_path):
     """In how many of them it is sure."""
-    page = campaign_page(campaign(seeds=5, worlds=("mud", "reef")), tmp_path)
+    page = campaign_page(campaign(seeds=6, worlds=("mud", "reef"), lost=False), tmp_path)
     assert "&lt;ours&gt; is surely best in 2 of 2 settings (mm RMSE of the model)." in page
 
 
@@ -88,5 +88,5 @@ def test_what_is_not_finished_or_not_there_is_said(tmp_path):
 
 def test_vehicles_are_compared_like_methods(tmp_path):
     """Whatever differs; each has a colour of its own."""
-    page = campaign_page(campaign(factor="vehicle", names=("heavy", "vectored6"), seeds=5), tmp_path)
+    page = campaign_page(campaign(factor="vehicle", names=("heavy", "vectored6"), lost=False), tmp_path)
     assert "vectored6 is best with" in page

@@ -15,6 +15,10 @@ Place = Mapping[str, Any]
 """A trial: world, method, target, seed, folder below the store, figures, and reason if it failed."""
 
 
+FEWEST = 6
+"""Pairs from which on a difference can be sure: five all agree by chance alone once in sixteen times."""
+
+
 class Measure(NamedTuple):
     """A figure that methods are judged by, its unit in words, the factor to that, and whether less is better."""
 
@@ -53,6 +57,8 @@ class Glance:
             return "there was no other method"
         if self.trials < 2:
             return "one trial each: nobody knows"
+        if self.trials < FEWEST:
+            return f"{self.trials} pairs are too few to be sure"
         if self.interval_pct is None or self.interval_pct[0] <= 0.0:
             return "undecided, the interval holds zero"
         return "sure, the interval does not hold zero"

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from wakewise.campaigns.contest import comparable, contest, measures, places
-from wakewise.campaigns.glance import Glance, Measure, Place
+from wakewise.campaigns.glance import FEWEST, Glance, Measure, Place
 from wakewise.campaigns.table import Results, failures, group_table
 from wakewise.files import write_text
 from wakewise.reports.methods_compared import methods_compared, price, profiles, won
@@ -78,9 +78,11 @@ def _head(found: Results, judged: Sequence[tuple[Measure, Glance]], compared: st
             f"<b>Not finished.</b> {total - done - failed} trials are still to come; this holds for those that ended."
         )
     few = min((one.trials for _, one in judged), default=0)
-    if 0 < few < 5:
-        pairs = "one pair" if few == 1 else f"{few} pairs"
-        cautions.append(f"<b>Few.</b> {pairs.capitalize()} somewhere: read it as what to look at next. More `seeds`.")
+    if 0 < few < FEWEST:
+        pairs = "One pair" if few == 1 else f"{few} pairs"
+        cautions.append(
+            f"<b>Few.</b> {pairs} somewhere: read it as what to look at next; more <code>seeds</code> tell."
+        )
     said = "".join(f'<p class="caution">{text}</p>' for text in cautions)
     return f"{eyebrow}<h1>{escape(_title(judged, compared))}</h1>{_why(judged)}{said}"
 
