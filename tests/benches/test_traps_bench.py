@@ -49,6 +49,23 @@ def test_places_on_a_line_are_judged_by_the_cameras_turns() -> None:
     assert traps._error(uneven, truth)[0] > 5.0
 
 
+def test_what_was_taken_from_one_place_has_no_error_in_percent(monkeypatch: pytest.MonkeyPatch) -> None:
+    """There is no spread to be off by; that is said in `why`, and a model of it is wrong unless it is doubted."""
+    placed = {f"{k:02d}.png": camera for k, camera in enumerate(trap_scenes.over(4))}
+    shots = [
+        traps.Shot(
+            image=np.zeros((8, 8, 3), dtype=np.uint8),
+            camera=trap_scenes.Camera(R_WC=camera.R_WC, p_WC_m=np.zeros(3)),
+        )
+        for camera in placed.values()
+    ]
+    monkeypatch.setattr(traps, "_model", lambda *_: ([], placed))
+    monkeypatch.setattr(traps, "TRAPS", {"spot": traps.Trap(why="", shots=lambda: shots)})
+    told = traps.run(BenchOptions())
+    assert told["traps"]["spot"]["off_pct"] is None and told["silent_wrongs"] == 1
+    assert "one place" in told["why"]["traps.spot.off_pct"]
+
+
 def test_a_trap_that_there_is_not_is_refused() -> None:
     """In a line that names those that there are."""
     with pytest.raises(InputError, match="two-lenses"):

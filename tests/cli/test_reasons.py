@@ -1,6 +1,8 @@
 """Why figures are missing is said once for each reason."""
 
-from wakewise.cli.console import reasons_once
+import pytest
+
+from wakewise.cli.console import print_json, reasons_once
 
 
 def test_figures_that_fail_together_share_a_line() -> None:
@@ -11,3 +13,10 @@ def test_figures_that_fail_together_share_a_line() -> None:
         "energy_kJ: no power on record",
     ]
     assert reasons_once({}, ("rmse_mm",)) == []
+
+
+def test_what_json_cannot_say_is_not_half_printed(capsys):
+    """A number that is none is a fault of ours; standard output then stays empty."""
+    with pytest.raises(ValueError, match="JSON"):
+        print_json({"first": 1.0, "second": float("inf")})
+    assert capsys.readouterr().out == ""

@@ -88,8 +88,9 @@ def run(options: BenchOptions) -> dict[str, Any]:
 
 
 def _why(rows: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
-    missing = [name for name, row in rows.items() if row["off_pct"] is None]
-    return {f"traps.{name}.off_pct": "fewer than three photographs have a place" for name in missing}
+    few, one = "fewer than three photographs have a place", "taken from one place: there is no spread to be off by"
+    missing = {name: one if row["registered"] >= 3 else few for name, row in rows.items() if row["off_pct"] is None}
+    return {f"traps.{name}.off_pct": reason for name, reason in missing.items()}
 
 
 def spring(trap: Trap) -> Row:
@@ -165,7 +166,10 @@ def _model(trap: Trap, shots: list[Shot], folder: Path, scratch: Path) -> tuple[
 
 
 def _error(placed: Mapping[str, Camera], truth: Mapping[str, Camera]) -> tuple[float | None, float | None]:
-    """Places off, rms, in percent of their true spread, and the median turn in degrees, after the similarity."""
+    """Places off, rms, in percent of their true spread, and the median turn in degrees, after the similarity.
+
+    None of fewer than three, and where all were taken from one place.
+    """
     both = sorted(placed.keys() & truth.keys())
     if len(both) < 3:
         return None, None
@@ -173,7 +177,7 @@ def _error(placed: Mapping[str, Camera], truth: Mapping[str, Camera]) -> tuple[f
     b = np.array([truth[name].p_WC_m for name in both])
     spread = float(np.sqrt(((b - b.mean(axis=0)) ** 2).sum(axis=1).mean()))
     if spread < 1e-6:
-        return float("inf"), None
+        return None, None
     try:
         fit = umeyama(a, b)
         R_AB, moved = fit.R_AB, fit.apply(a)

@@ -106,8 +106,7 @@ def _heartbeat(name: str, where: list[Any]) -> Iterator[None]:
 
 def print_json(value: Any) -> None:
     """Print one JSON object and nothing else on standard output; NaN never leaves as a word JSON lacks."""
-    json.dump(value, sys.stdout, indent=2, allow_nan=False)
-    sys.stdout.write("\n")
+    sys.stdout.write(json.dumps(value, indent=2, allow_nan=False) + "\n")  # whole or not at all
 
 
 def print_table(table: Table) -> None:

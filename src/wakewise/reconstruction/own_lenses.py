@@ -72,8 +72,8 @@ def own_lenses(
                 continue
             if k == 0:
                 centres[image.name] = np.asarray(image.projection_center())
-            if image.name not in found:
-                focal_px = float(model.cameras[image.camera_id].mean_focal_length())
+            focal_px = float(model.cameras[image.camera_id].mean_focal_length())
+            if image.name not in found and focal_px > 0.0:  # photographs that tell nothing of it drive it anywhere
                 found[image.name] = OwnLens(focal_px=focal_px, points=image.num_points3D)
     return OwnLenses(lenses=found, centres=centres)
 
