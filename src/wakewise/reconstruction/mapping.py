@@ -25,7 +25,7 @@ from wakewise.reconstruction.photos import PhotoStore
 from wakewise.reconstruction.seeded import Seeded, map_from_poses
 from wakewise.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
 from wakewise.reconstruction.solving import BUNDLE_ITERATIONS, NEVER, solve, solve_again
-from wakewise.reconstruction.verdict import doubts, evidence, known_doubts
+from wakewise.reconstruction.verdict import doubts, evidence, few_doubts, known_doubts
 
 # Fewer registered photos are a failure; of fewer, lenses are not looked into.
 MIN_REGISTERED, LEAST_FOR_CHECK = 3, 5
@@ -138,7 +138,8 @@ def map_photos(
         left = left_out(model, copy)
     opinion_pct = None if own is None else _second_opinion_pct(model, own)
     if given is None:
-        wrong = doubts(found, uncut_px=uncut_px, cut_pct=cut_pct) + lens_doubts(model, own, opinion_pct)
+        wrong = few_doubts(registered, photos) + doubts(found, uncut_px=uncut_px, cut_pct=cut_pct)
+        wrong += lens_doubts(model, own, opinion_pct)
     else:
         wrong = known_doubts(found, error_px=uncut_px, kept_pct=given.kept_pct)
     figures: dict[str, Any] = {

@@ -25,7 +25,7 @@ MOST_RAYS = 12
 
 LEAST_OBSERVATIONS, LEAST_COVERAGE_PCT, LEAST_ANGLE_DEG = 50.0, 10.0, 2.0
 LEAST_AGREEING_PCT, MOST_HELD_OUT_PX, MOST_UNCUT_PX, MOST_CUT_PCT = 90.0, 1.5, 1.2, 30.0
-LEAST_KEPT_PCT = 40.0
+LEAST_KEPT_PCT, LEAST_REGISTERED = 40.0, 0.5
 """What a model that is trusted has, at least and at most; the bench `traps` shows what each catches."""
 
 
@@ -102,6 +102,15 @@ def doubts(found: Evidence, *, uncut_px: float, cut_pct: float) -> list[str]:
             f"{MOST_UNCUT_PX:g} px and {MOST_CUT_PCT:g} % are sound: a lens that does not fit, or things that moved"
         )
     return out
+
+
+def few_doubts(registered: int, photos: int) -> list[str]:
+    """The reason not to trust a model that leaves most photographs out, if it does."""
+    if registered >= LEAST_REGISTERED * photos:
+        return []
+    return [
+        f"{registered} of {photos} photos found a place: less than half is a part at best, held together by few views"
+    ]
 
 
 def known_doubts(found: Evidence, *, error_px: float, kept_pct: float | None) -> list[str]:
