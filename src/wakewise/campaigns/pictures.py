@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import polars as pl
 
-from wakewise.errors import StageError
+from wakewise.errors import InputError, StageError
 from wakewise.evaluation import Crop, compare_surface
 from wakewise.files import whole_file, write_json
 from wakewise.reconstruction import read_cloud
@@ -37,12 +37,14 @@ def photographs_of(folder: Path) -> list[tuple[float, Path]]:
 
 
 def _keep_model(target: Target, place: Path, folder: Path) -> None:
-    """Points of the model with their errors in mm, thinned, for a picture."""
+    """Points of the model with their errors in mm, thinned, for a picture; nothing where there is no model."""
+    if not (place / "dense.ply").is_file():
+        return
     try:
         compared = compare_surface(
             read_cloud(place / "dense.ply").points_m, target.mesh, crop=Crop(bed_z_m=target.bed_z_m)
         )
-    except (StageError, OSError):
+    except (StageError, InputError, OSError):
         return
     every = max(1, len(compared.points_W_m) // POINTS)
     with whole_file(folder / MODEL) as temporary, temporary.open("wb") as file:
@@ -55,7 +57,11 @@ def _keep_model(target: Target, place: Path, folder: Path) -> None:
 
 def _keep_photographs(place: Path, folder: Path) -> None:
     """The photographs nearest to `PICTURES_AT_S`, small."""
+    if not (place / "images.csv").is_file():
+        return
     listed = pl.read_csv(place / "images.csv").sort("time_s")
+    if listed.is_empty():
+        return
     times = listed["time_s"].to_numpy() - float(listed["time_s"][0])
     kept = []
     for wished in PICTURES_AT_S:
