@@ -177,6 +177,7 @@ def _fuse_all(
         progress(len(maps) + index, 2 * len(maps), "fusion")
         gathered.add(rows)
     cloud, _ = gathered.means()
+    del gathered  # as large as the cloud and half as large again
     return cloud[~lonely(cloud[:, :3], threads=settings.threads)]
 
 

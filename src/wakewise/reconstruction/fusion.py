@@ -13,6 +13,9 @@ from wakewise.compiled import njit
 from wakewise.reconstruction.photos import Image
 from wakewise.reconstruction.stereo import DepthImage, DepthMap
 
+AT_ONCE = 250_000
+"""Points whose neighbours are looked for at once."""
+
 
 @njit(nogil=True)
 def _agree(
@@ -186,8 +189,10 @@ def lonely(points_m: Array, neighbours: int = 12, sigmas: float = 2.0, threads: 
     """
     if len(points_m) <= neighbours:
         return np.zeros(len(points_m), dtype=np.bool_)
-    distances = np.asarray(KDTree(points_m).query(points_m, k=neighbours + 1, workers=threads)[0])
-    distance = distances[:, 1:].mean(axis=1)
+    tree, distance = KDTree(points_m), np.empty(len(points_m))
+    for start in range(0, len(points_m), AT_ONCE):  # all at once would take four times the memory of the points
+        some = slice(start, start + AT_ONCE)
+        distance[some] = np.asarray(tree.query(points_m[some], neighbours + 1, workers=threads)[0])[:, 1:].mean(axis=1)
     return np.asarray(distance > distance.mean() + sigmas * distance.std())
 
 

@@ -55,7 +55,8 @@ def mesh_points(
         If the disk is full.
     """
     whole = read_cloud(dense)
-    cloud = whole.only(near_subject(whole.points_m))
+    kept = near_subject(whole.points_m)
+    cloud = whole if kept.all() else whole.only(kept)
     options = pycolmap.PoissonMeshingOptions()
     options.depth = octree_depth(cloud.points_m, spacing_m, settings.mesh_depth)
     options.trim = 0.0
