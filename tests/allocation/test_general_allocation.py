@@ -115,6 +115,7 @@ def test_boxes_and_lines_agree_where_both_apply():
         assert gap <= 1.1e-5 * b
 
 
+@pytest.mark.slow
 def test_the_incoherent_sum_is_one_quadratic_program():
     """A diagonal Gram matrix on a layout in one piece is solved as convex, and branch and bound does not beat it."""
     rng = np.random.default_rng(3)

@@ -102,6 +102,7 @@ def test_the_covariance_moves_as_the_mean_does():
         np.testing.assert_array_equal(found, found.T)
 
 
+@pytest.mark.slow
 def test_every_unknown_moves_the_vehicle_as_the_jacobian_says():
     """Column by column, twist after a step by current, drag and inertia: within 3 % of differences."""
     mean, thrusts, dt = random_mean(), 0.3 * RNG.normal(size=8), 0.005

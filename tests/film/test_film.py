@@ -326,6 +326,7 @@ def test_a_page_without_any_record_still_draws() -> None:
     assert cover(np.zeros((30, 40, 3), np.uint8), 64, 64).shape == (64, 64, 3)
 
 
+@pytest.mark.slow
 def test_rows_lie_in_the_order_of_the_comparison(flown: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Methods come as comparison.json has them; the picture has a column per time; a time after the end is refused."""
     folder = tmp_path / "compare"

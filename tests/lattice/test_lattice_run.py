@@ -103,6 +103,7 @@ def test_bad_cases_are_refused():
         find_case("whirl")
 
 
+@pytest.mark.slow
 def test_run_goes_on_from_a_checkpoint_as_if_never_stopped(tmp_path):
     """Stopped half-way and restored, the flow and its averages are the same bytes."""
     whole = compute_run(SMALL)
