@@ -3,7 +3,7 @@
 FOLDER/store.json              format of what lies here
 FOLDER/trials/KEY/trial.json   what is made: work, settings, versions
 FOLDER/trials/KEY/attempts.jsonl, log.txt, claim.json while somebody is at it
-FOLDER/trials/KEY/work/        what the work leaves
+FOLDER/trials/KEY/work         what the work leaves
 FOLDER/trials/KEY/figures.json the trial is finished
 """
 

@@ -88,18 +88,26 @@ def test_a_line_that_is_no_pose_is_refused_in_words(line: str, said: str) -> Non
     assert said in str(poses.complaint)
 
 
+def only_what_can_be(data: bytes) -> None:
+    """Every pose that is read of these bytes is somewhere, and is counted."""
+    poses = LinePoses()
+    samples = poses.feed(data, 1.0)
+    for sample in samples:
+        said = sample.measurement
+        assert np.isfinite(said.X_WB.p_m if said.p_WB_m is None else said.p_WB_m).all()
+    assert len(samples) <= poses.taken
+
+
 @given(st.binary(max_size=300))
 def test_any_datagram_is_borne(data: bytes) -> None:
     """Bytes of any kind give poses that can be, or nothing."""
-    for sample in LinePoses().feed(data, 1.0):
-        said = sample.measurement
-        assert np.isfinite(said.X_WB.p_m if said.p_WB_m is None else said.p_WB_m).all()
+    only_what_can_be(data)
 
 
 @given(st.text(alphabet='{}[]":,.0123456789eE+-pqtrynstd_mfaceu \n', max_size=200))
 def test_text_that_is_nearly_a_pose_is_borne(text: str) -> None:
     """The same of letters that poses are made of."""
-    LinePoses().feed(text.encode(), 1.0)
+    only_what_can_be(text.encode())
 
 
 def test_a_senders_clock_is_brought_onto_ours() -> None:
