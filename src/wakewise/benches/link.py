@@ -25,7 +25,10 @@ from wakewise.trials.timing import BenchOptions
 
 VEHICLE = "bluerov2-heavy"
 FUZZ_BYTES = 1_000_000
-PHYSICS_S, LOOP_S, PASSES = 20.0, 20.0, 3000
+PHYSICS_S, LOOP_S, PASSES = 20.0, 60.0, 3000
+LOOP_PERIOD_S = 0.1
+STARTS_S, _PATIENCE_S = 2.0, 5.0
+"""How long another process may take until it runs, and how much later it may be over."""
 _READY_S = 900.0
 _PULSES = (1560, 1440, 1430, 1575, 1535, 1465, 1540, 1460, *(0,) * 8)
 
@@ -137,7 +140,10 @@ def relay_figures(passes: int = PASSES) -> dict[str, Any]:
 
 
 def loop_figures(options: BenchOptions, seconds: float = LOOP_S) -> dict[str, Any]:
-    """How far steps of the 10 Hz loop are from their time, p99, in a session with a stand-in in another process."""
+    """How far steps of the 10 Hz loop are from their time, p99, in a session with a stand-in in another process.
+
+    A step is where its estimate is made. A process that only sleeps at the same rate says what of it is the computer's.
+    """
     from wakewise.links.ardusub.carriers import Udp
     from wakewise.links.ardusub.connection import Endpoint
     from wakewise.links.ardusub.post import Post
@@ -152,7 +158,10 @@ def loop_figures(options: BenchOptions, seconds: float = LOOP_S) -> dict[str, An
         free.bind((LOOPBACK, 0))
         port = free.getsockname()[1]
     udp = Udp(Endpoint(way="udpin", host=LOOPBACK, port=port))
-    other = multiprocessing.get_context("spawn").Process(target=fly_piloted, args=(VEHICLE, port), daemon=True)
+    spawn = multiprocessing.get_context("spawn")
+    other = spawn.Process(target=fly_piloted, args=(VEHICLE, port), daemon=True)
+    asleep, told = spawn.Pipe(duplex=False)
+    sleeper = spawn.Process(target=_sleep_and_wake, args=(seconds, told), daemon=True)
     steps_s: list[float] = []
     began_cpu = time.process_time()
     with tempfile.TemporaryDirectory() as folder:
@@ -176,26 +185,47 @@ def loop_figures(options: BenchOptions, seconds: float = LOOP_S) -> dict[str, An
         try:
             session.start()
             engaged = _engage(session)
+            sleeper.start()
+            time.sleep(STARTS_S)
             steps_s.clear()
             time.sleep(seconds)
+            bare_s = asleep.recv() if asleep.poll(_PATIENCE_S) else []
             still = session.warden.entry is not None
             how = f"{session.warden.engagement.state}: {session.warden.engagement.why}"
         finally:
             session.stop("measured")
-            other.terminate()
-            other.join()
+            for process in (other, sleeper):
+                if process.pid is not None:
+                    process.terminate()
+                    process.join()
             udp.close()
     if len(steps_s) < 10:
         why = f"no loop ran: {session.preparing}" if session.fault is None else str(session.fault)
         return {"loop_jitter_ms_p99": None, "why": {"loop_jitter_ms_p99": why}}
     spans = np.diff(np.array(steps_s))
     return {
-        "loop_jitter_ms_p99": float(np.percentile(np.abs(spans - 0.1), 99)) * 1e3,
+        "loop_jitter_ms_p99": _jitter_ms(steps_s),
+        "bare_jitter_ms_p99": _jitter_ms(bare_s),
         "loop_hz": float(1.0 / spans.mean()),
         "loop_engaged": engaged and still,
         "loop_state": how,
         "loop_cpu_s": time.process_time() - began_cpu,
     }
+
+
+def _jitter_ms(steps_s: list[float]) -> float | None:
+    """How far spans between steps are from the period, p99."""
+    spans = np.diff(np.array(steps_s))
+    return float(np.percentile(np.abs(spans - LOOP_PERIOD_S), 99)) * 1e3 if spans.size else None
+
+
+def _sleep_and_wake(seconds: float, told: Any) -> None:
+    """When a loop that does nothing woke."""
+    begun_s, woke_s = time.monotonic(), list[float]()
+    for k in range(round(seconds / LOOP_PERIOD_S)):
+        time.sleep(max(begun_s + k * LOOP_PERIOD_S - time.monotonic(), 0.0))
+        woke_s.append(time.monotonic())
+    told.send(woke_s)
 
 
 def _engage(session: Any, within_s: float = _READY_S) -> bool:

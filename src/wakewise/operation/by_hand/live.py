@@ -6,6 +6,7 @@ when it is over. What it leaves is a trial folder like any other.
 
 from __future__ import annotations
 
+import gc
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -174,7 +175,7 @@ class LiveFlight:
 
         self.preparing = None
         try:
-            with blamed(parts, recorder), _quick_to_switch():
+            with blamed(parts, recorder), _undisturbed():
                 loop_of(parts, plant, witness, record)(
                     duration_s=None, stop=self._is_over, pace=self.pace.pace, sent=sent
                 )
@@ -204,15 +205,19 @@ class LiveFlight:
 
 
 @contextmanager
-def _quick_to_switch() -> Iterator[None]:
-    """Let this thread have the interpreter back soon.
+def _undisturbed() -> Iterator[None]:
+    """Let this thread have the interpreter back soon, and leave what was made before the flight out of garbage rounds.
 
     Kernels of water and planner release it, and each time a busy thread may keep it for the interval of before: at
-    Python's own 5 ms a loop of 50 Hz beside a thread that never rests loses two fifths of its pace.
+    Python's own 5 ms a loop of 50 Hz beside a thread that never rests loses two fifths of its pace. A round through all
+    that the program has imported stops every thread for a period of 10 Hz.
     """
     before_s = sys.getswitchinterval()
     sys.setswitchinterval(min(SWITCH_S, before_s))
+    gc.collect()
+    gc.freeze()
     try:
         yield
     finally:
+        gc.unfreeze()
         sys.setswitchinterval(before_s)
