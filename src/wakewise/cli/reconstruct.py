@@ -15,6 +15,7 @@ from wakewise.cli.reconstruct_options import (
     BarOption,
     BarsFile,
     Crop,
+    FixesOption,
     LookOption,
     MasksOption,
     UntilOption,
@@ -88,6 +89,7 @@ def reconstruct_photos(
     no_mesh: NoMesh = False,
     bar: BarOption = None,
     bars: BarsFile = None,
+    fixes: FixesOption = None,
     masks: MasksOption = None,
     crop: Crop = None,
     until: UntilOption = None,
@@ -97,8 +99,8 @@ def reconstruct_photos(
 ) -> None:
     """Turn a folder of photographs into a sparse model, a dense cloud and a mesh.
 
-    Stages that are done are skipped. Without reference cameras or bars the model has no scale. What a verdict means
-    and how to photograph is in docs/photographs.md; bars, masks, films and outputs are in docs/scale.md.
+    Stages that are done are skipped. Without reference cameras, bars or fixes the model has no scale. What a verdict
+    means and how to photograph is in docs/photographs.md; scale, masks, films and outputs are in docs/scale.md.
     """
     from wakewise.extras import need
 
@@ -111,7 +113,7 @@ def reconstruct_photos(
     changes = ({"mesh": False} if no_mesh else {}) | parse_overrides(sets or [])
     settings = check_scenario({"reconstruction": changes}, "--set").reconstruction
     check_kinds(write, "dense" if no_mesh and until is None else until)
-    wishes = wishes_of(bar, bars, masks, crop, until)
+    wishes = wishes_of(bar, bars, masks, crop, until, fixes, photos)
     photos = frames_of(photos, out)
     if look:
         look_first(photos, out, settings.threads, json)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -23,6 +23,12 @@ BarsFile = Annotated[
     Path | None,
     typer.Option("--bars", metavar="FILE", help="YAML file of bars, targets' family and size, ChArUco board "
                  "(docs/scale.md).", show_default=False),
+]  # fmt: skip
+FixesOption = Annotated[
+    str | None,
+    typer.Option("--fixes", metavar="FILE|exif", help="Where photos were taken, as GPS or a depth gauge tells it: a "
+                 "CSV with name,depth_m and lat_deg,lon_deg or north_m,east_m, or what their EXIF holds; gives scale, "
+                 "as sure as it can, where nothing better does.", show_default=False),
 ]  # fmt: skip
 MasksOption = Annotated[
     Path | None,
@@ -47,14 +53,16 @@ def wishes_of(
     masks: Path | None,
     crop: tuple[float, float, float, float, float, float] | None,
     until: Until | None,
+    fixes: str | None,
+    photos: Path,
 ) -> Wishes:
-    """All of them, checked."""
+    """All of them, checked; `photos` are those of which fixes are read."""
     from dataclasses import replace
 
     import numpy as np
 
     from wakewise.reconstruction import Box, Wishes
-    from wakewise.reconstruction.scale import Bars, parse_bar, read_bars
+    from wakewise.reconstruction.scale import Bars, exif_fixes, parse_bar, read_bars, read_fixes
 
     given = None if bars is None else read_bars(bars)
     if bar:
@@ -62,8 +70,10 @@ def wishes_of(
         given = Bars(bars=listed) if given is None else replace(given, bars=(*given.bars, *listed))
     if masks is not None and not masks.is_dir():
         raise InputError(f"--masks {masks}: is no folder; masks are images in a folder, named like the photos")
+    weak = None if fixes is None else exif_fixes(photos) if fixes == "exif" else read_fixes(Path(fixes))
     return Wishes(
         bars=given,
+        fixes=weak,
         masks=masks,
         crop=None if crop is None else Box(low=np.array(crop[:3]), high=np.array(crop[3:])),
         until=until or "mesh",
@@ -125,8 +135,35 @@ def write_report_of(out: Path, photos: Path) -> None:
 
 
 def scale_lines(model: Model) -> list[str]:
-    """What bars say, a line each."""
-    said = model.scale_bars
+    """What bars and fixes say, a line each."""
+    return [*_bar_lines(model.scale_bars), *_fix_lines(model.scale_fixes)]
+
+
+def _fix_lines(said: dict[str, Any] | None) -> list[str]:
+    if said is None:
+        return []
+    sure = "open" if said["uncertainty_pct"] is None else f"uncertain by {said['uncertainty_pct']:.1f} %"
+    if said["model_off_pct"] is not None:
+        head = f"scale: by fixes, lengths are {said['model_off_pct']:+.1f} % off ({sure})"
+        if said["why"] is not None:
+            head = f"scale: fixes cannot check it, {said['why']}"
+    elif said["used"]:
+        north = "" if said["north_known"] else ", which way is north is not known"
+        head = f"scale: by fixes of {said['photos']} photos, {sure}; the third axis is down{north}"
+    else:
+        head = f"scale: none, {said['why']}"
+    rms = [
+        f"{words} {said[key]:.2f} m"
+        for key, words in (("horizontal_rms_m", "horizontally"), ("depth_rms_m", "in depth"))
+        if said[key] is not None
+    ]
+    lines = [head, f"  fixes are off by {', '.join(rms)} rms"]
+    if said["far"]:
+        lines.append(f"  {len(said['far'])} fixes do not fit: {', '.join(said['far'][:3])}")
+    return lines
+
+
+def _bar_lines(said: dict[str, Any] | None) -> list[str]:
     if said is None:
         return []
     head = f"scale: by {len(said['bars'])} bars, uncertain by {said['uncertainty_pct']:.3f} %"

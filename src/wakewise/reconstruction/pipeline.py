@@ -28,15 +28,14 @@ from wakewise.reconstruction.pairs import BAND_NEIGHBOURS, POSE_NEIGHBOURS, by_l
 from wakewise.reconstruction.patchmatch import require_cuda
 from wakewise.reconstruction.photos import Photo, PhotoStore, passed_over, read_photos, without_duplicates
 from wakewise.reconstruction.references import match_references
-from wakewise.reconstruction.scale.stage import scale_model
 from wakewise.reconstruction.settings import ReconstructionSettings
 from wakewise.reconstruction.stage_keys import stage_key
 from wakewise.reconstruction.stages import StageResult, make_folder, run_stage, withdraw
-from wakewise.reconstruction.steps import dense_step, map_step, match_step
+from wakewise.reconstruction.steps import dense_step, map_step, match_step, scale_step
 from wakewise.reconstruction.views import Ball
 from wakewise.reconstruction.wishes import Wishes
 
-LATER = ("scale_bars", "dense_points", "depth_maps", "point_spacing_mm", *MESH_FIGURES)
+LATER = ("scale_bars", "scale_fixes", "dense_points", "depth_maps", "point_spacing_mm", *MESH_FIGURES)
 """Figures of stages that may not be asked for."""
 
 
@@ -56,7 +55,7 @@ class Model:
     each model that came about; the first is kept. duplicates: photos left out because another has the same bytes.
     passed_over: films and other files that are not read. suspicion: a word where lengths cannot be metres. stages_s:
     what each stage took when it ran; `skipped` were done before.
-    wall_s: this call. scale_bars: what bars say of the scale, see `scale.stage.scale_model`.
+    wall_s: this call. scale_bars, scale_fixes: what bars and fixes say of the scale, see `scale.stage`.
     A model without references has no scale, so its lengths are None.
     """
 
@@ -96,6 +95,7 @@ class Model:
     surface_distance_m: float | None
     suspicion: str | None
     scale_bars: dict[str, Any] | None
+    scale_fixes: dict[str, Any] | None
     dense_points: int | None
     depth_maps: int | None
     point_spacing_mm: float | None
@@ -113,6 +113,7 @@ class Model:
             "dense_points": "no dense points were asked for",
             "depth_maps": "no dense points were asked for",
             "scale_bars": "no bars were given",
+            "scale_fixes": "no fixes were given",
             **dict.fromkeys(MESH_FIGURES, "no mesh was asked for, or it is made after the figures"),
             "suspicion": "nothing looks suspicious",
             "agreeing_pairs_pct": "no pair of registered photos has matches enough",
@@ -177,7 +178,7 @@ def reconstruct(
         Poses and lenses of photos, in place of references and lenses: kept as they are, or where mapping begins, as the
         settings say.
     wishes : Wishes, optional
-        Bars that give scale, masks, a box to cut to, the last stage.
+        Bars or fixes that give scale, masks, a box to cut to, the last stage.
     progress : callable
         Called with (done, total, note) in units of a stage's own work.
 
@@ -276,16 +277,16 @@ def reconstruct(
                 progress,
             ),
         )
-        bars, metric = wishes.bars, references is not None or wishes.bars is not None
-        if bars is None:
+        bars, fixes = wishes.bars, wishes.fixes
+        if bars is None and fixes is None:
             withdraw(out, "scale", "map")
         else:
             results["scale"] = run_stage(
                 out,
                 "scale",
-                stage_key(settings, "scale", results["map"].key, bars.key()),
+                stage_key(settings, "scale", results["map"].key, bars and bars.key(), fixes and fixes.key()),
                 (sparse / "images.bin",),
-                lambda: scale_model(store, sparse, bars, settings.threads, progress, keep=references is not None),
+                lambda: scale_step(store, sparse, wishes, settings.threads, references is not None, progress),
             )
         place = None if ball is None else [ball.centre_W_m.tolist(), ball.radius_m]
         cut = [] if wishes.crop is None else [wishes.crop.key()]
@@ -306,7 +307,8 @@ def reconstruct(
     figures["left_out"] = figures["left_out"] + [
         {"name": photo.name, "partner": None, "matches": 0, "why": "no known camera"} for photo in strangers
     ]
-    if not metric:
+    by_fixes = figures["scale_fixes"] is not None and figures["scale_fixes"]["used"]
+    if references is None and bars is None and not by_fixes:
         figures["point_spacing_mm"] = None
     model = Model(
         images=len(found) + len(strangers),

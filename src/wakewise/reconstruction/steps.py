@@ -17,10 +17,11 @@ from wakewise.reconstruction.mapping import map_photos
 from wakewise.reconstruction.pairs import Pairs
 from wakewise.reconstruction.patchmatch import patch_match
 from wakewise.reconstruction.photos import Photo, PhotoStore
+from wakewise.reconstruction.scale.stage import place_model, scale_model
 from wakewise.reconstruction.settings import ReconstructionSettings
 from wakewise.reconstruction.stages import need_room
 from wakewise.reconstruction.views import Ball
-from wakewise.reconstruction.wishes import Box, cut_cloud
+from wakewise.reconstruction.wishes import Box, Wishes, cut_cloud
 
 
 def match_step(
@@ -80,6 +81,20 @@ def map_step(
         poses=None if fixed else poses,
         fixed=poses if fixed else None,
     )
+
+
+def scale_step(
+    store: PhotoStore, sparse: Path, wishes: Wishes, threads: int, referred: bool, progress: Progress
+) -> dict[str, Any]:
+    """sparse/ in metres; see `scale.stage`. The surest gives the scale: references (`referred`), then bars, then fixes;
+    the others check it.
+    """
+    figures: dict[str, Any] = {}
+    if wishes.bars is not None:
+        figures |= scale_model(store, sparse, wishes.bars, threads, progress, keep=referred)
+    if wishes.fixes is not None:
+        figures |= place_model(sparse, wishes.fixes, keep=referred or wishes.bars is not None)
+    return figures
 
 
 def dense_step(

@@ -12,6 +12,7 @@ from wakewise.arrays import Array, BoolArray, freeze
 from wakewise.errors import InputError, StageError
 from wakewise.reconstruction.clouds import read_cloud, write_cloud
 from wakewise.reconstruction.scale.bars import Bars
+from wakewise.reconstruction.scale.fixes import Fixes
 
 LEAST_POINTS = 100
 
@@ -42,11 +43,12 @@ class Box:
 
 @dataclass(frozen=True, kw_only=True)
 class Wishes:
-    """bars: lengths that give scale; masks: a folder of them; crop: what dense points and mesh are kept of; until: the
-    last stage.
+    """bars: lengths that give scale; fixes: weak knowledge of places, which gives it without bars; masks: a folder of
+    them; crop: what dense points and mesh are kept of; until: the last stage.
     """
 
     bars: Bars | None = None
+    fixes: Fixes | None = None
     masks: Path | None = None
     crop: Box | None = None
     until: Literal["sparse", "dense", "mesh"] = "mesh"

@@ -1,6 +1,6 @@
-"""A sparse model in metres by bars: sparse/ and photographs in, the same sparse/ scaled out.
+"""A sparse model in metres by bars or by fixes: sparse/ and photographs in, the same sparse/ scaled out.
 
-The fit does not ask what units the model has, so the stage may run again on what it left.
+Neither asks what units the model has, so the stage may run again on what it left.
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ from wakewise.reconstruction.calibration import Board
 from wakewise.reconstruction.colmap import pycolmap
 from wakewise.reconstruction.photos import PhotoStore
 from wakewise.reconstruction.scale.bars import Bars
+from wakewise.reconstruction.scale.by_fixes import figures, place_by_fixes, why_unused
 from wakewise.reconstruction.scale.fitting import Measured, fit_scale
+from wakewise.reconstruction.scale.fixes import Fixes
 from wakewise.reconstruction.scale.marks import Sightings, find_board, find_marks
 from wakewise.reconstruction.scale.places import Place, place
 from wakewise.reconstruction.views import View, read_views
@@ -71,7 +73,7 @@ def scale_model(
     fit = fit_scale(measured, keep)
     said = [_said(number, corners, fit.scale) for number, corners in targets.items()]
     _check_sizes(said, bars.tag_m, fit.uncertainty_pct)
-    figures = {
+    told = {
         "used": not keep,
         "model_off_pct": 100.0 * (1.0 / fit.scale - 1.0) if keep else 0.0,
         "family": family,
@@ -84,7 +86,39 @@ def scale_model(
         with whole_folder(sparse) as temporary:
             model.write_binary(temporary)
     progress(1, 1, "scale")
-    return {"scale_bars": figures}
+    return {"scale_bars": told}
+
+
+def place_model(sparse: Path, fixes: Fixes, keep: bool = False) -> dict[str, Any]:
+    """Lay a sparse model where fixes say that its cameras were, in m, down along its third axis.
+
+    Parameters
+    ----------
+    keep : bool
+        Leave the model as it is: its scale comes from elsewhere, and the fixes check it.
+
+    Returns
+    -------
+    dict
+        scale_fixes: used, why (not, in words), photos, uncertainty_pct (None where the scale is open), model_off_pct
+        (how much longer lengths of the model are than by the fixes; None where these give the scale),
+        horizontal_rms_m and depth_rms_m (of what is left), far (photos whose fix does not fit), north_known, origin_deg
+        (latitude and longitude of the frame's origin).
+
+    Raises
+    ------
+    InputError
+        If too few registered photos have a fix.
+    """
+    model = pycolmap.Reconstruction(sparse)
+    centres = {image.name: np.asarray(image.projection_center()) for image in model.images.values() if image.has_pose}
+    placed = place_by_fixes(centres, fixes)
+    used = not keep and why_unused(placed) is None
+    if used:
+        model.transform(pycolmap.Sim3d(placed.scale, pycolmap.Rotation3d(placed.R), placed.t))
+        with whole_folder(sparse) as temporary:
+            model.write_binary(temporary)
+    return {"scale_fixes": figures(placed, fixes, used, keep)}
 
 
 def _said(number: int, corners: list[Place], scale: float) -> dict[str, Any]:

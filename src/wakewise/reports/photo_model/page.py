@@ -16,6 +16,8 @@ from wakewise.files import write_text
 from wakewise.reconstruction.photo_facts import ModelFacts, model_facts
 from wakewise.reports.ink import TEAL, dress, new_figure
 from wakewise.reports.page import chip, fold, missing, plot, scene_box, section, tile, whole_page
+from wakewise.reports.photo_model.rows import facts_list, table_row
+from wakewise.reports.photo_model.scale import scale_section, scale_tile
 from wakewise.reports.photo_model.scene import model_scene
 from wakewise.reports.words import number
 
@@ -54,7 +56,7 @@ def model_page(name: str, figures: dict[str, Any], facts: ModelFacts, scene: str
     body = (
         f'<header class="top">{_headline(name, figures)}</header>'
         f'<nav class="parts" aria-label="parts"><div>{links}</div></nav><main>{_model(figures, facts, scene)}'
-        f"{_scale(figures)}{_matches(facts)}{_photos(figures, facts)}{_cut(figures)}{_figures(figures)}</main>"
+        f"{scale_section(figures)}{_matches(facts)}{_photos(figures, facts)}{_cut(figures)}{_figures(figures)}</main>"
         "<footer><p>The model's files are beside this page: sparse/ (COLMAP), dense.ply, mesh.ply, mesh.glb.</p>"
         "</footer>"
     )
@@ -74,14 +76,7 @@ def _headline(name: str, figures: dict[str, Any]) -> str:
 
 
 def _tiles(figures: dict[str, Any]) -> str:
-    bars, scale = figures.get("scale_bars"), figures.get("scale")
     placed, images = figures["registered_images"], figures["images"]
-    if bars is not None and bars["used"]:
-        size = tile("scale", f"± {number(bars['uncertainty_pct'], 2)}", "%", f"by {len(bars['bars'])} bars")
-    elif scale is not None:
-        size = tile("scale", number(figures["cameras_rmse_mm"]), "mm", "cameras from their references, rms")
-    else:
-        size = tile("scale", "–", "", "no bars, no reference cameras")
     spacing = figures.get("point_spacing_mm")
     dense = figures.get("dense_points")
     faces = figures.get("mesh_faces")
@@ -91,7 +86,7 @@ def _tiles(figures: dict[str, Any]) -> str:
     return (
         tile("photographs placed", str(placed), f"of {images}", "have a place in the model", _state(placed == images))
         + tile("error", f"{figures['reprojection_px']:.2f}", "px", cut)
-        + size
+        + scale_tile(figures)
         + tile("sparse points", _count(figures["points"]), "", f"in {figures['track_length']:.1f} photos each")
         + tile("dense points", "–" if dense is None else _count(dense), "", "not asked for" if dense is None else note)
         + tile("surface", "–" if faces is None else _count(faces), "", surface)
@@ -115,81 +110,6 @@ def _model(figures: dict[str, Any], facts: ModelFacts, scene: str | None) -> str
     legend = chip("#d9562b", f"{placed} photographs") + chip("#8fa0a6", f"{_count(len(facts.points))} sparse points")
     content = missing("the model", "no photograph has a place") if scene is None else scene_box(scene, legend)
     return section("model", "The model", lead, content)
-
-
-def _scale(figures: dict[str, Any]) -> str:
-    bars = figures.get("scale_bars")
-    if bars is None and figures.get("scale") is None:
-        lead = "The model has no scale: its lengths mean nothing by themselves."
-        how = (
-            "<p>Lay two or more bars between coded targets into the scene (<code>--bar A,B,LENGTH</code>), or give the "
-            "places of the cameras (<code>--reference-cameras</code>).</p>"
-        )
-        return section("scale", "Scale", lead, how)
-    if bars is None:
-        return section(
-            "scale", "Scale", "From the places of the cameras that were given.", _facts(_references(figures))
-        )
-    lead = (
-        f"From {len(bars['bars'])} bars between coded targets, uncertain by {number(bars['uncertainty_pct'], 2)} %."
-        if bars["used"]
-        else f"From reference cameras; by the bars, lengths are {bars['model_off_pct']:+.3f} % off."
-    )
-    head = _row(("bar", "stated", "in the model", "off", "by the other bars", "photos"), "th", "tlrrrr")
-    rows = "".join(
-        _row(
-            (
-                bar["name"],
-                f"{1e3 * bar['length_m']:.2f} ± {1e3 * bar['sigma_m']:.2f} mm",
-                f"{1e3 * bar['found_m']:.2f} mm",
-                f"{round(bar['off_mm'], 2) + 0.0:+.2f} mm",
-                "only one" if bar["check_pct"] is None else f"{bar['check_pct']:+.3f} %",
-                str(bar["photos"]),
-            ),
-            "td",
-            "tlrrrr",
-        )
-        for bar in bars["bars"]
-    )
-    table = f"<table><thead>{head}</thead><tbody>{rows}</tbody></table>"
-    targets = "".join(
-        _row(
-            (
-                str(one["target"]),
-                str(one["photos"]),
-                f"{one['error_px']:.2f} px",
-                f"{np.mean(one['sides_mm']):.2f} mm",
-                ", ".join(f"{value:.4f}" for value in one["middle_m"]),
-            ),
-            "td",
-            "trrrl",
-        )
-        for one in bars["targets"]
-    )
-    if targets:
-        head = _row(("target", "photos", "error", "side", "middle, m"), "th", "trrrl")
-        inner = f"<table><thead>{head}</thead><tbody>{targets}</tbody></table>"
-        table += fold(f"Targets ({bars['family']})", inner, f"{len(bars['targets'])}")
-    return section("scale", "Scale", lead, table)
-
-
-def _references(figures: dict[str, Any]) -> list[tuple[str, str]]:
-    return [
-        ("cameras from their references", f"{number(figures['cameras_rmse_mm'])} mm rms, "
-         f"{number(figures['cameras_max_mm'])} mm at most"),
-        ("references that fit", str(figures["reference_inliers"])),
-        ("surface", f"{number(figures['surface_distance_m'])} m from the cameras"),
-    ]  # fmt: skip
-
-
-def _facts(rows: list[tuple[str, str]]) -> str:
-    return f'<dl class="facts">{"".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in rows)}</dl>'
-
-
-def _row(cells: tuple[str, ...], tag: str, kinds: str) -> str:
-    classes = {"t": "", "l": "", "r": ' class="num"'}
-    inner = [f"<{tag}{classes[k]}>{escape(cell)}</{tag}>" for cell, k in zip(cells, kinds, strict=True)]
-    return f"<tr>{''.join(inner)}</tr>"
 
 
 def _matches(facts: ModelFacts) -> str:
@@ -227,7 +147,7 @@ def match_figure(matches: IntArray) -> Figure | None:
 
 def _photos(figures: dict[str, Any], facts: ModelFacts) -> str:
     left = {one["name"]: one for one in figures["left_out"]}
-    head = _row(
+    head = table_row(
         ("photograph", "place", "features", "points seen", "error", "partners", "focal length"), "th", "tlrrrrr"
     )
     rows = []
@@ -240,7 +160,7 @@ def _photos(figures: dict[str, Any], facts: ModelFacts) -> str:
         error = "–" if photo.error_px is None else f"{photo.error_px:.2f} px"
         cells = (photo.name, place, str(photo.features), str(photo.observations), error, str(partners),
                  f"{photo.focal_px:.0f} px")  # fmt: skip
-        rows.append(_row(cells, "td", "tlrrrrr"))
+        rows.append(table_row(cells, "td", "tlrrrrr"))
     table = f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody></table>"
     lead = "Errors are means over the sparse points that a photograph sees, each point's over all that see it."
     content = fold("Every photograph", table, f"{len(rows)}") if len(rows) > _LONG else table
@@ -256,7 +176,9 @@ def _cut(figures: dict[str, Any]) -> str:
         ("models that came about", ", ".join(f"{count} photos" for count in figures["sub_models"]) or "–"),
         ("files not read", ", ".join(f"{n} of {kind}" for kind, n in figures["passed_over"].items()) or "none"),
     ]  # fmt: skip
-    return section("cut", "What was cut", "What the model rests on no longer, and why it may be missed.", _facts(rows))
+    return section(
+        "cut", "What was cut", "What the model rests on no longer, and why it may be missed.", facts_list(rows)
+    )
 
 
 def _figures(figures: dict[str, Any]) -> str:
