@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,9 @@ def frozen(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
     ):
         wanted = "(" + ", ".join("n" if s is None else str(s) for s in shape) + ")"
         raise InputError(f"{name}: shape {array.shape}, allowed {wanted}")
-    if not np.isfinite(array).all():
+    flat = array.ravel()
+    # A NaN or infinity shows in the sum of squares, at a fraction of the cost; so may numbers that are merely large.
+    if not math.isfinite(np.dot(flat, flat)) and not np.isfinite(array).all():
         raise InputError(f"{name}: holds NaN or infinity, every element must be finite")
     array.setflags(write=False)
     return array

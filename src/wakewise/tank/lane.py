@@ -14,19 +14,20 @@ from wakewise.water.chunks import cores
 class Lane:
     """Does one piece of work after another, in the order in which they were given, on a thread of its own.
 
-    Where there is one core only, each is done at once. Threads are shared by all lanes of a name, and the order of a
-    lane's own pieces is kept among those of others; what a piece does must not depend on what others do meanwhile.
+    Where there is one core only, or nothing is to be done `beside` who asked, each is done at once. Threads are shared
+    by all lanes of a name, and the order of a lane's own pieces is kept among those of others; what a piece does must
+    not depend on what others do meanwhile.
     """
 
-    def __init__(self, name: str) -> None:
-        self._name = name
+    def __init__(self, name: str, beside: bool = True) -> None:
+        self._name, self._beside = name, beside
         self._under_way: deque[Future[None]] = deque()
 
     def do(self, work: Callable[[], None]) -> None:
         """Take on a piece of work; what an earlier one raised is raised here or by `wait`."""
         while self._under_way and self._under_way[0].done():
             self._under_way.popleft().result()
-        if cores() == 1:
+        if cores() == 1 or not self._beside:
             work()
         else:
             self._under_way.append(_thread(self._name).submit(work))

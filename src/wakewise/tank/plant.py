@@ -266,7 +266,8 @@ class VehiclePlant:
         rate_B = rate_W @ self._R
         pressure = self._density * self.vehicle.displaced_volume_m3 * rate_B
         push: Array = self._body.added_mass[:, :3] @ rate_B
-        return push + np.concatenate([pressure, np.cross(self.vehicle.p_BB_m, pressure)])
+        (x, y, z), (f, g, h) = self.vehicle.p_BB_m, pressure
+        return push + np.array([f, g, h, y * h - z * g, z * f - x * h, x * g - y * f])
 
     def _inflow_factors(self, thrusts_N: Array, inflow_W_m_s: Array) -> Array:
         vehicle = self.vehicle

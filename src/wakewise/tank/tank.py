@@ -68,6 +68,9 @@ class Tank:
         Where the joint of the camera, if it has one, stands at the start.
     yielding : Yielding, optional
         How the target gives way to the water; None of one that nothing moves.
+    beside : bool
+        Move water and silt on threads of their own, while the vehicle goes on. It pays where whoever calls `step` does
+        little in between; a controller in Python and they would wait for each other's hold of the interpreter.
 
     Raises
     ------
@@ -85,6 +88,7 @@ class Tank:
         rng: np.random.Generator,
         tilt_rad: float = 0.0,
         yielding: Yielding | None = None,
+        beside: bool = True,
     ) -> None:
         length, width, depth = settings.size_m
         if abs(target.bed_z_m - depth) > 1e-6:
@@ -157,7 +161,7 @@ class Tank:
         self._muddy = self._silt.total_kg > 0.0
         self._touching = ""
         self._measured: WaterTruth | None = None
-        self._water_lane, self._silt_lane = Lane("water"), Lane("silt")
+        self._water_lane, self._silt_lane = Lane("water", beside), Lane("silt", beside)
         self._turbidity_per_m = self._probes.turbidity_per_m(laws, self._silt_grid())
 
     @property

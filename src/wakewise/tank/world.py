@@ -86,7 +86,16 @@ class TankWorld:
 
     def tank(self) -> Tank:
         """A fresh tank at its start, with all that it knows."""
-        return Tank(self.vehicle, self.target, self.settings, self.start, self.draw(), self.tilt_rad, self.yielding)
+        return Tank(
+            self.vehicle,
+            self.target,
+            self.settings,
+            self.start,
+            self.draw(),
+            self.tilt_rad,
+            self.yielding,
+            beside=False,  # a flight has a controller
+        )
 
     def begin(self) -> tuple[Plant, Witness | None]:
         """A fresh tank at its start, as plant and witness."""

@@ -20,6 +20,7 @@ from wakewise.physics import GRAVITY_M_S2
 from wakewise.water.closure import PLAIN
 from wakewise.water.faces import Room
 from wakewise.water.induction import impulse_velocity
+from wakewise.water.modes import add_modes
 
 _ROW_SPACING = 0.6  # of sigma: a row of Gaussians this dense is smooth to 1e-6
 _MODES = 48
@@ -165,10 +166,13 @@ class BackgroundTurbulence:
     cosines_m_s: Array
     sines_m_s: Array
     frequencies_rad_s: Array
+    _columns: tuple[Array, Array, Array] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         m = len(self.frequencies_rad_s)
         freeze(self, wave_numbers_per_m=(m, 3), cosines_m_s=(m, 3), sines_m_s=(m, 3), frequencies_rad_s=(m,))
+        rows = self.wave_numbers_per_m, self.cosines_m_s, self.sines_m_s
+        object.__setattr__(self, "_columns", tuple(np.ascontiguousarray(one.T) for one in rows))
 
     @classmethod
     def drawn(cls, rms_m_s: float, length_m: float, rng: np.random.Generator) -> BackgroundTurbulence:
@@ -189,8 +193,9 @@ class BackgroundTurbulence:
 
     def velocity(self, points_W_m: Array, time_s: float) -> Array:
         """Velocity of the water, shape (n, 3)."""
-        phase = points_W_m @ self.wave_numbers_per_m.T + self.frequencies_rad_s * time_s
-        u: Array = np.cos(phase) @ self.cosines_m_s + np.sin(phase) @ self.sines_m_s
+        waves, cosines, sines = self._columns
+        u = np.zeros((len(points_W_m), 3))
+        add_modes(np.ascontiguousarray(points_W_m), waves, self.frequencies_rad_s * time_s, cosines, sines, u)
         return u
 
 
