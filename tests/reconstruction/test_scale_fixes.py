@@ -73,6 +73,7 @@ def test_degrees_become_metres_on_the_ellipsoid(tmp_path):
         ("name,depth_m\n", "holds no fixes"),
         ("name,depth_m\na,deep\n", "line 2: depth_m is 'deep', must be a number"),
         ("name,depth_m\na,inf\n", "line 2: depth_m is inf, must be finite"),
+        ("name,depth_m\n,1\n", "line 2: has no name, must be a photo's"),
         ("name,depth_m\na,1\na,2\n", "line 3: a is there twice"),
         ("name,depth_m,lat_deg,lon_deg\na,1,45,\n", "lat_deg and lon_deg must both be said"),
         ("name,depth_m,lat_deg,lon_deg\na,1,95,3\n", "lat_deg must be within 90"),
@@ -107,6 +108,7 @@ def test_exif_tells_places_of_photos(tmp_path):
     (folder / "left" / "c.jpg").write_bytes(photo())
     fixes = exif_fixes(folder)
     assert set(fixes.fixes) == {"left/a.jpg", "left/b.jpg"}
+    assert fixes.of("right/a.jpg") is None
     assert fixes.origin == pytest.approx((-18.51, 147.25))
     a, b = fixes.of("left/a.jpg"), fixes.of("left/b.jpg")
     assert a.place_W_m == pytest.approx([0.0, 0.0, 4.5])

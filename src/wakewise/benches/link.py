@@ -142,7 +142,8 @@ def relay_figures(passes: int = PASSES) -> dict[str, Any]:
 def loop_figures(options: BenchOptions, seconds: float = LOOP_S) -> dict[str, Any]:
     """How far steps of the 10 Hz loop are from their time, p99, in a session with a stand-in in another process.
 
-    A step is where its estimate is made. A process that only sleeps at the same rate says what of it is the computer's.
+    A step is when its decision begins, by the newest estimate. A process that only sleeps at the same rate says how
+    much of it is the computer's.
     """
     from wakewise.links.ardusub.carriers import Udp
     from wakewise.links.ardusub.connection import Endpoint

@@ -9,6 +9,10 @@ import struct
 _MAKE, _MODEL, _EXIF, _FOCAL, _BODY_SERIAL, _LENS_MODEL = 0x010F, 0x0110, 0x8769, 0x920A, 0xA431, 0xA434
 
 
+UNREADABLE = (OSError, SyntaxError, ValueError, LookupError, TypeError, ZeroDivisionError, struct.error)
+"""What Pillow raises of pictures that only other decoders take, and of notes that are damaged."""
+
+
 def exif_words(data: bytes) -> str:
     """What an encoded image says of its camera: make, model, serial number, lens, focal length; empty if nothing."""
     from PIL import Image
@@ -17,8 +21,8 @@ def exif_words(data: bytes) -> str:
         with Image.open(io.BytesIO(data)) as image:
             tags = image.getexif()
             more = tags.get_ifd(_EXIF)
-    except (OSError, SyntaxError, ValueError, LookupError, TypeError, struct.error, Image.DecompressionBombError):
-        return ""  # a picture that only other decoders take, or notes that are damaged: it says nothing
+    except (*UNREADABLE, Image.DecompressionBombError):
+        return ""
     words = [_clean(tags.get(tag)) for tag in (_MAKE, _MODEL)] + [_clean(more.get(_BODY_SERIAL))]
     words.append(_clean(more.get(_LENS_MODEL)))
     try:

@@ -112,9 +112,9 @@ def read_photos(folder: Path, store: PhotoStore | None = None, threads: int = 2)
     if not folder.is_dir():
         found = "is a file" if folder.exists() else "does not exist"
         raise InputError(f"{folder}: {found}; a folder of photos ({allowed}) is needed")
-    files = sorted(p for p in folder.iterdir() if p.is_file() and not p.name.startswith("."))
-    images = [p for p in files if p.suffix.lower() in SUFFIXES] or _below(folder)
+    images = photo_files(folder)
     if not images:
+        files = _files(folder)
         inside = sorted(p.name for p in folder.iterdir() if p.is_dir() and not p.name.startswith("."))
         found = "is empty"
         if files:
@@ -131,6 +131,15 @@ def read_photos(folder: Path, store: PhotoStore | None = None, threads: int = 2)
     if len(photos) < MIN_PHOTOS:
         raise InputError(f"{folder}: holds {len(photos)} photos, at least {MIN_PHOTOS} are needed")
     return photos
+
+
+def photo_files(folder: Path) -> list[Path]:
+    """Files of a folder that are taken for photographs by their names: its own, or else those of the folders in it."""
+    return [path for path in _files(folder) if path.suffix.lower() in SUFFIXES] or _below(folder)
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
 
 
 def _below(folder: Path) -> list[Path]:

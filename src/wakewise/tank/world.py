@@ -84,8 +84,8 @@ class TankWorld:
     tilt_rad: float = 0.0
     yielding: Yielding | None = None
 
-    def tank(self) -> Tank:
-        """A fresh tank at its start, with all that it knows."""
+    def tank(self, beside: bool = True) -> Tank:
+        """A fresh tank at its start, with all that it knows; its water moves `beside` the vehicle, or after it."""
         return Tank(
             self.vehicle,
             self.target,
@@ -94,10 +94,10 @@ class TankWorld:
             self.draw(),
             self.tilt_rad,
             self.yielding,
-            beside=False,  # a flight has a controller
+            beside,
         )
 
     def begin(self) -> tuple[Plant, Witness | None]:
         """A fresh tank at its start, as plant and witness."""
-        tank = self.tank()
+        tank = self.tank(beside=False)  # a flight has a controller
         return tank, TankWitness(tank=tank)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-import struct
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,7 +19,8 @@ import numpy as np
 
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
-from wakewise.reconstruction.photos import SUFFIXES
+from wakewise.reconstruction.exif import UNREADABLE
+from wakewise.reconstruction.photos import photo_files
 
 GPS_SIGMA_M, GPS_HEIGHT_SIGMA_M = 8.0 / 2.448, 13.0 / 1.96
 """Of each of two horizontal axes, and of the height: 8 m and 13 m at 95 %, in the mean over the globe (GPS Standard
@@ -59,15 +59,20 @@ class Fixes:
 
     @cached_property
     def _by_stem(self) -> dict[str, Fix]:
-        return {Path(name).stem: fix for name, fix in self.fixes.items()}
+        return {_stem(name): fix for name, fix in self.fixes.items()}
 
     def of(self, name: str) -> Fix | None:
         """The fix of a photo; a name matches whole or without its suffix."""
-        return self.fixes.get(name) or self._by_stem.get(Path(name).stem)
+        return self.fixes.get(name) or self._by_stem.get(_stem(name))
 
     def key(self) -> list[Any]:
         """Plain values that tell these from others."""
         return [[name, fix.place_W_m.tolist(), fix.sigma_m.tolist()] for name, fix in sorted(self.fixes.items())]
+
+
+def _stem(name: str) -> str:
+    """A name without its suffix, with its folder: two cameras of a rig number their photos alike."""
+    return Path(name).with_suffix("").as_posix()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,6 +113,8 @@ def read_fixes(path: Path) -> Fixes:
                 raise InputError(f"{path}: {wrong}; allowed are {columns}")
             for row in reader:
                 name = (row["name"] or "").strip()
+                if not name:
+                    raise InputError(f"{path}: line {reader.line_num}: has no name, must be a photo's")
                 if name in told:
                     raise InputError(f"{path}: line {reader.line_num}: {name} is there twice")
                 told[name] = _row(f"{path}: line {reader.line_num}", row)
@@ -131,7 +138,7 @@ def exif_fixes(folder: Path) -> Fixes:
     if not folder.is_dir():
         raise InputError(f"{folder}: is no folder of photos, only theirs hold fixes")
     told: dict[str, _Told] = {}
-    files = sorted(path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES and path.is_file())
+    files = photo_files(folder)
     for path in files:
         try:
             found = exif_place(path.read_bytes())
@@ -160,10 +167,7 @@ def exif_place(data: bytes) -> _Told | None:
         # 1 and 3 are below sea level and below the ellipsoid.
         depth = float(tags[_ALT]) * (1.0 if below in (1, 3) else -1.0)
         sigma = float(tags.get(_ERROR, 0.0))
-    except (
-        OSError, SyntaxError, ValueError, LookupError, TypeError, ZeroDivisionError, struct.error,
-        Image.DecompressionBombError,
-    ):  # fmt: skip
+    except (*UNREADABLE, Image.DecompressionBombError):
         return None
     if not (all(map(math.isfinite, (*angles, depth, sigma))) and abs(angles[0]) <= 90.0 and abs(angles[1]) <= 180.0):
         return None
