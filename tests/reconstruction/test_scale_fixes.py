@@ -1,6 +1,7 @@
 """What GPS receivers and depth gauges tell of photographs: how it is read, and what is refused."""
 
 import io
+import json
 
 import numpy as np
 import pytest
@@ -49,6 +50,7 @@ def test_a_table_of_depths_is_read(tmp_path):
     assert fixes.of("b.jpg").sigma_m[2] == 0.02
     assert np.isnan(fixes.of("c.jpg").place_W_m).all()
     assert fixes.of("z.jpg") is None
+    assert json.dumps(fixes.key(), allow_nan=False)
 
 
 def test_degrees_become_metres_on_the_ellipsoid(tmp_path):

@@ -153,11 +153,11 @@ def _fix_lines(said: dict[str, Any] | None) -> list[str]:
     else:
         head = f"scale: none, {said['why']}"
     rms = [
-        f"{words} {said[key]:.2f} m"
+        f"{said[key]:.2g} m {words}"
         for key, words in (("horizontal_rms_m", "horizontally"), ("depth_rms_m", "in depth"))
         if said[key] is not None
     ]
-    lines = [head, f"  fixes are off by {', '.join(rms)} rms"]
+    lines = [head, f"  fixes are off by {', '.join(rms)}, rms"]
     if said["far"]:
         lines.append(f"  {len(said['far'])} fixes do not fit: {', '.join(said['far'][:3])}")
     return lines

@@ -66,8 +66,11 @@ class Fixes:
         return self.fixes.get(name) or self._by_stem.get(_stem(name))
 
     def key(self) -> list[Any]:
-        """Plain values that tell these from others."""
-        return [[name, fix.place_W_m.tolist(), fix.sigma_m.tolist()] for name, fix in sorted(self.fixes.items())]
+        """Plain values that tell these from others, None for what is not known."""
+        return [
+            [name, [None if math.isnan(x) else x for x in fix.place_W_m.tolist()], fix.sigma_m.tolist()]
+            for name, fix in sorted(self.fixes.items())
+        ]
 
 
 def _stem(name: str) -> str:
