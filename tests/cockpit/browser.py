@@ -54,7 +54,10 @@ class Browser:
         )  # fmt: skip
         port_file = self._profile / "DevToolsActivePort"
         lines = until(lambda: port_file.is_file() and port_file.read_text().split(), "chromium to start", 60.0)
-        self._socket: ClientConnection = connect(f"ws://127.0.0.1:{lines[0]}{lines[1]}", max_size=None, proxy=None)
+        # Without pings of its own: they draw from `random` in a thread, and Hypothesis sees any such draw in its tests.
+        self._socket: ClientConnection = connect(
+            f"ws://127.0.0.1:{lines[0]}{lines[1]}", max_size=None, proxy=None, ping_interval=None
+        )
         self._number = 0
         self._answers: dict[int, dict[str, Any]] = {}
         self.events: list[dict[str, Any]] = []

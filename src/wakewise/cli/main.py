@@ -111,42 +111,57 @@ def run(arguments: Sequence[str] | None = None) -> int:
         if code == _INTERRUPTED:  # Ctrl-C inside a command
             return _stopped()
         return code if isinstance(code, int) else 0
-    except typer.TyperException as fault:
-        _say(fault.format_message())
-        return 2
-    except (InputError, MissingExtra) as fault:
-        _say(str(fault))
-        return 2
-    except ModuleNotFoundError as fault:
-        from wakewise.extras import missing_extra
-
-        refusal = missing_extra("this command", fault)
-        if refusal is None:
-            raise
-        _say(str(refusal))
-        return 2
-    except WakewiseError as fault:
-        _say(str(fault))
-        return 1
     except (KeyboardInterrupt, typer.Abort):
         return _stopped()
-    except BrokenPipeError:  # nobody reads on, as after `| head`
-        _close_output()
-        return 1
-    except OSError as fault:
-        where = "cannot write: " if fault.filename is None else f"{fault.filename}: "
-        _say(f"{where}{fault.strerror or fault}")
-        _close_output()
-        return 1
-    except MemoryError as fault:
-        _say(f"out of memory ({fault})" if str(fault) else "out of memory")
-        return 1
     except Exception as fault:
-        told = next((said for words, said in _COMPUTER.items() if words in str(fault)), None)
-        if told is None:
-            raise
-        _say(told)
-        return 1
+        code = None if _made_of_interrupt(fault) else _refused(fault)
+        if code is not None:
+            return code
+        # Swallowed on its way, a library may have failed at what it left undone.
+        if _made_of_interrupt(fault) or INTERRUPTED.is_set():
+            return _stopped()
+        raise
+
+
+def _made_of_interrupt(fault: BaseException | None) -> bool:
+    """Whether an error was made of Ctrl-C, as Python 3.11 makes a RuntimeError of one that comes within a class."""
+    while fault is not None and not isinstance(fault, KeyboardInterrupt):
+        fault = fault.__cause__
+    return fault is not None
+
+
+def _refused(fault: Exception) -> int | None:
+    """Say an error that is foreseen in one line and give its exit code; None where it is not."""
+    match fault:
+        case typer.TyperException():
+            _say(fault.format_message())
+            return 2
+        case InputError() | MissingExtra():
+            _say(str(fault))
+            return 2
+        case ModuleNotFoundError():
+            from wakewise.extras import missing_extra
+
+            refusal = missing_extra("this command", fault)
+            if refusal is not None:
+                _say(str(refusal))
+            return None if refusal is None else 2
+        case WakewiseError():
+            _say(str(fault))
+        case BrokenPipeError():  # nobody reads on, as after `| head`
+            _close_output()
+        case OSError():
+            where = "cannot write: " if fault.filename is None else f"{fault.filename}: "
+            _say(f"{where}{fault.strerror or fault}")
+            _close_output()
+        case MemoryError():
+            _say(f"out of memory ({fault})" if str(fault) else "out of memory")
+        case _:
+            told = next((said for words, said in _COMPUTER.items() if words in str(fault)), None)
+            if told is None:
+                return None
+            _say(told)
+    return 1
 
 
 def _say(message: str) -> None:
@@ -172,6 +187,7 @@ def _terminate(*_: Any) -> None:
     """End as after Ctrl-C, so that whatever is half-done is tidied up; a second SIGTERM does not disturb that."""
     global _terminated  # noqa: PLW0603
     _terminated = True
+    INTERRUPTED.set()
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     raise KeyboardInterrupt
 
@@ -182,6 +198,12 @@ def _interrupt(*_: Any) -> None:
     raise KeyboardInterrupt
 
 
+def _unraisable(fault: sys.UnraisableHookArgs) -> None:
+    """Ctrl-C in a call back from C cannot be raised there; it is remembered, and no stack needs to tell of it."""
+    if not isinstance(fault.exc_value, KeyboardInterrupt):
+        sys.__unraisablehook__(fault)
+
+
 def main() -> None:
     """Entry point of the installed command."""
     if isinstance(sys.stdout, io.TextIOWrapper):  # a figure with a sign that the terminal lacks is still a figure
@@ -189,6 +211,7 @@ def main() -> None:
     signal.signal(signal.SIGTERM, _terminate)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a job in the background has it ignored
         signal.signal(signal.SIGINT, _interrupt)
+    sys.unraisablehook = _unraisable
     if numba_cache.CHOSEN is not None:
         _say(f"compiled code is kept in {numba_cache.CHOSEN}: the package's folder and the user's cache are read-only")
     code = run()
