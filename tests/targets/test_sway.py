@@ -75,7 +75,7 @@ def test_the_turned_normals_are_those_of_the_moved_surface():
     target = rod(0.004, 0.004)
     sway = Sway.of(target, FLESH, WATER)
     tips = np.array([[0.012, -0.006]])
-    moved, tilt = sway.bent(target, tips)
+    moved, tilt = sway.bent(tips)
     corners = (target.mesh.vertices_m + moved)[target.mesh.faces]
     faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     height = BED_Z - target.mesh.vertices_m[target.mesh.faces, 2]

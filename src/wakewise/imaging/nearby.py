@@ -7,7 +7,7 @@ of its own rays, whatever the lens.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,28 +24,57 @@ SLACK = 1.02
 """Widening of a cone whose angle is that of its corners: a lens may bulge the sides between them."""
 
 
-def bounding_spheres(parts: Sequence[tuple[Array, IntArray]]) -> Array:
-    """Spheres (x, y, z, radius), shape (k, 4), that together hold all faces of surfaces given as vertices and faces."""
-    found = [np.zeros((0, 4))]
-    for vertices, faces in parts:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Pieces:
+    """A surface cut into pieces, for spheres round them however it is moved; make it with `Pieces.of`.
+
+    `faces` (m, 3) are vertex indices, those of a piece one after the other; `firsts` (k + 1,) says where each begins.
+    """
+
+    faces: IntArray
+    firsts: IntArray
+
+    @classmethod
+    def of(cls, vertices: Array, faces: IntArray) -> Pieces:
+        """Cut a surface into cells of `PIECE_M`."""
         if not len(faces):
-            continue
-        corners = vertices[faces]
-        cells = np.floor(corners.mean(axis=1) / PIECE_M).astype(np.int64)
+            return cls(faces=np.zeros((0, 3), np.int64), firsts=np.zeros(1, np.int64))
+        cells = np.floor(vertices[faces].mean(axis=1) / PIECE_M).astype(np.int64)
         cells -= cells.min(axis=0)
         _, rows, columns = cells.max(axis=0) + 1
         # One number a cell sorts as its three do, in a tenth of the time.
         number = (cells[:, 0] * rows + cells[:, 1]) * columns + cells[:, 2]
-        _, piece = np.unique(number, return_inverse=True)
-        order = np.argsort(piece.ravel(), kind="stable")
-        firsts = np.searchsorted(piece.ravel()[order], np.arange(int(piece.max()) + 1))
-        corners = corners[order]
-        low = np.minimum.reduceat(corners.min(axis=1), firsts)
-        high = np.maximum.reduceat(corners.max(axis=1), firsts)
-        centres = 0.5 * (low + high)
-        away = np.linalg.norm(corners - centres[piece.ravel()[order], None], axis=2).max(axis=1)
-        found.append(np.column_stack([centres, np.maximum.reduceat(away, firsts) + 1e-6]))
-    return np.concatenate(found)
+        order = np.argsort(number, kind="stable")
+        begins = np.flatnonzero(np.diff(number[order], prepend=-1))
+        return cls(faces=faces[order].astype(np.int64), firsts=np.append(begins, len(faces)))
+
+    def spheres(self, vertices: Array) -> Array:
+        """Spheres (x, y, z, radius), shape (k, 4), that hold the pieces where the vertices are now, shape (n, 3)."""
+        out = np.empty((len(self.firsts) - 1, 4))
+        _spheres(np.ascontiguousarray(vertices, np.float64), self.faces, self.firsts, out)
+        return out
+
+
+@njit(nogil=True)
+def _spheres(vertices: Any, faces: Any, firsts: Any, out: Any) -> None:
+    low, high = np.empty(3), np.empty(3)
+    for k in range(out.shape[0]):
+        low[:], high[:] = np.inf, -np.inf
+        for m in range(firsts[k], firsts[k + 1]):
+            for corner in range(3):
+                for j in range(3):
+                    low[j] = min(low[j], vertices[faces[m, corner], j])
+                    high[j] = max(high[j], vertices[faces[m, corner], j])
+        furthest = 0.0
+        for j in range(3):
+            out[k, j] = 0.5 * (low[j] + high[j])
+        for m in range(firsts[k], firsts[k + 1]):
+            for corner in range(3):
+                away = 0.0
+                for j in range(3):
+                    away += (vertices[faces[m, corner], j] - out[k, j]) ** 2
+                furthest = max(furthest, away)
+        out[k, 3] = math.sqrt(furthest) + 1e-6
 
 
 @njit(nogil=True)

@@ -21,7 +21,7 @@ from wakewise.arrays import Array, IntArray
 from wakewise.errors import InputError
 from wakewise.imaging.daylight import bake_light
 from wakewise.imaging.height_field import HeightField, grid_faces, height_field
-from wakewise.imaging.nearby import bounding_spheres
+from wakewise.imaging.nearby import Pieces
 from wakewise.imaging.panels import Panels
 from wakewise.imaging.texture import BED_MAP_LEVELS, BED_MAP_SIZE, BED_TEXEL_M, Maps, bake_bed, bed_heights
 from wakewise.targets import Mesh, Target
@@ -84,7 +84,7 @@ class Scene:
         vertices, normals = self.vertices_F_m.copy(), self.normals.copy()
         vertices[:n], normals[:n] = rest + moved_m.astype(np.float32), target_normals
         own = self.faces[: self.first_face[1]]
-        spheres = bounding_spheres([(vertices[:n].astype(np.float64), own.astype(np.int64))])
+        spheres = self._pieces.spheres(vertices[:n])
         return replace(
             self,
             vertices_F_m=vertices,
@@ -104,7 +104,12 @@ class Scene:
     @cached_property
     def _stone_spheres(self) -> Array:
         vertices, faces = self._stones
-        return bounding_spheres([(vertices.astype(np.float64), faces.astype(np.int64))])
+        return Pieces.of(vertices, faces).spheres(vertices)
+
+    @cached_property
+    def _pieces(self) -> Pieces:
+        """Of the target, cut as it stands here: pieces that it is moved in are no larger for it."""
+        return Pieces.of(self.vertices_F_m[: self.first_bed_vertex], self.faces[: self.first_face[1]])
 
     @property
     def target_normals(self) -> NDArray[np.float32]:
@@ -174,7 +179,7 @@ class Scene:
             seed=noise_seed,
             bed=height_field(lines, bed_z),
             first_bed_vertex=len(vertices),
-            spheres_F_m=bounding_spheres([parts[0], parts[2]]),
+            spheres_F_m=np.concatenate([Pieces.of(v, f).spheres(v) for v, f in (parts[0], parts[2])]),
             solids=_embree([parts[0], parts[2]]),
         )
 

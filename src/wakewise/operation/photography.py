@@ -141,7 +141,7 @@ def moved_m(parts: Parts, exposure: ExposureRecord) -> Array:
     if exposure.shift_m is not None:
         moved += np.append(exposure.shift_m, 0.0)
     if yielding is not None and yielding.sway is not None and exposure.tips_m is not None:
-        moved += yielding.sway.moved(yielding.sway.stem, mesh.vertices_m, exposure.tips_m)
+        moved += yielding.sway.bent(exposure.tips_m)[0]
     return moved
 
 
@@ -150,7 +150,7 @@ def _posed(parts: Parts, tips_m: Array, shift_m: Array) -> Scene:
     yielding, scene = parts.yielding, parts.scene
     moved, normals = np.zeros((scene.first_bed_vertex, 3)), scene.target_normals.astype(np.float64)
     if yielding is not None and yielding.sway is not None:
-        moved, tilt = yielding.sway.bent(parts.target, tips_m)
+        moved, tilt = yielding.sway.bent(tips_m)
         normals = turned_normals(normals, tilt)
     return scene.posed(moved + np.append(shift_m, 0.0), normals)
 

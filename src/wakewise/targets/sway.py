@@ -15,6 +15,7 @@ tip moves by about half of the height, `BENDS_TO`; higher modes, torsion, and br
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -87,6 +88,7 @@ class Sway:
     moved_water_kg: Array
     stress_Pa_m: Array
     stem: IntArray
+    z_m: Array
     bed_z_m: float
 
     def __post_init__(self) -> None:
@@ -121,7 +123,7 @@ class Sway:
                 "stand upright; a stiffer or lighter one can"
             )
         columns = {name: np.stack([part[name] for part in parts]) for name in parts[0]}
-        return cls(height_m=heights, stem=stem, bed_z_m=target.bed_z_m, **columns)
+        return cls(height_m=heights, stem=stem, z_m=mesh.vertices_m[:, 2], bed_z_m=target.bed_z_m, **columns)
 
     @property
     def frequency_Hz(self) -> Array:
@@ -147,28 +149,41 @@ class Sway:
         """How far points at rest have moved, shape (n, 3), when the tips have moved by `tips_m`, shape (k, 2)."""
         shape, _, drop = self.at(stem, points_W_m[:, 2])
         place = np.where(stem >= 0, stem, 0)
-        tips = tips_m[place]
-        aside = np.einsum("ni,nij->nj", tips * shape, self.axes_W[place])
-        return np.column_stack([aside, np.sum(tips**2 * drop, axis=1)])
+        return _moved(tips_m[place], shape, drop, self.axes_W[place])
 
-    def bent(self, target: Target, tips_m: Array) -> tuple[Array, Array]:
+    def bent(self, tips_m: Array) -> tuple[Array, Array]:
         """How far the target's vertices have moved, shape (n, 3), and the slope (x, y) of the axis there, (n, 2).
 
         For tips that have moved by `tips_m`, shape (k, 2); see `turned_normals` for what the slope does to the surface.
         """
-        points = target.mesh.vertices_m
+        place, axes, shape, slope, drop = self._vertices
+        tips = tips_m[place]
+        return _moved(tips, shape, drop, axes), _along(tips * slope, axes)
+
+    @cached_property
+    def _vertices(self) -> tuple[IntArray, Array, Array, Array, Array]:
+        """Stem, axes, shape, slope and drop at each vertex: what does not hang on how far the tips have moved."""
         place = np.where(self.stem >= 0, self.stem, 0)
-        _, slope, _ = self.at(self.stem, points[:, 2])
-        tilt = np.einsum("ni,nij->nj", tips_m[place] * slope, self.axes_W[place])
-        return self.moved(self.stem, points, tips_m), tilt
+        return place, self.axes_W[place], *self.at(self.stem, self.z_m)
+
+
+def _along(ways: Array, axes: Array) -> Array:
+    """Level vectors, shape (n, 2), of ways (n, 2) along two axes each, (n, 2, 2)."""
+    return np.asarray(ways[:, :1] * axes[:, 0] + ways[:, 1:] * axes[:, 1])
+
+
+def _moved(tips: Array, shape: Array, drop: Array, axes: Array) -> Array:
+    down = tips[:, 0] ** 2 * drop[:, 0] + tips[:, 1] ** 2 * drop[:, 1]
+    return np.column_stack([_along(tips * shape, axes), down])
 
 
 def turned_normals(normals: Array, tilt: Array) -> Array:
     """Unit normals (n, 3) of a surface whose level sections are shifted with the slope `tilt` (n, 2) over height."""
-    keeps = np.maximum(1.0 - 0.5 * np.sum(tilt**2, axis=1), 0.1)
-    out = np.column_stack([keeps[:, None] * normals[:, :2], normals[:, 2] + np.sum(normals[:, :2] * tilt, axis=1)])
-    turned: Array = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-30)
-    return turned
+    (x, y, z), (a, b) = normals.T, tilt.T
+    keeps = np.maximum(1.0 - 0.5 * (a**2 + b**2), 0.1)
+    x, y, z = keeps * x, keeps * y, z + x * a + y * b
+    length = np.maximum(np.sqrt(x**2 + y**2 + z**2), 1e-30)
+    return np.column_stack([x / length, y / length, z / length])
 
 
 def _stems(places: Array, faces: IntArray) -> tuple[IntArray, Array]:
