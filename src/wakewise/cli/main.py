@@ -8,6 +8,7 @@ import signal
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from types import TracebackType
 from typing import Any
 
 import typer
@@ -204,6 +205,12 @@ def _unraisable(fault: sys.UnraisableHookArgs) -> None:
         sys.__unraisablehook__(fault)
 
 
+def _uncaught(kind: type[BaseException], fault: BaseException, trace: TracebackType | None) -> None:
+    """The same where C prints what it cannot raise: of Python's own code none but `run` would let Ctrl-C through."""
+    if not issubclass(kind, KeyboardInterrupt):
+        sys.__excepthook__(kind, fault, trace)
+
+
 def main() -> None:
     """Entry point of the installed command."""
     if isinstance(sys.stdout, io.TextIOWrapper):  # a figure with a sign that the terminal lacks is still a figure
@@ -211,7 +218,7 @@ def main() -> None:
     signal.signal(signal.SIGTERM, _terminate)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a job in the background has it ignored
         signal.signal(signal.SIGINT, _interrupt)
-    sys.unraisablehook = _unraisable
+    sys.unraisablehook, sys.excepthook = _unraisable, _uncaught
     if numba_cache.CHOSEN is not None:
         _say(f"compiled code is kept in {numba_cache.CHOSEN}: the package's folder and the user's cache are read-only")
     code = run()

@@ -84,7 +84,7 @@ class Scene:
         vertices, normals = self.vertices_F_m.copy(), self.normals.copy()
         vertices[:n], normals[:n] = rest + moved_m.astype(np.float32), target_normals
         own = self.faces[: self.first_face[1]]
-        spheres = self._pieces.spheres(vertices[:n])
+        spheres = self._pieces.spheres(vertices[:n].astype(np.float64))
         return replace(
             self,
             vertices_F_m=vertices,
@@ -104,12 +104,14 @@ class Scene:
     @cached_property
     def _stone_spheres(self) -> Array:
         vertices, faces = self._stones
-        return Pieces.of(vertices, faces).spheres(vertices)
+        places = vertices.astype(np.float64)
+        return Pieces.of(places, faces.astype(np.int64)).spheres(places)
 
     @cached_property
     def _pieces(self) -> Pieces:
         """Of the target, cut as it stands here: pieces that it is moved in are no larger for it."""
-        return Pieces.of(self.vertices_F_m[: self.first_bed_vertex], self.faces[: self.first_face[1]])
+        vertices, faces = self.vertices_F_m[: self.first_bed_vertex], self.faces[: self.first_face[1]]
+        return Pieces.of(vertices.astype(np.float64), faces.astype(np.int64))
 
     @property
     def target_normals(self) -> NDArray[np.float32]:
