@@ -13,6 +13,8 @@ from wakewise.errors import InputError
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
+_ONE_THREAD = 8192
+"""OpenBLAS takes longer dot products to all cores, and its threads spin for a while after each."""
 
 
 def frozen(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
@@ -40,7 +42,8 @@ def frozen(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
         raise InputError(f"{name}: shape {array.shape}, allowed {wanted}")
     flat = array.ravel()
     # A NaN or infinity shows in the sum of squares, at a fraction of the cost; so may numbers that are merely large.
-    if not math.isfinite(np.dot(flat, flat)) and not np.isfinite(array).all():
+    quick = flat.size <= _ONE_THREAD and math.isfinite(np.dot(flat, flat))
+    if not quick and not np.isfinite(array).all():
         raise InputError(f"{name}: holds NaN or infinity, every element must be finite")
     array.setflags(write=False)
     return array
