@@ -33,7 +33,6 @@ _START_S = 300.0
 _THREADS = (
     "OMP_NUM_THREADS",
     "NUMBA_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
     "MKL_NUM_THREADS",
     "POLARS_MAX_THREADS",
 )
@@ -55,7 +54,7 @@ class Slot:
     Parameters
     ----------
     threads : int
-        Of every library in it.
+        Of every library in it but OpenBLAS, which has one.
     """
 
     def __init__(self, threads: int) -> None:
@@ -123,6 +122,7 @@ class Slot:
                 stderr=subprocess.DEVNULL,
                 env=os.environ
                 | dict.fromkeys(_THREADS, str(self.threads))
+                | {"OPENBLAS_NUM_THREADS": "1"}  # as in the command line, which says why
                 | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
                 text=True,
                 cwd=cwd if cwd and Path(cwd).is_dir() else None,
