@@ -70,7 +70,7 @@ def rms(x):
 @pytest.mark.parametrize(
     ("name", "method", "trim_N", "current_m_s"),
     [
-        ("paper", "dp", 1.0, 0.0),
+        pytest.param("paper", "dp", 1.0, 0.0, marks=pytest.mark.slow),
         ("paper", "dp", -1.0, 0.05),
         ("paper", "wake-aware", -1.0, 0.05),
         ("bluerov2-heavy", "dp", -1.0, 0.05),

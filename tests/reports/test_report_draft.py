@@ -16,6 +16,7 @@ def test_a_part_is_made_once():
     assert draft.once("b", lambda: 2) == 2
 
 
+@pytest.mark.slow
 def test_the_page_of_a_draft_is_the_same_to_the_byte(made_up, report_text, tmp_path, monkeypatch):
     """Begun without the mesh, gone on without its colours; what was made then is not made again."""
     folder = tmp_path / made_up.name

@@ -33,6 +33,23 @@ def study(tmp_path_factory):
     return folder, scenario, degrade(scenario, folder, {"silt": (0.0, 3000.0, 4000.0)})
 
 
+@pytest.fixture(scope="module")
+def told(tmp_path_factory):
+    """The same study with its photographs, but of models that are made up: what it does with them is looked at."""
+
+    def made_up(photos, *_):
+        mud = bool(asked)
+        asked.append(photos.folder)
+        figures = {"images": len(photos.names), "failure": "too few features" if mud else None, "success": not mud}
+        return figures | ({} if mud else {"rmse_mm": 1.0, "completeness_pct": 97.0})
+
+    asked = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(degradation, "judge", made_up)
+        scenario, folder = load_scenario("quick", None, SMALL), tmp_path_factory.mktemp("told")
+        return folder, scenario, degrade(scenario, folder, {"silt": (0.0, 3000.0, 4000.0)})
+
+
 @pytest.mark.slow
 def test_clear_water_gives_a_model_and_mud_gives_none(study):
     """In clear water there are figures; in mud a reason instead of every one of them, and it ends there."""
@@ -45,9 +62,9 @@ def test_clear_water_gives_a_model_and_mud_gives_none(study):
     assert mud["rmse_mm"] is None and mud["completeness_pct"] is None
 
 
-def test_what_is_done_is_not_done_again_and_another_study_is_refused(study, monkeypatch):
+def test_what_is_done_is_not_done_again_and_another_study_is_refused(told, monkeypatch):
     """A second call reads its files; another scenario in the same folder is bad input."""
-    folder, scenario, rows = study
+    folder, scenario, rows = told
     monkeypatch.setattr(degradation, "judge", None)
     assert degrade(scenario, folder, {"silt": (0.0, 3000.0)}) == rows
     assert json.loads((folder / "degradation.json").read_text())["rows"] == rows
@@ -56,9 +73,10 @@ def test_what_is_done_is_not_done_again_and_another_study_is_refused(study, monk
         degrade(load_scenario("quick", None, SMALL | {"seed": 7}), folder)
 
 
-def test_the_plot_holds_levels_with_and_without_a_model(study, tmp_path):
+def test_the_plot_holds_levels_with_and_without_a_model(told, tmp_path):
     """A picture comes about whether there are models, none, or only some."""
-    rows = study[2]
+    rows = told[2]
+    assert [row["failure"] for row in rows] == [None, "too few features"]
     for some in (rows, rows[:1], rows[1:]):
         plot_degradation(some, FACTORS["silt"].title, "mg/L", tmp_path / "silt.png")
         assert (tmp_path / "silt.png").stat().st_size > 5000

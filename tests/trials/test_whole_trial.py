@@ -164,6 +164,7 @@ def test_the_same_seed_flies_the_same_flight_and_another_does_not() -> None:
     assert not one.equals(other)
 
 
+@pytest.mark.slow
 def test_the_report_of_a_real_trial_is_one_file_without_addresses(trial: tuple[Path, dict]) -> None:
     """report.html names the verdict and the figures, and asks no host for anything."""
     folder, figures = trial
