@@ -70,8 +70,9 @@ def bake_light(
         lit = np.arange(len(vertices))
         if k == 1:
             sky[:] = np.clip(0.5 - 0.5 * normal[:, 2:], 0.0, 1.0)
-            lamp[:] = per_unit * panels.irradiance(vertices + foot_W_m, normal)[:, None]
-            lit = np.nonzero(np.hypot(vertices[:, 0], vertices[:, 1]) < near_m)[0]
+            near = np.hypot(vertices[:, 0], vertices[:, 1]) < near_m
+            lit, far = np.flatnonzero(near), np.flatnonzero(~near)
+            lamp[far] = per_unit * panels.irradiance(vertices[far] + foot_W_m, normal[far])[:, None]
         sides = (1.0, -1.0) if k == 0 else (1.0,)
         rays = int(np.clip(RAYS_TOTAL // max(1, len(lit) * len(sides) * len(parts)), 8, 64))
         for side, sign in enumerate(sides):
