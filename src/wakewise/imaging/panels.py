@@ -64,7 +64,7 @@ class Panels:
         total = np.zeros(n)
         area = self.size_m[0] * self.size_m[1] / SPOTS
         points, normals = np.ascontiguousarray(points_W_m), np.ascontiguousarray(normals)
-        origin = np.zeros(3) if origin_W_m is None else np.asarray(origin_W_m, np.float64)
+        origin = np.zeros(3) if origin_W_m is None else np.array(origin_W_m, np.float64)
         starts, ways = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
         which, shares = np.empty(n, np.int64), np.empty(n)
         # Two patterns take turns among the vertices, so that penumbras show no steps; smoothing evens them out.
