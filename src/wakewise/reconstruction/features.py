@@ -30,6 +30,8 @@ T = TypeVar("T")
 FEW_FEATURES = 150
 FISHEYE_FOCAL = 0.4
 """Where a fisheye's focal length is unknown: this much of the longer side, which is 180 deg across a 4:3 diagonal."""
+BYTES_PER_PX, ROOM_BYTES = 60.0, 6e9
+"""What the scales of a photo take for each of its pixels (43 to 54 measured), and those of all threads in all."""
 EXTRACTION_BATCHES, MATCHING_BATCHES, LEAST_PAIRS = 12, 8, 120
 """Parts that the work is done in, for progress; descriptors are indexed anew in each, so few pairs are few parts."""
 
@@ -168,9 +170,16 @@ def _extract(
         if group.lens is not None:
             reader.camera_model, reader.camera_params = group.lens.for_colmap()
         work = _by_opencv if settings.detector == "opencv" else _by_colmap
-        work(store, list(group.photos), database, settings, reader, partial(_tell, progress, done, total))
+        here = settings.model_copy(update={"threads": threads_for(settings, group.width, group.height)})
+        work(store, list(group.photos), database, here, reader, partial(_tell, progress, done, total))
         done += len(group.photos)
     progress(done, total, "features")
+
+
+def threads_for(settings: ReconstructionSettings, width: int, height: int) -> int:
+    """Threads that may look for features in photos of this size, so that all of them fit into `ROOM_BYTES`."""
+    doubled = 4 if settings.first_octave == -1 else 1
+    return max(1, min(settings.threads, int(ROOM_BYTES / (BYTES_PER_PX * doubled * width * height))))
 
 
 def _tell(progress: Progress, before: int, total: int, done: int) -> None:
