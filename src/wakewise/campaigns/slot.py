@@ -54,7 +54,7 @@ class Slot:
     Parameters
     ----------
     threads : int
-        Of every library in it but OpenBLAS, which has one.
+        Of every library in it but OpenBLAS, which has one or as many as the user says.
     """
 
     def __init__(self, threads: int) -> None:
@@ -120,9 +120,9 @@ class Slot:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
-                env=os.environ
+                env={"OPENBLAS_NUM_THREADS": "1"}  # unless the user says otherwise, as in the command line
+                | os.environ
                 | dict.fromkeys(_THREADS, str(self.threads))
-                | {"OPENBLAS_NUM_THREADS": "1"}  # as in the command line, which says why
                 | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
                 text=True,
                 cwd=cwd if cwd and Path(cwd).is_dir() else None,

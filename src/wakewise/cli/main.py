@@ -115,11 +115,12 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except (KeyboardInterrupt, typer.Abort):
         return _stopped()
     except Exception as fault:
-        code = None if _made_of_interrupt(fault) else _refused(fault)
+        if _made_of_interrupt(fault):
+            return _stopped()
+        code = _refused(fault)
         if code is not None:
             return code
-        # Swallowed on its way, a library may have failed at what it left undone.
-        if _made_of_interrupt(fault) or INTERRUPTED.is_set():
+        if INTERRUPTED.is_set():  # swallowed on its way by a library, which then failed at what it had left undone
             return _stopped()
         raise
 

@@ -45,7 +45,8 @@ def bake_light(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Irradiance by sky and by panels on both sides of each vertex of target, bed and stones, shape (n, 2) each.
 
-    Each is 1 on a level open surface at the foot. What bed and target throw back is the same share of either.
+    Each is 1 on a level open surface at the foot. What bed and target throw back is the same share of either. The bed
+    has one side that is seen, column 0.
 
     Parameters
     ----------
