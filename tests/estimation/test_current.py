@@ -72,3 +72,21 @@ def test_whichever_published_drag_is_the_true_one_the_current_is_within_what_is_
                     e = found[:2] - c
                     told.append(float(np.sqrt(e @ np.linalg.solve(spread[:2, :2], e))))
     assert len(sets) > 2 and max(off) < 2.5 < max(alone)
+
+
+def test_the_current_told_is_that_of_a_readable_twin():
+    """Principal axes by LAPACK, one force after the other through Newton, mean and covariance by NumPy."""
+    sets = np.stack([compile_body(vehicle).packed for vehicle in with_each_drag(load_vehicle("paper"))])
+    q, root = quat_from_euler(0.05, -0.2, 2.0), 0.02 * np.random.default_rng(0).normal(size=(3, 3))
+    force, around = np.array([*level_drag(sets[0], q, 0.1, -0.06), 0.3]), root @ root.T
+    values, axes = np.linalg.eigh(around[:2, :2])
+    reach = (axes * np.sqrt(2.0 * values)).T
+    forces = force[:2] + np.concatenate([reach, -reach])
+    told = np.array([current_of_force(packed, q, *f)[:2] for packed in sets for f in forces])
+    level = told.mean(axis=0)
+    spread = (told - level).T @ (told - level) / len(told) + 0.2**2 * np.outer(level, level)
+    current, covariance = told_current(sets, q, force, around, 0.2)
+    np.testing.assert_allclose(current, [*level, 0.0], rtol=1e-9)
+    np.testing.assert_allclose(covariance[:2, :2], spread, rtol=1e-9)
+    assert not covariance[2].any()
+    assert not covariance[:, 2].any()

@@ -2,8 +2,9 @@
 
 Start reading in `error_state.py`: `ErrorStateFilter` is an error-state extended Kalman filter (EKF) on the nominal
 vehicle's equations; `FilterSettings` states the noise of the sensors that it assumes, `Priors` in `settings.py` what
-it takes for granted. `kernels.py` is compiled prediction and correction, `resting.py` what a vehicle at rest tells of
-its biases, `current.py` what its load tells of the current.
+it takes for granted. `kernels.py` is the compiled motion, `prediction.py` and `corrections.py` what time and what each
+kind of measurement do to mean and covariance, `resting.py` what a vehicle at rest tells of its biases, `current.py`
+what its load tells of the current.
 """
 
 from wakewise.estimation.error_state import ErrorStateFilter, FilterState

@@ -20,8 +20,7 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.compiled import njit
-from wakewise.estimation.resting import turn
-from wakewise.vehicles.kernels import damping
+from wakewise.vehicles.kernels import damping, rotate
 
 KNOWN_M_S = 0.02
 """A current is told once it is known to this, one sigma per axis: half of what runs in a still tank or a calm bay."""
@@ -34,10 +33,10 @@ _ROUNDS = 30
 @njit
 def level_drag(packed: Array, q: Array, north_m_s: float, east_m_s: float) -> tuple[float, float]:
     """North and east of the force on a vehicle at rest, attitude q, in a level current."""
-    c_B = turn(q, np.array([north_m_s, east_m_s, 0.0]), -1.0)
-    drag = damping(packed, (c_B[0], c_B[1], c_B[2], 0.0, 0.0, 0.0))
-    force = turn(q, np.array([drag[0], drag[1], drag[2]]), 1.0)
-    return force[0], force[1]
+    c = rotate(-q[0], q[1], q[2], q[3], north_m_s, east_m_s, 0.0)
+    drag = damping(packed, (c[0], c[1], c[2], 0.0, 0.0, 0.0))
+    north_N, east_N, _ = rotate(q[0], q[1], q[2], q[3], drag[0], drag[1], drag[2])
+    return north_N, east_N
 
 
 @njit
@@ -84,14 +83,70 @@ def current_of_force(packed: Array, q: Array, north_N: float, east_N: float) -> 
     return answer
 
 
+@njit
+def _likely_forces(force_W_N: Array, covariance: Array) -> Array:
+    """Four level forces, shape (4, 2), of the mean and the covariance that a force's level part has."""
+    a, b, c = covariance[0, 0], covariance[0, 1], covariance[1, 1]
+    middle, half, angle = 0.5 * (a + c), np.hypot(0.5 * (a - c), b), 0.5 * np.arctan2(2.0 * b, a - c)
+    forces = np.empty((4, 2))
+    for k in range(2):
+        # The covariance's principal axes, longer one first.
+        turned, value = angle + 0.5 * np.pi * k, middle + half * (1.0 - 2.0 * k)
+        reach = np.sqrt(2.0 * max(value, 0.0))
+        for sign in range(2):
+            along = reach * (1.0 - 2.0 * sign)
+            forces[2 * k + sign, 0] = force_W_N[0] + along * np.cos(turned)
+            forces[2 * k + sign, 1] = force_W_N[1] + along * np.sin(turned)
+    return forces
+
+
+@njit
+def _each_told(sets: Array, rest_q: Array, force_W_N: Array, force_covariance: Array) -> Array:
+    """North and east by each set of drag and each likely force, shape (sets * 4, 2), the first set's first."""
+    forces = _likely_forces(force_W_N, force_covariance)
+    told = np.empty((sets.shape[0] * 4, 2))
+    for k in range(told.shape[0]):
+        found = current_of_force(sets[k // 4], rest_q, forces[k % 4, 0], forces[k % 4, 1])
+        told[k, 0], told[k, 1] = found[0], found[1]
+    return told
+
+
+@njit
+def _told_current(
+    sets: Array, rest_q: Array, force_W_N: Array, force_covariance: Array, drag_std: float, answer: Array
+) -> bool:
+    """Write current and covariance, row by row, to `answer`, shape (4, 3); False while it is not known."""
+    told = _each_told(sets, rest_q, force_W_N, force_covariance)
+    own, many = told[:4], told.shape[0]
+    unsure = 0.0
+    for i in range(2):
+        middle = 0.25 * (own[0, i] + own[1, i] + own[2, i] + own[3, i])
+        for k in range(4):
+            unsure += 0.25 * (own[k, i] - middle) ** 2
+    answer[:] = 0.0
+    for i in range(2):
+        for k in range(many):
+            answer[0, i] += told[k, i] / many
+    north, east = answer[0, 0], answer[0, 1]
+    # Not a number, where one set found none, is not known either.
+    if not (0.5 * unsure <= KNOWN_M_S**2 and np.isfinite(north + east)):
+        return False
+    for i in range(2):
+        for j in range(2):
+            answer[1 + i, j] = drag_std**2 * answer[0, i] * answer[0, j]
+            for k in range(many):
+                answer[1 + i, j] += (told[k, i] - answer[0, i]) * (told[k, j] - answer[0, j]) / many
+    return True
+
+
 def told_current(
-    sets: Sequence[Array], rest_q: Array, force_W_N: Array, force_covariance: Array, drag_std: float
+    sets: Array | Sequence[Array], rest_q: Array, force_W_N: Array, force_covariance: Array, drag_std: float
 ) -> tuple[Array, Array] | None:
     """Level current and its covariance, shapes (3,) and (3, 3), or None while it is not known to `KNOWN_M_S`.
 
     Parameters
     ----------
-    sets : sequence of ndarray
+    sets : ndarray, shape (k, 20, 6)
         Numbers of the vehicle with each drag that it may have, each alike; the nominal one first.
     rest_q : ndarray, shape (4,)
         Attitude that the force is told for.
@@ -100,19 +155,10 @@ def told_current(
     drag_std : float
         Relative error of each drag.
     """
-    force, around = force_W_N[:2], force_covariance[:2, :2]
-    if not np.isfinite(force.sum() + around.sum()):
-        return None
     # Drag without a linear part has no slope at rest: its current is told from four forces about the one found, whose
     # mean and covariance are right (S. J. Julier and J. K. Uhlmann, Proc. IEEE 92 (2004) 401).
-    values, axes = np.linalg.eigh(around)
-    reach = (axes * np.sqrt(2.0 * np.maximum(values, 0.0))).T
-    forces = force + np.concatenate([reach, -reach])
-    told = np.array([current_of_force(packed, rest_q, float(f[0]), float(f[1]))[:2] for packed in sets for f in forces])
-    if not (np.isfinite(told).all() and 0.5 * float(told[: len(forces)].var(axis=0).sum()) <= KNOWN_M_S**2):
-        return None
-    level = told.mean(axis=0)
-    current, covariance = np.zeros(3), np.zeros((3, 3))
-    current[:2] = level
-    covariance[:2, :2] = (told - level).T @ (told - level) / len(told) + drag_std**2 * np.outer(level, level)
-    return current, covariance
+    answer = np.empty((4, 3))
+    known = _told_current(
+        np.asarray(sets), rest_q, np.array(force_W_N), np.array(force_covariance), float(drag_std), answer
+    )
+    return (answer[0], answer[1:]) if known else None

@@ -31,37 +31,22 @@ the settings.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+import math
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import chdtri
 
 from wakewise.arrays import Array, freeze
+from wakewise.estimation.corrections import NOTHING, take_force, take_pose, take_sum
 from wakewise.estimation.current import told_current
-from wakewise.estimation.kernels import (
-    CURRENT,
-    FORCE,
-    GYRO,
-    correct,
-    felt,
-    predict,
-    turn_between,
-    turned_by,
-    unexplained,
-)
+from wakewise.estimation.kernels import CURRENT, FORCE, GYRO, TURNING, unexplained
+from wakewise.estimation.prediction import TICK_S, advance
 from wakewise.estimation.settings import FilterSettings, Priors
-from wakewise.geometry import Pose, matrix_from_quat
+from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Measurement
-from wakewise.physics import GRAVITY_M_S2
 from wakewise.vehicles import Vehicle, compile_body, with_each_drag
-
-_TICK_S = 1e-9
-_MEMORY = 15  # poses that the mean of innovations goes back, a quarter of a second at 62 Hz
-_CHANCE = 9.0 / (2 * _MEMORY - 1)  # square of three sigmas of that mean for a filter whose noise is right
-_CLIP = 3.0  # one wrong pose counts for no more sigmas than this
-_LARGEST_SURPRISE = 10.0
-_HASTE = 0.1  # growth of the noise per pose and unit of surprise: at most tenfold in 3 poses, back by half in 7
-_NOISIEST = 300.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -129,7 +114,7 @@ class ErrorStateFilter:
         self._start_s = start_s
         self._body = compile_body(vehicle)
         self._packed = self._body.packed
-        self._drags = tuple(compile_body(other).packed for other in with_each_drag(vehicle))
+        self._drags = np.stack([compile_body(other).packed for other in with_each_drag(vehicle)])
         self._B = vehicle.allocation_matrix
         self._lag_s = np.maximum(vehicle.time_constants_s, 1e-9)
         self._noise = np.array(
@@ -159,8 +144,8 @@ class ErrorStateFilter:
         n = self._B.shape[1]
         lasting = np.repeat([s.current_std_m_s, s.drag_std, s.inertia_std, s.gain_std], [3, 6, 6, n])
         lasts_s = np.full(len(lasting), s.lasting_s)
-        self._slow: dict[str, int] = {}
-        """Where the slow errors of the sensors that have one begin among the errors."""
+        self._slow = {"camera": NOTHING, "tracking": NOTHING, "depth": NOTHING}
+        """Where the slow errors of the sensors begin among the errors."""
         for sensor, spreads, time_s in (
             ("camera", np.repeat([s.pose_slow_std_m, s.pose_slow_std_rad], 3), s.slow_s),
             ("tracking", np.full(3, s.tracking_slow_std_m), s.slow_s),
@@ -193,24 +178,24 @@ class ErrorStateFilter:
         """Advance by `dt_s` under the commanded thrusts, shape (n,), take in what was measured, say where we are."""
         now_s = state.time_s + dt_s
         commands = (*state.commands, (state.time_s, np.where(np.isfinite(thrusts_N), thrusts_N, 0.0)))
-        fresh = tuple(m for m in measurements if m.time_s > state.settled_s - _TICK_S)
+        fresh = tuple(m for m in measurements if m.time_s > state.settled_s - TICK_S)
         waiting = tuple(sorted((*state.waiting, *fresh), key=lambda m: m.time_s))
         settled_s = max(now_s - self.priors.settle_s, state.settled_s)
-        due = tuple(m for m in waiting if m.time_s <= settled_s + _TICK_S)
+        due = tuple(m for m in waiting if m.time_s <= settled_s + TICK_S)
         rest = waiting[len(due) :]
         walk = _Walk(state, commands)
         for measured in due:
             self._advance(walk, min(measured.time_s, settled_s))
             self._take(walk, measured)
         self._advance(walk, settled_s)
-        begun = max((k for k, (since, _) in enumerate(commands) if since <= settled_s + _TICK_S), default=0)
-        settled = replace(
-            state,
+        begun = max((k for k, (since, _) in enumerate(commands) if since <= settled_s + TICK_S), default=0)
+        settled = FilterState(
             time_s=now_s,
             settled_s=settled_s,
-            mean=walk.mean.copy(),
-            covariance=walk.P.copy(),
+            mean=walk.mean,
+            covariance=walk.P,
             thrusts_N=walk.thrusts_N,
+            rest_q=state.rest_q,
             commands=commands[begun:],
             waiting=rest,
             poses_refused_in_a_row=walk.refused_in_a_row,
@@ -244,97 +229,84 @@ class ErrorStateFilter:
 
     def _advance(self, walk: _Walk, until_s: float) -> None:
         """Move on to a time, command by command."""
-        while until_s - walk.time_s > _TICK_S:
-            command, changes_s = walk.command_at(walk.time_s)
-            end_s = min(until_s, changes_s)
-            dt_s = end_s - walk.time_s
-            kept = np.exp(-dt_s / self._lag_s)
-            # Mean thrust over the step, exact for the first-order lag.
-            push = command + (walk.thrusts_N - command) * (self._lag_s / dt_s) * (1.0 - kept)
-            noise = self._noise.copy()
-            noise[:4] *= walk.noise_scale
-            predict(
-                self._packed, self._B, walk.mean, walk.P, push, walk.rest_q, dt_s, noise, self._lasting, self._lasts_s
+        if until_s - walk.time_s > TICK_S:
+            walk.time_s = advance(
+                self._packed,
+                self._B,
+                self._lag_s,
+                walk.mean,
+                walk.P,
+                walk.thrusts_N,
+                walk.rest_q,
+                walk.since_s,
+                walk.commands_N,
+                walk.time_s,
+                until_s,
+                self._noise,
+                walk.noise_scale,
+                self._lasting,
+                self._lasts_s,
             )
-            walk.thrusts_N = command + kept * (walk.thrusts_N - command)
-            walk.time_s = end_s
 
     def _take(self, walk: _Walk, measured: Measurement) -> None:
-        s = self.settings
-        if measured.X_WB is not None and np.isfinite(measured.X_WB.p_m.sum() + measured.X_WB.q.sum()):
-            if walk.refused_in_a_row >= self.priors.gate_patience:
-                walk.P[np.diag_indices(self._errors)] += np.diag(self._start_covariance)
-            H, residual, std = self._pose_rows(walk, measured.X_WB)
-            self._heed(walk, residual / np.sqrt(np.einsum("ij,jk,ik->i", H, walk.P, H) + std**2))
-            distance = self._correct(walk, H, residual, std)
-            walk.refused_in_a_row = 0 if distance <= self._gate[6] else walk.refused_in_a_row + 1
-        if measured.p_WB_m is not None and np.isfinite(measured.p_WB_m).all():
-            H = np.zeros((3, self._errors))
-            H[:, :3] = np.eye(3)
-            residual = measured.p_WB_m - walk.mean[:3] - self._slow_part(walk, "tracking", H, 3)
-            self._correct(walk, H, residual, np.full(3, s.tracking_std_m))
-        if measured.depth_m is not None and np.isfinite(measured.depth_m):
-            H = np.zeros((1, self._errors))
-            H[0, 2] = 1.0
-            residual = measured.depth_m - walk.mean[2:3] - self._slow_part(walk, "depth", H, 1)
-            self._correct(walk, H, residual, np.array([s.depth_std_m]))
-        if measured.omega_B_rad_s is not None and np.isfinite(measured.omega_B_rad_s).all():
-            H = np.zeros((3, self._errors))
-            H[:, 9:12] = H[:, GYRO : GYRO + 3] = np.eye(3)
-            expected = walk.mean[10:13] + walk.mean[19:22]
-            self._correct(walk, H, measured.omega_B_rad_s - expected, np.full(3, s.gyro_std_rad_s))
-        if measured.force_B_m_s2 is not None and np.isfinite(measured.force_B_m_s2).all():
+        s, slow = self.settings, self._slow
+        if measured.X_WB is not None:
+            self._take_pose(walk, measured.X_WB)
+        if measured.p_WB_m is not None:
+            self._take_sum(walk, measured.p_WB_m, 0, slow["tracking"], s.tracking_std_m)
+        if measured.depth_m is not None:
+            self._take_sum(walk, (measured.depth_m,), 2, slow["depth"], s.depth_std_m)
+        if measured.omega_B_rad_s is not None:
+            self._take_sum(walk, measured.omega_B_rad_s, TURNING, GYRO, s.gyro_std_rad_s)
+        if measured.force_B_m_s2 is not None:
             self._take_force(walk, measured.force_B_m_s2, measured.time_s)
 
-    def _pose_rows(self, walk: _Walk, seen: Pose) -> tuple[Array, Array, Array]:
-        """Jacobian (6, E), residual (6,) and noise (6,) of a camera pose, its slow error included."""
-        H, residual, q = np.zeros((6, self._errors)), np.empty(6), walk.mean[3:7]
-        H[:, :6] = np.eye(6)
-        slow = self._slow_part(walk, "camera", H, 6)
-        residual[:3] = seen.p_m - walk.mean[:3] - slow[:3]
-        if slow.any():
-            q = turned_by(q, slow[3:])
-        residual[3:] = turn_between(q, seen.q)
-        return H, residual, np.repeat([self.settings.position_std_m, self.settings.attitude_std_rad], 3)
+    def _take_pose(self, walk: _Walk, seen: Pose) -> None:
+        """Camera: where the vehicle is; what poses say together is heeded by the model's noise."""
+        if walk.refused_in_a_row >= self.priors.gate_patience:
+            walk.P += self._start_covariance
+        distance, walk.noise_scale = take_pose(
+            walk.mean,
+            walk.P,
+            seen.p_m,
+            seen.q,
+            self._slow["camera"],
+            self.settings.position_std_m,
+            self.settings.attitude_std_rad,
+            self._gate[6],
+            walk.leaning,
+            walk.noise_scale,
+        )
+        walk.refused_in_a_row = 0 if walk.count(distance, self._gate[6]) else walk.refused_in_a_row + 1
 
-    def _slow_part(self, walk: _Walk, sensor: str, H: Array, size: int) -> Array:
-        """A sensor's slow error as believed, shape (size,), and its columns in H."""
-        k = self._slow.get(sensor)
-        if k is None:
-            return np.zeros(size)
-        H[:, k : k + size] = np.eye(size)
-        return walk.mean[k + 1 : k + 1 + size]
+    def _take_sum(self, walk: _Walk, told: ArrayLike, first: int, second: int, std: float) -> None:
+        """A sensor of the errors from `first` on, its own slow error from `second` on."""
+        measured = _numbers(told)
+        if measured is not None:
+            gate = self._gate[len(measured)]
+            walk.count(take_sum(walk.mean, walk.P, measured, first, second, std, gate), gate)
 
-    @staticmethod
-    def _heed(walk: _Walk, innovation: Array) -> None:
-        """Let the model's noise follow what the normalised innovations of poses, shape (6,), say about it."""
-        walk.leaning = walk.leaning + (np.clip(innovation, -_CLIP, _CLIP) - walk.leaning) / _MEMORY
-        surprise = min(float(np.max(walk.leaning**2)) / _CHANCE, _LARGEST_SURPRISE)
-        walk.noise_scale = float(np.clip(walk.noise_scale * np.exp(_HASTE * (surprise - 1.0)), 1.0, _NOISIEST))
-
-    def _take_force(self, walk: _Walk, force_B_m_s2: Array, time_s: float) -> None:
-        """Accelerometer: dv/dt + omega x v - R' g, seen through tilt, the unmodelled force and the bias.
-
-        The white error of the modelled acceleration,
-        over one period of the sensor, counts as noise.
-        """
-        mean = walk.mean
-        R_WB = matrix_from_quat(mean[3:7])
-        down_B = R_WB.T @ np.array([0.0, 0.0, GRAVITY_M_S2])
-        H = np.empty((3, self._errors))
-        expected = felt(self._packed, self._B, mean, walk.thrusts_N, walk.rest_q, down_B, H)
+    def _take_force(self, walk: _Walk, told: ArrayLike, time_s: float) -> None:
+        """Accelerometer: the white error of the modelled acceleration, over one of its periods, counts as noise."""
+        force_B_m_s2 = _numbers(told)
+        if force_B_m_s2 is None:
+            return
         period_s = max(time_s - walk.force_s, 1e-3) if walk.force_s is not None else 0.02
         walk.force_s = time_s
-        s = self.settings
-        std = np.hypot(s.accelerometer_std_m_s2, self.priors.acceleration_noise_m_s2 / np.sqrt(period_s))
-        self._correct(walk, H, force_B_m_s2 - expected, np.full(3, std))
+        std = math.hypot(
+            self.settings.accelerometer_std_m_s2, self.priors.acceleration_noise_m_s2 / math.sqrt(period_s)
+        )
+        gate = self._gate[3]
+        distance = take_force(
+            self._packed, self._B, walk.mean, walk.P, walk.thrusts_N, walk.rest_q, force_B_m_s2, std, gate
+        )
+        walk.count(distance, gate)
 
-    def _correct(self, walk: _Walk, H: Array, residual: Array, std: Array) -> float:
-        gate = self._gate[len(residual)]
-        distance = float(correct(walk.mean, walk.P, H, residual, np.diag(std**2), gate))
-        walk.taken += distance <= gate
-        walk.refused += distance > gate
-        return distance
+
+def _numbers(told: ArrayLike) -> Array | None:
+    """What a sensor told, shape (m,), or None where that is no number."""
+    measured = np.array(told, dtype=np.float64)
+    return measured if math.isfinite(sum(measured.tolist())) else None
 
 
 class _Walk:
@@ -343,17 +315,17 @@ class _Walk:
     def __init__(self, state: FilterState, commands: tuple[tuple[float, Array], ...]) -> None:
         self.time_s = state.settled_s
         self.mean, self.P = state.mean.copy(), state.covariance.copy()
-        self.thrusts_N, self.rest_q = state.thrusts_N, state.rest_q
+        self.thrusts_N, self.rest_q = state.thrusts_N.copy(), state.rest_q
         self.refused_in_a_row = state.poses_refused_in_a_row
-        self.leaning, self.noise_scale = state.leaning, state.noise_scale
+        self.leaning, self.noise_scale = state.leaning.copy(), state.noise_scale
         self.taken, self.refused = state.taken, state.refused
         self.force_s: float | None = None
-        self._commands = commands
+        self.since_s = np.array([since for since, _ in commands])
+        self.commands_N = np.array([thrusts for _, thrusts in commands])
 
-    def command_at(self, time_s: float) -> tuple[Array, float]:
-        """Thrusts commanded at a time, and until when."""
-        for k in range(len(self._commands) - 1, -1, -1):
-            if self._commands[k][0] <= time_s + _TICK_S:
-                after_s = self._commands[k + 1][0] if k + 1 < len(self._commands) else np.inf
-                return self._commands[k][1], after_s
-        return self._commands[0][1], self._commands[1][0] if len(self._commands) > 1 else np.inf
+    def count(self, distance: float, gate: float) -> bool:
+        """Count a measurement as taken or refused; returns whether it was taken."""
+        right = distance <= gate
+        self.taken += right
+        self.refused += not right
+        return right

@@ -1,4 +1,4 @@
-"""Compiled steps of the error-state filter; see `error_state` for what they mean.
+"""Compiled motion of the error-state filter; see `error_state` for what it means.
 
 `mean`, shape (40 + n [+ up to 10],) for n thrusters: position in W (0:3), quaternion q_WB (3:7), twist in B (7:13),
 unmodelled force in W (13:16) and moment in B (16:19), what the current does at rest included (`resting`), gyro bias
@@ -15,13 +15,13 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.compiled import assign, njit
-from wakewise.estimation.resting import DRAG, at_rest, rest_effects, turn
-from wakewise.vehicles.kernels import INVERSE, LINEAR, QUADRATIC, damping, rate_kernel, rotate
+from wakewise.estimation.resting import DRAG, at_rest, rest_effects
+from wakewise.vehicles.kernels import INVERSE, LINEAR, QUADRATIC, Three, damping, rate_kernel, rotate
 from wakewise.vehicles.runge_kutta import rk4_jacobian_kernel
 
 _INSTANT_S = 1e-7
-MOVING, FORCE, MOMENT, GYRO, FELT, CURRENT, INERTIA, GAINS = 12, 12, 15, 18, 21, 24, 33, 39
-"""Where each block of the error begins; the first is how many entries the equations of motion move."""
+TURNING, MOVING, FORCE, MOMENT, GYRO, FELT, CURRENT, INERTIA, GAINS = 9, 12, 12, 15, 18, 21, 24, 33, 39
+"""Where blocks of the error begin, the body rate's first; MOVING is how many entries the equations of motion move."""
 
 
 @njit
@@ -62,29 +62,35 @@ def believed(packed: Array, mean: Array) -> Array:
     own = packed.copy()
     for i in range(6):
         drag, root = 1.0 + mean[1 + DRAG + i], np.sqrt(1.0 + mean[1 + INERTIA + i])
+        less = 1.0 / root
         for j in range(6):
             own[i, j] *= root
             own[j, i] *= root
-            own[INVERSE + i, j] /= root
-            own[INVERSE + j, i] /= root
+            own[INVERSE + i, j] *= less
+            own[INVERSE + j, i] *= less
             own[LINEAR + i, j] *= drag
         own[QUADRATIC, i] *= drag
     return own
 
 
 @njit(apart=True)
-def pushed(own: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array) -> Array:
-    """Wrench in B of thrusts, with the gains believed in, and of what the model does not explain, shape (6,)."""
-    wrench = at_rest(own, mean, rest_q)
-    load_B = turn(mean[3:7], mean[13:16] + wrench[:3], -1.0)
+def lacking(own: Array, mean: Array, rest_q: Array) -> Array:
+    """Wrench in B of what the model does not explain, shape (6,)."""
+    wrench, q = at_rest(own, mean, rest_q), mean[3:7]
+    x, y, z = mean[13] + wrench[0], mean[14] + wrench[1], mean[15] + wrench[2]
+    wrench[0], wrench[1], wrench[2] = rotate(-q[0], q[1], q[2], q[3], x, y, z)
     for i in range(3):
-        wrench[i] = load_B[i]
         wrench[3 + i] += mean[16 + i]
+    return wrench
+
+
+@njit
+def _push(wrench: Array, allocation: Array, mean: Array, thrusts_N: Array) -> None:
+    """Add to a wrench in B that of thrusts, with the gains believed in."""
     for k in range(thrusts_N.shape[0]):
         thrust = (1.0 + mean[1 + GAINS + k]) * thrusts_N[k]
         for i in range(6):
             wrench[i] += allocation[i, k] * thrust
-    return wrench
 
 
 @njit
@@ -98,7 +104,8 @@ def _past(mean: Array) -> tuple[float, float, float, float, float, float]:
 def unexplained(packed: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array) -> Array:
     """Wrench in B, shape (6,), that the nominal vehicle in still water lacks to move as the mean has it."""
     vehicle = believed(packed, mean)
-    wrench = pushed(vehicle, allocation, mean, thrusts_N, rest_q)
+    wrench = lacking(vehicle, mean, rest_q)
+    _push(wrench, allocation, mean, thrusts_N)
     own = damping(vehicle, _past(mean))
     still = damping(packed, (mean[7], mean[8], mean[9], mean[10], mean[11], mean[12]))
     for i in range(6):
@@ -106,14 +113,6 @@ def unexplained(packed: Array, allocation: Array, mean: Array, thrusts_N: Array,
             wrench[i] -= allocation[i, k] * thrusts_N[k]
         wrench[i] += still[i] - own[i]
     return wrench
-
-
-@njit(inline="always")
-def _inputs(own: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array) -> Array:
-    inputs = np.empty(9)
-    assign(inputs[:6], pushed(own, allocation, mean, thrusts_N, rest_q))
-    assign(inputs[6:], mean[25:28])
-    return inputs
 
 
 @njit(apart=True)
@@ -151,12 +150,10 @@ def _effects(own: Array, mean: Array, inputs: Array) -> Array:
 
 @njit(apart=True)
 def _add_current(F: Array, A: Array, mean: Array, dt_s: float) -> None:
-    """Fill F's columns of the current: it acts as a velocity the other way, and turns in B."""
+    """Add to F's columns of the current: it acts as a velocity the other way, and turns in B."""
     q, w = mean[3:7], mean[10:13]
     for j in range(3):
-        axis = np.zeros(3)
-        axis[j] = 1.0
-        seen = turn(q, axis, -1.0)
+        seen = _world_axis(q, j)
         change = np.zeros(6)
         for i in range(6):
             for k in range(3):
@@ -164,15 +161,48 @@ def _add_current(F: Array, A: Array, mean: Array, dt_s: float) -> None:
         change[0] -= dt_s * (w[1] * seen[2] - w[2] * seen[1])
         change[1] -= dt_s * (w[2] * seen[0] - w[0] * seen[2])
         change[2] -= dt_s * (w[0] * seen[1] - w[1] * seen[0])
-        moved = turn(q, change[:3].copy(), 1.0)
+        moved = rotate(q[0], q[1], q[2], q[3], change[0], change[1], change[2])
         for i in range(3):
-            F[i, CURRENT + j] = 0.5 * dt_s * moved[i]
-            F[3 + i, CURRENT + j] = 0.5 * dt_s * change[3 + i]
-            F[6 + i, CURRENT + j] = change[i]
-            F[9 + i, CURRENT + j] = change[3 + i]
+            F[i, CURRENT + j] += 0.5 * dt_s * moved[i]
+            F[3 + i, CURRENT + j] += 0.5 * dt_s * change[3 + i]
+            F[6 + i, CURRENT + j] += change[i]
+            F[9 + i, CURRENT + j] += change[3 + i]
+
+
+@njit(inline="always")
+def _world_axis(q: Array, j: int) -> Three:
+    """The world's axis j, as the body sees it."""
+    x, y, z = 1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0
+    return rotate(-q[0], q[1], q[2], q[3], x, y, z)
 
 
 @njit
+def _wrench_by_error(
+    own: Array, allocation: Array, mean: Array, load_B: Array, thrusts_N: Array, rest_q: Array, errors: int
+) -> Array:
+    """What the wrench in B changes by with the errors at the step's start, shape (6, errors)."""
+    by = np.zeros((6, errors))
+    # A turn of the body turns the force that it sees by S(load_B).
+    by[1, 3], by[2, 3] = load_B[2], -load_B[1]
+    by[0, 4], by[2, 4] = -load_B[2], load_B[0]
+    by[0, 5], by[1, 5] = load_B[1], -load_B[0]
+    for j in range(3):
+        seen = _world_axis(mean[3:7], j)
+        for i in range(3):
+            by[i, FORCE + j] = seen[i]
+        by[3 + j, MOMENT + j] = 1.0
+    resting = rest_effects(own, mean, rest_q)
+    for i in range(6):
+        for j in range(3):
+            by[i, CURRENT + j] = resting[i, j]
+        for j in range(12):
+            by[i, DRAG + j] = resting[i, 3 + j]
+        for k in range(thrusts_N.shape[0]):
+            by[i, GAINS + k] = allocation[i, k] * thrusts_N[k]
+    return by
+
+
+@njit(apart=True)
 def moved(
     packed: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array, dt_s: float, errors: int
 ) -> Array:
@@ -181,8 +211,12 @@ def moved(
     Drag and inertia enter the Jacobian as they act half-way, the current as it does at the start of the step.
     """
     own = believed(packed, mean)
-    inputs = _inputs(own, allocation, mean, thrusts_N, rest_q)
-    load_B = turn(mean[3:7], mean[13:16] + at_rest(own, mean, rest_q)[:3], -1.0)
+    load_B = lacking(own, mean, rest_q)
+    by = _wrench_by_error(own, allocation, mean, load_B, thrusts_N, rest_q, errors)
+    inputs = np.empty(9)
+    assign(inputs[:6], load_B)
+    assign(inputs[6:], mean[25:28])
+    _push(inputs, allocation, mean, thrusts_N)
     before = mean.copy()
     A, B = np.empty((MOVING, MOVING)), np.empty((MOVING, 6))
     rk4_jacobian_kernel(own, mean[:13], inputs, dt_s, A, B)
@@ -190,35 +224,18 @@ def moved(
     assign(halfway[:13], 0.5 * (before[:13] + mean[:13]))
     assign(halfway[3:7], halfway[3:7] / np.sqrt(np.dot(halfway[3:7], halfway[3:7])))
     effect = _effects(own, halfway, inputs)
-    F = np.zeros((MOVING, errors))
-    for i in range(MOVING):
-        assign(F[i, :MOVING], A[i])
-    _add_current(F, A, before, dt_s)
-    driven = B @ effect
-    for i in range(MOVING):
-        assign(F[i, DRAG:GAINS], driven[i])
-    resting = B @ rest_effects(own, before, rest_q)
-    for i in range(MOVING):
-        for j in range(3):
-            F[i, CURRENT + j] += resting[i, j]
+    for i in range(6):
         for j in range(12):
-            F[i, DRAG + j] += resting[i, 3 + j]
-    by_gain = B @ allocation
+            by[i, DRAG + j] += effect[i, j]
+    F = B @ by
     for i in range(MOVING):
-        # A turn of the body turns the force that it sees by S(load_B).
-        b0, b1, b2 = B[i, 0], B[i, 1], B[i, 2]
-        F[i, 3] += b1 * load_B[2] - b2 * load_B[1]
-        F[i, 4] += b2 * load_B[0] - b0 * load_B[2]
-        F[i, 5] += b0 * load_B[1] - b1 * load_B[0]
-        row = turn(before[3:7], B[i, :3].copy(), 1.0)
-        for j in range(3):
-            F[i, FORCE + j] = row[j]
-            F[i, MOMENT + j] = B[i, 3 + j]
-        for k in range(thrusts_N.shape[0]):
-            F[i, GAINS + k] = by_gain[i, k] * thrusts_N[k]
+        for j in range(MOVING):
+            F[i, j] += A[i, j]
+    _add_current(F, A, before, dt_s)
     return F
 
 
+@njit
 def felt(
     packed: Array, allocation: Array, mean: Array, thrusts_N: Array, rest_q: Array, down_B: Array, H: Array
 ) -> Array:
@@ -226,20 +243,14 @@ def felt(
 
     dv/dt + omega x v - down_B, with gravity `down_B` in B; writes its Jacobian to H, shape (3, E).
     """
-    after = mean.copy()
-    F = moved(packed, allocation, after, np.array(thrusts_N), rest_q, _INSTANT_S, H.shape[1])
-    return np.asarray(_felt(mean, after, F, down_B, H))
-
-
-@njit
-def _felt(mean: Array, after: Array, F: Array, down_B: Array, H: Array) -> Array:
-    v, w, instant_s = mean[7:10], mean[10:13], _INSTANT_S
+    after, v, w = mean.copy(), mean[7:10], mean[10:13]
+    F = moved(packed, allocation, after, thrusts_N, rest_q, _INSTANT_S, H.shape[1])
     force = np.empty(3)
     for i in range(3):
         a, b = (i + 1) % 3, (i + 2) % 3
-        force[i] = (after[7 + i] - mean[7 + i]) / instant_s + w[a] * v[b] - w[b] * v[a] - down_B[i] + mean[22 + i]
+        force[i] = (after[7 + i] - mean[7 + i]) / _INSTANT_S + w[a] * v[b] - w[b] * v[a] - down_B[i] + mean[22 + i]
         for j in range(H.shape[1]):
-            H[i, j] = (F[6 + i, j] - (1.0 if j == 6 + i else 0.0)) / instant_s
+            H[i, j] = (F[6 + i, j] - (1.0 if j == 6 + i else 0.0)) / _INSTANT_S
         H[i, 6 + b] += w[a]
         H[i, 6 + a] -= w[b]
         H[i, 9 + a] += v[b]
@@ -248,129 +259,3 @@ def _felt(mean: Array, after: Array, F: Array, down_B: Array, H: Array) -> Array
         H[i, 3 + b] -= down_B[a]
         H[i, FELT + i] += 1.0
     return force
-
-
-def predict(
-    packed: Array,
-    allocation: Array,
-    mean: Array,
-    P: Array,
-    thrusts_N: Array,
-    rest_q: Array,
-    dt_s: float,
-    noise: Array,
-    spread: Array,
-    lasts_s: Array,
-) -> None:
-    """Advance mean and covariance in place by dt_s, some hundredths at most.
-
-    `noise`, shape (6,), are spectral densities (amplitudes) of the errors of the modelled linear and angular
-    acceleration and of the random walks of force, moment, gyro bias and accelerometer bias. What comes after the
-    accelerometer's bias is a first-order Gauss-Markov process each, of standard deviation `spread` and time `lasts_s`,
-    both of shape (E - 24,).
-    """
-    q = mean[3:7].copy()
-    # Two kernels: that of the motion is the largest of the room, and `felt` calls it as well.
-    F = moved(packed, allocation, mean, np.array(thrusts_N), rest_q, dt_s, P.shape[0])
-    _spread(mean, P, F, q, dt_s, noise, spread, lasts_s)
-
-
-@njit
-def _spread(
-    mean: Array, P: Array, F: Array, q: Array, dt_s: float, noise: Array, spread: Array, lasts_s: Array
-) -> None:
-    """Carry the covariance on by the Jacobian F, and let noise and the Markov processes at it."""
-    top = F @ P
-    block = top @ F.T
-    for i in range(MOVING):
-        for j in range(MOVING):
-            P[i, j] = 0.5 * (block[i, j] + block[j, i])
-        for j in range(MOVING, P.shape[0]):
-            P[i, j] = top[i, j]
-            P[j, i] = top[i, j]
-    _add_noise(P, q, dt_s, noise)
-    _fade(mean, P, dt_s, spread, lasts_s)
-
-
-@njit(inline="always")
-def _fade(mean: Array, P: Array, dt_s: float, spread: Array, lasts_s: Array) -> None:
-    for k in range(spread.shape[0]):
-        i, kept = CURRENT + k, np.exp(-dt_s / lasts_s[k])
-        mean[1 + i] *= kept
-        for j in range(P.shape[0]):
-            P[i, j] *= kept
-            P[j, i] *= kept
-        P[i, i] += spread[k] ** 2 * (1.0 - kept * kept)
-
-
-@njit(inline="always")
-def _add_noise(P: Array, q: Array, dt_s: float, noise: Array) -> None:
-    linear, angular = noise[0] ** 2, noise[1] ** 2
-    for i in range(3):
-        P[i, i] += linear * dt_s**3 / 3.0
-        P[6 + i, 6 + i] += linear * dt_s
-        P[3 + i, 3 + i] += angular * dt_s**3 / 3.0
-        P[9 + i, 9 + i] += angular * dt_s
-        P[3 + i, 9 + i] += angular * dt_s**2 / 2.0
-        P[9 + i, 3 + i] += angular * dt_s**2 / 2.0
-        axis = np.zeros(3)
-        axis[i] = 1.0
-        column = turn(q, axis, 1.0)  # the body's axis i, as the world sees it
-        for j in range(3):
-            P[j, 6 + i] += column[j] * linear * dt_s**2 / 2.0
-            P[6 + i, j] += column[j] * linear * dt_s**2 / 2.0
-    for block in range(4):
-        for i in range(3):
-            k = FORCE + 3 * block + i
-            P[k, k] += noise[2 + block] ** 2 * dt_s
-
-
-@njit
-def correct(mean: Array, P: Array, H: Array, residual: Array, R: Array, gate: float) -> float:
-    """Kalman update in place by a measurement with rows H (m, E), residual (m,) and covariance R (m, m).
-
-    Returns the squared Mahalanobis distance of the residual; where it exceeds `gate` nothing is changed.
-    """
-    m, errors = H.shape
-    PH = P @ H.T
-    S = H @ PH + R
-    # S = L L'; with X = PH / L', the gain's part of the covariance is X X', the change X (residual / L).
-    distance = 0.0
-    for i in range(m):
-        for j in range(i + 1):
-            total = S[i, j]
-            for k in range(j):
-                total -= S[i, k] * S[j, k]
-            S[i, j] = np.sqrt(total) if i == j else total / S[j, j]
-    whitened = np.empty(m)
-    for i in range(m):
-        total = residual[i]
-        for k in range(i):
-            total -= S[i, k] * whitened[k]
-        whitened[i] = total / S[i, i]
-        distance += whitened[i] ** 2
-    if distance > gate:
-        return distance
-    change = np.zeros(errors)
-    for r in range(errors):
-        for i in range(m):
-            total = PH[r, i]
-            for k in range(i):
-                total -= S[i, k] * PH[r, k]
-            PH[r, i] = total / S[i, i]
-            change[r] += PH[r, i] * whitened[i]
-    for i in range(errors):
-        for j in range(i + 1):
-            total = 0.5 * (P[i, j] + P[j, i])
-            for k in range(m):
-                total -= PH[i, k] * PH[j, k]
-            P[i, j] = P[j, i] = total
-    for i in range(3):
-        mean[i] += change[i]
-    assign(mean[3:7], turned_by(mean[3:7], change[3:6]))
-    for i in range(6, P.shape[0]):
-        mean[1 + i] += change[i]
-    # No vehicle has a tenth, or ten times, of the drag and inertia that it is believed to have.
-    for i in range(DRAG, GAINS):
-        mean[1 + i] = min(max(mean[1 + i], -0.9), 9.0)
-    return distance

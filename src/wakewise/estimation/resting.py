@@ -17,7 +17,7 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.compiled import assign, njit
-from wakewise.vehicles.kernels import LINEAR, QUADRATIC, coriolis, damping, rotate
+from wakewise.vehicles.kernels import LINEAR, QUADRATIC, Three, coriolis, damping, rotate
 
 DRAG = 27
 """Where the error's drag begins; inertia comes six places later."""
@@ -51,33 +51,56 @@ def at_rest(own: Array, mean: Array, rest_q: Array) -> Array:
     return wrench
 
 
+@njit(inline="always")
+def _cross(a: Three, b: Three) -> Three:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(inline="always")
+def _momentum(own: Array, v: Three) -> Three:
+    """Linear momentum at a linear velocity."""
+    return (
+        own[0, 0] * v[0] + own[0, 1] * v[1] + own[0, 2] * v[2],
+        own[1, 0] * v[0] + own[1, 1] * v[1] + own[1, 2] * v[2],
+        own[2, 0] * v[0] + own[2, 1] * v[1] + own[2, 2] * v[2],
+    )
+
+
 @njit(apart=True)
 def rest_effects(own: Array, mean: Array, rest_q: Array) -> Array:
     """By what `at_rest`, with its force in B, changes with current (3), drag (6) and inertia (6), shape (6, 15)."""
-    past, q = _past_at_rest(mean, rest_q), mean[3:7]
-    v, drag = np.array([past[0], past[1], past[2]]), damping(own, past)
-    M = np.ascontiguousarray(own[:3, :3])
-    h = M @ v
+    past = _past_at_rest(mean, rest_q)
+    v, drag = (past[0], past[1], past[2]), damping(own, past)
+    h = _momentum(own, v)
     effect = np.zeros((6, 15))
     for j in range(3):
-        axis = np.zeros(3)
-        axis[j] = -1.0
-        seen = turn(rest_q, axis, -1.0)
+        axis = (-1.0 if j == 0 else 0.0, -1.0 if j == 1 else 0.0, -1.0 if j == 2 else 0.0)
+        seen = rotate(-rest_q[0], rest_q[1], rest_q[2], rest_q[3], axis[0], axis[1], axis[2])
+        turning, turned = _cross(seen, h), _cross(v, _momentum(own, seen))
         for i in range(6):
             for k in range(3):
                 effect[i, j] += own[LINEAR + i, k] * seen[k]
-            if i < 3:
-                effect[i, j] += 2.0 * own[QUADRATIC, i] * abs(v[i]) * seen[i]
-        assign(effect[3:, j], effect[3:, j] + np.cross(seen, h) + np.cross(v, M @ seen))
+        for i in range(3):
+            effect[i, j] += 2.0 * own[QUADRATIC, i] * abs(v[i]) * seen[i]
+            effect[3 + i, j] += turning[i] + turned[i]
     for i in range(6):
         effect[i, 3 + i] = drag[i] / (1.0 + mean[1 + DRAG + i])
     for i in range(3):
         share = 0.5 / (1.0 + mean[1 + DRAG + 6 + i])
         change = np.zeros(3)
         for j in range(3):
-            change[i] += share * M[i, j] * v[j]
-            change[j] += share * M[j, i] * v[i]
-        assign(effect[3:, 9 + i], np.cross(v, change))
+            change[i] += share * own[i, j] * v[j]
+            change[j] += share * own[j, i] * v[i]
+        turning = _cross(v, (change[0], change[1], change[2]))
+        for k in range(3):
+            effect[3 + k, 9 + i] = turning[k]
     for j in range(9):
-        assign(effect[:3, j], turn(q, turn(rest_q, effect[:3, j].copy(), 1.0), -1.0))
+        _turn_as_at_rest(effect[:3, j], mean[3:7], rest_q)
     return effect
+
+
+@njit(inline="always")
+def _turn_as_at_rest(force: Array, q: Array, rest_q: Array) -> None:
+    """A force in the body at rest, in place, as the body at q sees it that has turned since."""
+    x, y, z = rotate(rest_q[0], rest_q[1], rest_q[2], rest_q[3], force[0], force[1], force[2])
+    force[0], force[1], force[2] = rotate(-q[0], q[1], q[2], q[3], x, y, z)
