@@ -90,19 +90,21 @@ class Flow:
 @njit
 def _profile(kind, numbers, own, s):  # type: ignore[no-untyped-def]
     """(U_0 per square root of newton, chi, width) of the jet in still water at a distance s from the disk."""
-    speed, _, _ = speed_and_slope(kind, numbers, own[0], own[1], own[2], s, s * s)
     if kind != ROUND_JET:
+        speed, _, _ = speed_and_slope(kind, numbers, own[0], own[1], own[2], s, s * s)
         # cos^m of the angle is a Gaussian of the radius with this width.
         power = 4.0 if kind == PRINTED_CONE else max(numbers[2], 2.0)
         return speed, 0.5, s * np.sqrt(2.0 / power)
-    b = own[1] + numbers[4] * s
+    # The middle of the jet's own kernel, which is asked here for nothing else: one root serves speed and core.
+    b, x = own[1] + numbers[4] * s, s + own[0]
     if numbers[5] == 0.0:
-        return speed, 0.5, b
-    # The core's radius, as in the jet's own kernel.
-    root = np.sqrt(max(numbers[1] / (speed * speed) + (np.pi / 8.0 - 0.5) * b * b, 0.0))
+        return numbers[0] / x, 0.5, b
+    square = x * x
+    third = np.cbrt(square * square * square + own[2])
+    root = np.sqrt(max(numbers[1] / (numbers[0] * numbers[0]) * third + (np.pi / 8.0 - 0.5) * b * b, 0.0))
     a = max(root - np.sqrt(np.pi / 8.0) * b, 0.0)
     momentum = a * a + np.sqrt(0.5 * np.pi) * a * b + 0.5 * b * b
-    return speed, momentum / (a * a + np.sqrt(np.pi) * a * b + b * b), a + b
+    return numbers[0] / np.sqrt(third), momentum / (a * a + np.sqrt(np.pi) * a * b + b * b), a + b
 
 
 @njit
@@ -120,11 +122,13 @@ def excess_speed(strength, chi, along, current2, near):  # type: ignore[no-untyp
             low = U
         else:
             high = U
-        # Newton's step, halving where it leaves the bracket.
-        after = U - over / (U * (4.0 * own * own + 6.0 * own * along + 2.0 * current2))
+        # Halley's step, halving where it leaves the bracket. It leaves the cube of the error that it takes away.
+        slope = U * (4.0 * own * own + 6.0 * own * along + 2.0 * current2)
+        bend = 12.0 * own * (own + along) + 2.0 * current2
+        after = U - 2.0 * over * slope / (2.0 * slope * slope - over * bend)
         if not low < after < high:
             after = 0.5 * (low + high)
-        if abs(after - U) <= 1e-12 * U:
+        if abs(after - U) <= 1e-9 * U:
             return after
         U = after
     return U
@@ -132,8 +136,8 @@ def excess_speed(strength, chi, along, current2, near):  # type: ignore[no-untyp
 
 @njit
 def _rates(kind, numbers, own, s, grown, root, e, current, along, current2, near, v):  # type: ignore[no-untyped-def]
-    """(ds/dt, d grown/dt, U, U_0) at one section, and dX/dt into `v`; `grown` / s is the width over still water's."""
-    unit, chi, _ = _profile(kind, numbers, own, s)
+    """(ds/dt, d grown/dt, U, U_0, width in still water) at one section, and dX/dt into `v`; `grown` / s widens it."""
+    unit, chi, width = _profile(kind, numbers, own, s)
     still = unit * root
     wider = max(grown / s, 1.0)
     U = excess_speed(chi * still * still / (wider * wider), chi, along, current2, near)
@@ -144,7 +148,7 @@ def _rates(kind, numbers, own, s, grown, root, e, current, along, current2, near
         forward += v[x] * e[x]
     cosine = min(max(forward / np.sqrt(size2), 0.0), 1.0) if size2 > 0.0 else 1.0
     rate = chi * U
-    return rate, rate * (cosine + PUFF * np.sqrt(1.0 - cosine * cosine)), U, still
+    return rate, rate * (cosine + PUFF * np.sqrt(1.0 - cosine * cosine)), U, still, width
 
 
 @njit(apart=True)
@@ -171,7 +175,7 @@ def follow(kind, parameters, own, origin, e, thrust, current, unsure, curve):  #
     s = 1e-6 if kind == ROUND_JET else 0.05
     grown, t = s, 0.0
     X, v = origin.copy(), np.empty(3)
-    ds, dg, U, still = _rates(kind, numbers, own, s, grown, root, e, current, along, current2, 1e3, v)
+    ds, dg, U, still, width = _rates(kind, numbers, own, s, grown, root, e, current, along, current2, 1e3, v)
     curve[0, :3] = X
     curve[0, 3], curve[0, 4], curve[0, 5], curve[0, 6] = 0.0, 0.0, 1.0, 1.0
     for x in range(3):
@@ -181,12 +185,11 @@ def follow(kind, parameters, own, origin, e, thrust, current, unsure, curve):  #
         dt = then - t
         # The midpoint rule; the rates at a section's end are those at the next one's beginning.
         half_s, half_grown = s + 0.5 * dt * ds, grown + 0.5 * dt * dg
-        ds, dg, U, _ = _rates(kind, numbers, own, half_s, half_grown, root, e, current, along, current2, U, v)
+        ds, dg, U, _, _ = _rates(kind, numbers, own, half_s, half_grown, root, e, current, along, current2, U, v)
         for x in range(3):
             X[x] += dt * v[x]
         s, grown, t = s + dt * ds, grown + dt * dg, then
-        ds, dg, U, still = _rates(kind, numbers, own, s, grown, root, e, current, along, current2, U, v)
-        _, _, width = _profile(kind, numbers, own, s)
+        ds, dg, U, still, width = _rates(kind, numbers, own, s, grown, root, e, current, along, current2, U, v)
         wider = max(grown / s, 1.0)
         blurred = np.sqrt(1.0 + (2.0 * unsure * t / (wider * width)) ** 2)
         curve[k, :3] = X
@@ -194,13 +197,14 @@ def follow(kind, parameters, own, origin, e, thrust, current, unsure, curve):  #
 
 
 @njit
-def fill_plume(points, ball, kind, parameters, own, curve, end, speed):  # type: ignore[no-untyped-def]
-    """Raise `speed`, shape (n,), to the plume's speed per square root of newton at points, shape (n, 3), in a ball.
+def fill_plume(points, ball, kind, parameters, own, curve, end, room, hits, speed):  # type: ignore[no-untyped-def]
+    """Raise `speed`, shape (n,), to the plume's speed per square root of newton at points, shape (3, n), in a ball.
 
-    `end`, shape (2,): how far along itself the jet is whole, and what share of it goes on from there.
+    `end`, shape (2,): how far along itself the jet is whole, and what share of it goes on from there. `room`, shape
+    (2, n), and `hits`, shape (n + 1,), are room to work in.
     """
     numbers = as_tuple(parameters)
-    count = SECTIONS
+    count, n = SECTIONS, points.shape[1]
     d, length = np.zeros((count, 3)), np.empty(count)
     for k in range(count):
         total = 0.0
@@ -211,30 +215,38 @@ def fill_plume(points, ball, kind, parameters, own, curve, end, speed):  # type:
         for x in range(3):
             d[k, x] /= length[k] + _TINY
     for k in range(count):
-        a, b = curve[k], curve[k + 1]
+        a, b, whole = curve[k], curve[k + 1], length[k]
         s, wide = b[4], max(a[6], b[6])
         reach2 = (own[3] + own[4] * s + (own[5] - 1.0) * s * s) * wide * wide
         # Most of a plume is far from all of the points.
         px, py, pz = a[0] - ball[0], a[1] - ball[1], a[2] - ball[2]
-        if px * px + py * py + pz * pz > (ball[3] + length[k] + np.sqrt(reach2)) ** 2:
+        if px * px + py * py + pz * pz > (ball[3] + whole + np.sqrt(reach2)) ** 2:
             continue
-        for j in range(points.shape[0]):
-            px, py, pz = points[j, 0] - a[0], points[j, 1] - a[1], points[j, 2] - a[2]
-            on = px * d[k, 0] + py * d[k, 1] + pz * d[k, 2]
-            if on <= 0.0:
-                continue
-            if on > length[k]:
+        # And most points are far from what is left of it: a pass without branches, in vector instructions, finds those.
+        ax, ay, az, dx, dy, dz = a[0], a[1], a[2], d[k, 0], d[k, 1], d[k, 2]
+        for j in range(n):
+            px, py, pz = points[0, j] - ax, points[1, j] - ay, points[2, j] - az
+            on = px * dx + py * dy + pz * dz
+            nearest = min(on, whole)
+            room[0, j] = on
+            room[1, j] = px * px + py * py + pz * pz - nearest * (2.0 * on - nearest)
+        reached = 0
+        for j in range(n):
+            hits[reached] = j
+            reached += (room[0, j] > 0.0) & (room[1, j] <= reach2)
+        for h in range(reached):
+            j = hits[h]
+            on, share = room[0, j], 1.0
+            if on > whole:
                 if k + 1 == count:
                     continue
                 # Between this section's end and the next one's beginning, outside of the bend.
-                px, py, pz = points[j, 0] - b[0], points[j, 1] - b[1], points[j, 2] - b[2]
+                px, py, pz = points[0, j] - b[0], points[1, j] - b[1], points[2, j] - b[2]
                 if px * d[k + 1, 0] + py * d[k + 1, 1] + pz * d[k + 1, 2] > 0.0:
                     continue
-                r2, share = px * px + py * py + pz * pz, 1.0
             else:
-                r2, share = max(px * px + py * py + pz * pz - on * on, 0.0), on / length[k]
-            if r2 > reach2:
-                continue
+                share = on / whole
+            r2 = max(room[1, j], 0.0)
             along = a[4] + share * (b[4] - a[4])
             stretch = a[6] + share * (b[6] - a[6])
             if r2 > (own[3] + own[4] * along + (own[5] - 1.0) * along * along) * stretch * stretch:
@@ -253,20 +265,23 @@ def plume_speeds(points, origins, directions, areas, kind, parameters, thrusts, 
     Jets leave along `directions`, shape (m, 3), and move the water in excess of the current along them, too. `ends`,
     shape (m, 2), as for `fill_plume`.
     """
-    m = origins.shape[0]
+    m, n = origins.shape[0], points.shape[0]
     own = own_constants(kind, parameters, areas)
-    speeds, curves = np.zeros((m, points.shape[0])), np.empty((m, SECTIONS + 1, 7))
-    ball = np.zeros(4)
+    speeds, curves = np.zeros((m, n)), np.empty((m, SECTIONS + 1, 7))
+    across, ball = np.empty((3, n)), np.zeros(4)
     for x in range(3):
-        ball[x] = np.mean(points[:, x])
-    for j in range(points.shape[0]):
+        for j in range(n):
+            across[x, j] = points[j, x]
+            ball[x] += points[j, x] / n
+    for j in range(n):
         r2 = 0.0
         for x in range(3):
             r2 += (points[j, x] - ball[x]) ** 2
         ball[3] = max(ball[3], np.sqrt(r2))
+    room, hits = np.empty((2, n)), np.empty(n + 1, np.int64)
     for i in range(m):
         follow(kind, parameters, own[i], origins[i], directions[i], thrusts[i], current, unsure, curves[i])
-        fill_plume(points, ball, kind, parameters, own[i], curves[i], ends[i], speeds[i])
+        fill_plume(across, ball, kind, parameters, own[i], curves[i], ends[i], room, hits, speeds[i])
     return speeds, curves
 
 

@@ -27,6 +27,8 @@ CHI = float(np.sqrt(0.5))
 """Momentum flux over mass flux and greatest speed, of a half Gaussian."""
 SOFT = 0.1
 """Thickness of a front over its distance where the current is known exactly: that of the layer."""
+FADED = 32.0
+"""Exponent of layer and edge together beyond which nothing is counted: less than 1.3e-14 of the speed in the layer."""
 TURNS = 3
 """Times that the direction of a ray is set right by the time that its water was on its way."""
 _TINY = 1e-12
@@ -83,6 +85,12 @@ def add_carried_walls(points, curves, directions, areas, floor, thrusts, current
                 continue
             blur = 2.0 * unsure * (before + tau)
             square = rx * rx + ry * ry + r0 * r0
+            height = max(floor[0] - points[j, 2], 0.0)
+            soft = max(blur, SOFT * away) + _TINY
+            faded = np.log(2.0) * height * height / (HALF_THICKNESS**2 * square) + (beyond / soft) ** 2
+            # Most points are above the layer, and the speed there is long to find.
+            if faded > FADED:
+                continue
             size = np.sqrt(square)
             still = strength / (square * (1.0 - (rx * dx + ry * dy) / size))
             r = np.sqrt(rx * rx + ry * ry) + _TINY
@@ -90,10 +98,6 @@ def add_carried_walls(points, curves, directions, areas, floor, thrusts, current
             if c > 0.0:
                 with_it = (rx * cx + ry * cy) / r
                 speed = excess_speed(CHI * speed * speed, CHI, with_it * (OPPOSED if with_it < 0.0 else 1.0), c2, speed)
-            height = max(floor[0] - points[j, 2], 0.0)
-            layer = np.exp(-np.log(2.0) * height * height / (HALF_THICKNESS**2 * square))
-            soft = max(blur, SOFT * away) + _TINY
-            edge = np.exp(-((beyond / soft) ** 2))
-            share = left * speed / root * layer * edge * np.sqrt(square / (square + blur * blur)) / r
+            share = left * speed / root * np.exp(-faded) * np.sqrt(square / (square + blur * blur)) / r
             velocity[i, j, 0] += share * rx
             velocity[i, j, 1] += share * ry
