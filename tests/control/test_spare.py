@@ -1,4 +1,4 @@
-"""Spare thrusts shared out anew: jets that meet, and the controllers that use them."""
+"""Spare thrusts shared out anew, and the controllers that use them."""
 
 import numpy as np
 import pytest
@@ -6,15 +6,15 @@ import pytest
 from wakewise.allocation import Weights, gentle_allocation
 from wakewise.control import ControlSettings, make_controller, vehicle_layout
 from wakewise.control.levers import LeverSettings
-from wakewise.control.spare import Respared, SpareState, joined_jets, meeting_pairs, meeting_view
+from wakewise.control.meeting import meeting_view
+from wakewise.control.spare import Respared, SpareState
 from wakewise.control.thrift import Sharer
 from wakewise.control.watch import Watch
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Command, Goal
 from wakewise.targets import Region
 from wakewise.vehicles import load_vehicle
-from wakewise.wake import RoundJet, WakeView, disturbance
-from wakewise.wake.carried import Flow
+from wakewise.wake import RoundJet, WakeView
 
 VEHICLE = load_vehicle("paper")
 LAYOUT = vehicle_layout(VEHICLE)
@@ -30,67 +30,6 @@ def watching(view, previous=1e-3):
     """What is seen through a view, in still water."""
     weights = Weights(disturbance=150.0, effort=1e-3, previous=previous)
     return Watch(view=view, levers=LeverSettings(drift=False), sharer=Sharer(layout=LAYOUT), weights=weights)
-
-
-def test_two_equal_jets_join_along_the_middle_with_the_sum_of_their_momenta():
-    """Jets at right angles in a plane: the joined one starts where both have come as far, with sqrt(2) the momentum."""
-    origins = np.array([[0.0, 0.3, 0.0], [0.0, -0.3, 0.0]])
-    axes = -np.array([[1.0, -1.0, 0.0], [1.0, 1.0, 0.0]]) / np.sqrt(2.0)
-    met = joined_jets(origins, axes, ((0, 1),))
-    assert (met.first.tolist(), met.second.tolist()) == ([0], [1])
-    np.testing.assert_allclose(met.directions, [[1.0, 0.0, 0.0]], atol=1e-12)
-    np.testing.assert_allclose(met.momentum, np.sqrt(2.0))
-    np.testing.assert_allclose(met.share, 1.0)
-    # They cross 0.3 m ahead after 0.3 sqrt(2) m each.
-    np.testing.assert_allclose(met.origins_m, [[0.3 - 0.3 * np.sqrt(2.0), 0.0, 0.0]], atol=1e-12)
-
-
-def test_jets_that_pass_part_or_face_each_other_do_not_join():
-    """Skew by many widths, parting, parallel, head-on: nothing joins; one half-width apart, half of it does."""
-    side = np.array([[0.0, 0.3, 0.0], [0.0, -0.3, 0.0]])
-    cross = -np.array([[1.0, -1.0, 0.0], [1.0, 1.0, 0.0]]) / np.sqrt(2.0)
-    width = 0.096 * 0.6 * np.sqrt(2.0)
-    near = joined_jets(side + np.array([[0, 0, width], [0, 0, 0]]), cross, ((0, 1),))
-    np.testing.assert_allclose(near.share, 0.5)
-    assert len(joined_jets(side + np.array([[0, 0, 6 * width], [0, 0, 0]]), cross, ((0, 1),)).share) == 0
-    parallel, facing = np.array([[-1.0, 0, 0], [-1.0, 0, 0]]), np.array([[0, 1.0, 0], [0, -1.0, 0]])
-    for axes in (parallel, facing):
-        assert len(joined_jets(side, axes, ((0, 1),)).share) == 0
-
-
-def test_pairs_are_those_that_share_spare_thrusts():
-    """Horizontals among themselves and verticals among themselves, so that the search stays exact in lines."""
-    pairs = meeting_pairs(LAYOUT)
-    assert set(pairs) == {(i, j) for group in (range(4), range(4, 8)) for i in group for j in group if i < j}
-
-
-def test_the_gram_matrix_of_meeting_jets_is_the_single_jets_and_one_product_per_pair():
-    """D grows by w |U|^2 sqrt(T_a T_b) momentum for the two forward jets, and by nothing if one of them is off."""
-    plain = WakeView.of(VEHICLE, AHEAD, RoundJet())
-    view, X_WB = meeting_view(plain, LAYOUT), Pose(np.zeros(3))
-    more = view.gram(X_WB) - plain.gram(X_WB)
-    np.testing.assert_allclose(more, more.T)
-    assert more.min() >= 0.0 and np.all(np.diag(more) == 0.0)
-    met = joined_jets(VEHICLE.thruster_positions_B_m, VEHICLE.thruster_axes_B, ((0, 1),))
-    k = np.flatnonzero((met.first == 0) & (met.second == 1))[0]
-    area = VEHICLE.disk_areas_m2[:1]
-    speed = RoundJet().unit_velocity(AHEAD.points_W_m, met.origins_m[k : k + 1], met.directions[k : k + 1], area)[0]
-    D = met.momentum[k] * met.share[k] * float(AHEAD.weights @ np.sum(speed**2, axis=1))
-    assert D > 1e-4 and 2.0 * more[0, 1] == pytest.approx(D, rel=1e-9)
-
-
-def test_knowing_that_jets_meet_moves_the_push_to_the_rear():
-    """To hold 0.3 N astern both forward jets are the least thrusts; their joined jet would hit what is looked at."""
-    wrench = np.array([-0.3, 0.0, 0.0, 0.0, 0.0, 0.0])
-    wrench[4] = 0.05 * wrench[0]
-    weights = Weights(disturbance=150.0, effort=1e-3)
-    plain = WakeView.of(VEHICLE, AHEAD, RoundJet())
-    X_WB = Pose(np.zeros(3))
-    blind = gentle_allocation(LAYOUT, wrench, plain.gram(X_WB), weights).thrusts_N
-    found = gentle_allocation(LAYOUT, wrench, meeting_view(plain, LAYOUT).gram(X_WB), weights)
-    assert min(blind[0], blind[1]) > 0.05
-    assert max(found.thrusts_N[0], found.thrusts_N[1]) < 1e-3 and found.method == "lines"
-    np.testing.assert_allclose(found.wrench_B, wrench, atol=1e-9)
 
 
 class Asks:
@@ -152,50 +91,6 @@ def test_shares_leave_a_poor_minimum_within_two_seconds():
         shares.append(float(np.abs(command.thrusts_N - best.thrusts_N).max()))
     assert np.abs(poor - best.thrusts_N).max() > 0.2
     assert shares[40] > 0.1 and shares[-1] < 0.05
-
-
-def test_what_two_jets_become_turns_to_the_stronger_and_the_two_end_there():
-    """In a flow the joined jet of unequal thrusts leaves the bisector; squarely met, the single ones do not go on."""
-    origins = np.array([[0.0, 0.3, 0.0], [0.0, -0.3, 0.0]])
-    axes = -np.array([[1.0, -1.0, 0.0], [1.0, 1.0, 0.0]]) / np.sqrt(2.0)
-    met = joined_jets(origins, axes, ((0, 1),), np.array([3.0, 1.0, 1e-9, 1e-9]))
-    np.testing.assert_allclose(met.momentum * met.strength_N, np.sqrt(10.0))
-    np.testing.assert_allclose(met.directions[0], np.array([4.0, -2.0, 0.0]) / np.sqrt(20.0), atol=1e-12)
-    np.testing.assert_allclose(met.ways_m, [[0.3 * np.sqrt(2.0)] * 2])
-    ahead = meeting_view(WakeView.of(VEHICLE, AHEAD, RoundJet()), LAYOUT)
-    slow = np.array([1e-9, 0.0, 0.0])
-    pair = {}
-    for thrusts in ((1.0, 1.0), (1.0, 0.0), (0.0, 1.0)):
-        T = np.array([*thrusts, 0, 0, 0, 0, 0, 0])
-        G = ahead.gram(Pose(np.zeros(3)), Flow(current_W_m_s=slow, unsure_m_s=0.0, thrusts_N=T))
-        pair[thrusts] = disturbance(G, T)
-    assert pair[1.0, 1.0] > 20.0 * max(pair[1.0, 0.0], pair[0.0, 1.0]), "only both together blow ahead"
-
-
-def test_a_bow_jet_is_charged_for_the_one_it_would_meet():
-    """In a flow, of a pair that rests, each costs half of what the two would become; without the lever nothing."""
-    plain = WakeView.of(VEHICLE, AHEAD, RoundJet())
-    flow = Flow(
-        current_W_m_s=np.array([0.0, 1e-9, 0.0]), unsure_m_s=0.0, thrusts_N=np.array([0, 0, -1.0, -1, 0, 0, 0, 0])
-    )
-    more = meeting_view(plain, LAYOUT).gram(Pose(np.zeros(3)), flow) - plain.gram(Pose(np.zeros(3)), flow)
-    charge = np.diag(more)
-    assert charge[0] == pytest.approx(charge[1], rel=1e-6) and charge[0] > 1e-3
-    both = meeting_view(plain, LAYOUT).gram(Pose(np.zeros(3)))
-    assert charge[0] == pytest.approx(both[0, 1], rel=0.02)
-
-
-def test_as_sent_a_pair_that_rests_leaves_nothing_and_both_leave_what_they_become():
-    """The matrix that the bound on power asks: one bow jet alone is not charged, both are as much as by `gram`."""
-    flow = Flow(
-        current_W_m_s=np.array([0.0, 1e-9, 0.0]), unsure_m_s=0.0, thrusts_N=np.array([0, 0, -1.0, -1, 0, 0, 0, 0])
-    )
-    plain = WakeView.of(VEHICLE, AHEAD, RoundJet())
-    seen = meeting_view(plain, LAYOUT).seen(Pose(np.zeros(3)), flow)
-    one, both = np.array([1.0, 0, 0, 0, 0, 0, 0, 0]), np.array([1.0, 1, 0, 0, 0, 0, 0, 0])
-    alone = disturbance(plain.gram(Pose(np.zeros(3)), flow), one)
-    assert disturbance(seen.sent, one) == pytest.approx(alone) and disturbance(seen.gram, one) > 2.0 * alone
-    assert disturbance(seen.sent, both) == pytest.approx(disturbance(seen.gram, both))
 
 
 @pytest.mark.parametrize("method", ["instant", "wake-aware"])

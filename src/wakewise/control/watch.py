@@ -9,6 +9,7 @@ flown for longer that its own matrix calls worse than the least thrusts.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -69,10 +70,10 @@ class Watch:
         The current is the one stated in the levers, else the estimate's; before that is known there is none.
         """
         current, found = self._believed(estimate)
-        if current is None or not self.levers.drift or not current.any():
+        if current is None:
             return None
-        variance = 0.0 if found is None else float(np.trace(found)) / 3.0
-        unsure_m_s = float(np.sqrt(variance + UNSURE**2 * float(current @ current)))
+        variance = 0.0 if found is None else float(found.trace()) / 3.0
+        unsure_m_s = math.sqrt(variance + UNSURE**2 * float(current @ current))
         return Flow(current_W_m_s=current, unsure_m_s=unsure_m_s, thrusts_N=thrusts_N)
 
     def cost(self, thrusts_N: Array, gram: Array, previous_N: Array | None = None) -> float:
@@ -101,7 +102,7 @@ class Watch:
         if not np.isfinite(before.gram).all():
             return None
         found = self.follow(wrench_B, before, previous_N)
-        if self.flow(estimate, previous_N) is None:
+        if self._believed(estimate)[0] is None:
             return found, before
         after = self.seen(estimate, found.thrusts_N)
         if self.allowed(moved):
@@ -147,7 +148,7 @@ class Watch:
             return None
         free = replace(self.weights, previous=0.0)
         found = self.sharer.shares(wrench_B, there, free, self.view.total_weight)
-        own = there if self.flow(estimate, present_N) is None else self.seen(estimate, found.thrusts_N)
+        own = there if self._believed(estimate)[0] is None else self.seen(estimate, found.thrusts_N)
         best, seen = min(((least, there), (found, own)), key=lambda pair: self.cost(pair[0].thrusts_N, pair[1].gram))
         if best.scale < FULL or not self.cost(best.thrusts_N, seen.gram) < (1.0 - WORTH) * self.cost(
             present_N, first.gram
@@ -156,7 +157,9 @@ class Watch:
         return replace(best, disturbance=disturbance_of(seen.gram, best.thrusts_N)), seen
 
     def _believed(self, estimate: BodyState) -> tuple[Array | None, Array | None]:
-        """The current, shape (3,), and its covariance, shape (3, 3), None each where nothing is known or sure."""
-        if self.levers.drift_m_s is not None:
-            return np.array(self.levers.drift_m_s, dtype=np.float64), None
-        return estimate.current_W_m_s, estimate.current_covariance
+        """The current, shape (3,), and its covariance, shape (3, 3); None each where it does not count or is sure."""
+        stated, found = self.levers.drift_m_s, estimate.current_covariance
+        current = estimate.current_W_m_s if stated is None else np.array(stated, dtype=np.float64)
+        if current is None or not self.levers.drift or not current.any():
+            return None, None
+        return current, found if stated is None else None

@@ -81,10 +81,20 @@ class Flow:
     @property
     def guessed(self) -> Array:
         """Size of both thrusts of each thruster, shape (2 m,), in N: as they are, but none far below the mean."""
-        size = np.abs(self.thrusts_N)
-        least = max(GUESS_SHARE * float(np.mean(size)), LEAST_GUESS_N)
-        ahead = np.where(self.thrusts_N > 0.0, size, 0.0)
-        return np.maximum(np.concatenate([ahead, size - ahead]), least)
+        return cast(Array, guesses(self.thrusts_N))
+
+
+@njit
+def guesses(thrusts: Array) -> Array:
+    """`Flow.guessed` of thrusts, shape (m,)."""
+    m = thrusts.size
+    mean = 0.0
+    for i in range(m):
+        mean += abs(thrusts[i]) / m
+    least, sizes = max(GUESS_SHARE * mean, LEAST_GUESS_N), np.empty(2 * m)
+    for i in range(m):
+        sizes[i], sizes[m + i] = max(thrusts[i], least), max(-thrusts[i], least)
+    return sizes
 
 
 @njit

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wakewise.arrays import Array
+from wakewise.compiled import njit
 from wakewise.errors import InputError
 from wakewise.interfaces import WakeModel
 from wakewise.wake.beds import free_jet
@@ -25,7 +26,7 @@ from wakewise.wake.floor_carried import add_carried_walls
 from wakewise.wake.floor_sums import floor_gram_sum
 from wakewise.wake.gradients import Superposition
 from wakewise.wake.jets import AxialJet
-from wakewise.wake.sums import gram_sum
+from wakewise.wake.sums import FAST, dot, gram_sum
 
 _ORIGIN, _LEVEL = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -92,10 +93,38 @@ def gram(
     return incoherent(G) if superposition == "incoherent" else G
 
 
-def velocity_gram(velocity: Array, weights: Array) -> Array:
+@njit(fastmath=FAST)
+def velocity_gram(velocity, weights):  # type: ignore[no-untyped-def]
     """G, shape (k, k), of velocities per square root of newton, shape (k, n, 3), at points of weights, shape (n,)."""
-    rows = (velocity * np.sqrt(weights)[:, None]).reshape(len(velocity), -1)
-    return np.asarray(rows @ rows.T)
+    k, n = velocity.shape[0], velocity.shape[1]
+    G, rows, here = np.zeros((k, k)), np.empty((k, 3 * n)), np.empty(k, np.bool_)
+    for i in range(k):
+        largest = 0.0
+        for j in range(n):
+            root = np.sqrt(weights[j])
+            for x in range(3):
+                rows[i, 3 * j + x] = root * velocity[i, j, x]
+                largest += abs(velocity[i, j, x])
+        # Most jets miss; what is not finite must show.
+        here[i] = largest != 0.0
+    for i in range(k):
+        for c in range(i + 1):
+            if here[i] and here[c]:
+                G[i, c] = dot(rows[i], rows[c], 3 * n)
+                G[c, i] = G[i, c]
+    return G
+
+
+@njit
+def _along(speeds, directions):  # type: ignore[no-untyped-def]
+    """Velocities, shape (m, n, 3), of speeds, shape (m, n), along directions, shape (m, 3)."""
+    m, n = speeds.shape
+    velocity = np.empty((m, n, 3))
+    for i in range(m):
+        for j in range(n):
+            for x in range(3):
+                velocity[i, j, x] = speeds[i, j] * directions[i, x]
+    return velocity
 
 
 def carried_velocity(
@@ -119,10 +148,11 @@ def carried_velocity(
         raise InputError(f"wake model {model.name}: brings no law of a jet that a current could carry")
     if ends is None:
         ends = np.tile([np.inf, 1.0], (len(origins_W_m), 1))
+    directions_W = np.ascontiguousarray(directions_W)
     speeds, curves = plumes(points_W_m, origins_W_m, directions_W, areas_m2, jet.law, thrusts_N, flow, ends)
-    velocity = speeds[:, :, None] * directions_W[:, None, :]
+    velocity = _along(speeds, directions_W)
     if isinstance(model, FloorJet):
-        walls = (np.ascontiguousarray(directions_W), areas_m2, model.numbers, thrusts_N)
+        walls = (directions_W, areas_m2, model.numbers, thrusts_N)
         add_carried_walls(points_W_m, curves, *walls, flow.current_W_m_s, flow.unsure_m_s, ends, velocity)
     return np.asarray(velocity)
 

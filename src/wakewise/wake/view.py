@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
@@ -71,9 +71,13 @@ class WakeView:
 
     def gram(self, X_WB: Pose, flow: Flow | None = None) -> Array:
         """Matrix G of D = s' G s, shape (2 n, 2 n), with the jets where a pose puts them and a flow carries them."""
-        origins_W, axes_W = _placed(X_WB.p_m, X_WB.q, self.positions_B_m, self.axes_B)
+        origins_W, axes_W = self.places(X_WB)
         place = (self.points_W_m, self.weights, origins_W, axes_W, self.areas_m2)
         return gram(self.wake, *place, superposition=self.superposition, flow=flow)
+
+    def places(self, X_WB: Pose) -> tuple[Array, Array]:
+        """Thruster origins and force axes in the world, shape (m, 3) each, of the body at a pose."""
+        return cast("tuple[Array, Array]", _placed(X_WB.p_m, X_WB.q, self.positions_B_m, self.axes_B))
 
     def seen(self, X_WB: Pose, flow: Flow | None = None) -> Seen:
         """Matrices of D: what to choose shares by, and what thrusts do as sent."""
