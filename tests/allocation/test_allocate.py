@@ -15,7 +15,6 @@ from wakewise.allocation import (
     least_thrusts,
     pseudo_inverse,
 )
-from wakewise.allocation.allocate import _reach
 from wakewise.allocation.search import cost
 from wakewise.control import vehicle_layout
 from wakewise.errors import InputError
@@ -232,23 +231,3 @@ def test_bad_input_is_refused_in_one_line(change, words):
     with pytest.raises(InputError, match=words) as caught:
         pseudo_inverse(**arguments)
     assert "\n" not in str(caught.value)
-
-
-def test_a_step_reaches_to_the_first_limit_on_either_side():
-    """From any point, along any direction: nothing beyond a limit, upper or lower, and one of them just met."""
-    rng = np.random.default_rng(11)
-    met = {"lower": 0, "upper": 0}
-    for _ in range(200):
-        start = rng.uniform(0.9 * LAYOUT.lower_N, 0.9 * LAYOUT.upper_N)
-        step = LAYOUT.null @ rng.normal(size=LAYOUT.null.shape[1])
-        end = start + _reach(LAYOUT, start, step, np.inf) * step
-        assert np.all(end >= LAYOUT.lower_N - 1e-9)
-        assert np.all(end <= LAYOUT.upper_N + 1e-9)
-        low, high = np.isclose(end, LAYOUT.lower_N), np.isclose(end, LAYOUT.upper_N)
-        assert np.any(low | high)
-        met["lower"] += bool(np.any(low))
-        met["upper"] += bool(np.any(high))
-        assert _reach(LAYOUT, start, 1e-6 * step, 1.0) == 1.0
-    assert min(met.values()) > 20
-    outside = LAYOUT.lower_N - 1.0
-    assert _reach(LAYOUT, outside, -np.ones(8), 1.0) == 0.0

@@ -93,3 +93,14 @@ def test_the_parts_of_the_null_space_are_gone_along_as_is_worth_most():
     bound = within_power(LAYOUT, found, least.thrusts_N, LAW, most_W, G, WEIGHTS)
     assert float(LAW.power_W(found.thrusts_N)) > most_W > 0.97 * float(LAW.power_W(bound.thrusts_N)) / 1.0
     assert bound.disturbance < 0.6 * least.disturbance
+
+
+def test_the_power_of_many_is_the_sum_over_each_ones_thrusters():
+    """Of thrusts of any shape, either way, below the least thrust and above: the law thruster by thruster."""
+    T = RNG.normal(size=(3, 5, 8))
+    each = np.empty_like(T)
+    for place, thrust in np.ndenumerate(T):
+        factor, least = (30.0, 0.4) if thrust >= 0.0 else (43.0, 0.36)
+        each[place] = factor * abs(thrust) * np.sqrt(max(abs(thrust), least))
+    np.testing.assert_allclose(LAW.power_W(T), each.sum(axis=-1), rtol=1e-12)
+    assert LAW.power_W(T[0, 0]).shape == ()

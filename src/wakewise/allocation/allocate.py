@@ -8,6 +8,7 @@ of a wrench that the limits do not allow (`reach`), so that they can be compared
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from wakewise.allocation.convex import convex_allocation, is_incoherent
 from wakewise.allocation.layout import Layout, compile_layout
 from wakewise.allocation.reach import AXES, by_priority, is_all, parse_priority, within_limits
 from wakewise.allocation.search import cost, disjoint_search, split_allocation
+from wakewise.allocation.starts import feasible_starts, start_directions, starts_at_rest, tied_parts
 from wakewise.arrays import Array, freeze, frozen
 from wakewise.errors import InputError
 
@@ -37,8 +39,7 @@ COUPLING_LIMIT = 1e-10
 BUDGET = 2000
 """Most boxes that branch and bound looks at unless told otherwise: a few milliseconds with two spare thrusters."""
 
-_STARTS = (0, 0, 6, 12, 24, 32)
-_RESTS, _RESTS_KEPT = 400, 8
+_DISTURBANCE = np.array([1.0, 0.0, 0.0])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,7 +101,7 @@ class Weights:
             if not (np.isfinite(value) and value >= 0.0):
                 raise InputError(f"weight {name}: {value:g}, must be finite and not negative")
 
-    @property
+    @cached_property
     def packed(self) -> Array:
         """(w_D, w_u, w_p), shape (3,)."""
         return np.array([self.disturbance, self.effort, self.previous], dtype=np.float64)
@@ -163,7 +164,8 @@ def _start(layout: Layout, requested: Array, priority: str | None) -> tuple[Arra
 
 def disturbance_of(gram: Array, thrusts_N: Array) -> float:
     """D = s' G s in (m/s)^2 with s_i = sqrt|T_i| in the slot of the jet that is on; G has shape (2 n, 2 n)."""
-    return float(cost(gram, np.array(thrusts_N), np.array(thrusts_N), np.array([1.0, 0.0, 0.0])))
+    thrusts = np.array(thrusts_N)
+    return float(cost(gram, thrusts, thrusts, _DISTURBANCE))
 
 
 def gentle_allocation(
@@ -229,7 +231,7 @@ def gentle_allocation(
         thrusts_N=thrusts,
         wrench_B=layout.B @ thrusts,
         requested_B=requested,
-        disturbance=cost(G, thrusts, previous, np.array([1.0, 0.0, 0.0])),
+        disturbance=cost(G, thrusts, previous, _DISTURBANCE),
         method=method,
         gap=gap / value if value > 0.0 else 0.0,
         scale=scale,
@@ -251,19 +253,19 @@ def _search(
         exact = found is not None and is_all(layout, found[0], layout.B @ start)
         if found is not None and exact and found[1] <= CLOSED * cost(G, found[0], previous, packed):
             return found[0], "convex", found[1]
-    spare = np.any(np.abs(layout.null) > 1e-12, axis=1)
+    spare = layout.owners.any(axis=0)
     thrusts, gap = start.copy(), 0.0
     for group in groups:
-        own = np.any(np.abs(group) > 1e-12, axis=1)
+        own = (np.abs(group) > 1e-12).any(axis=1)
         # Thrusters of other groups neither move nor count; those that never move count.
         here = own | ~spare
         base, before = np.where(here, start, 0.0), np.where(here, previous, 0.0)
         if group.shape[1] == 1:
             result, part = disjoint_search(G, base, group.T.copy(), lower, upper, before, packed)
         else:
-            starts = _feasible_starts(layout, base, before, group)
+            starts = feasible_starts(base, before, group, start_directions(group.shape[1]), lower, upper)
             if group.shape[1] > 2:
-                starts = np.vstack([starts, _at_rest(layout, base, before, group, G, packed)])
+                starts = np.vstack([starts, starts_at_rest(base, before, group, G, packed, lower, upper)])
             result, part, _ = box_search(G, starts, group, lower, upper, before, packed, budget)
         if cost(G, result, before, packed) <= cost(G, base, before, packed):
             thrusts[own] = result[own]
@@ -273,51 +275,13 @@ def _search(
 
 def _coupled_groups(layout: Layout, G: Array) -> list[Array]:
     """Parts of the null space, those joined that share a Gram entry; orthonormal bases, shape (n, k_g) each."""
-    strength = np.abs(G).reshape(2, layout.B.shape[1], 2, -1).max(axis=(0, 2))
-    owner = [np.any(np.abs(block) > 1e-12, axis=1) for block in layout.blocks]
-    limit = COUPLING_LIMIT * float(strength.max(initial=0.0))
+    tied = tied_parts(G, layout.owners, COUPLING_LIMIT)
     groups: list[list[int]] = []
-    for new in range(len(owner)):
+    for new in range(len(tied)):
         joined = [new]
         for group in groups.copy():
-            if any(strength[np.ix_(owner[new], owner[old])].max() > limit for old in group):
+            if any(tied[new, old] for old in group):
                 groups.remove(group)
                 joined = [*group, *joined]
         groups.append(joined)
     return [np.ascontiguousarray(np.hstack([layout.blocks[b] for b in group])) for group in groups]
-
-
-def _feasible_starts(layout: Layout, start: Array, previous: Array, Z: Array) -> Array:
-    """The least thrusts, the previous ones brought to this wrench, and points along fixed random directions."""
-    k = Z.shape[1]
-    toward = Z @ (Z.T @ (previous - start))
-    # A fixed stream: the same wrench gives the same thrusts.
-    directions = np.random.default_rng(0).normal(size=(_STARTS[min(k, len(_STARTS) - 1)], k))
-    starts = [start, start + _reach(layout, start, toward, 1.0) * toward]
-    for number, direction in enumerate(directions):
-        step = Z @ (direction / np.linalg.norm(direction))
-        share = ((number + 1) / len(directions)) ** 2
-        starts.append(start + share * _reach(layout, start, step, np.inf) * step)
-    return np.clip(np.array(starts), layout.lower_N, layout.upper_N)
-
-
-def _at_rest(layout: Layout, start: Array, previous: Array, Z: Array, G: Array, packed: Array) -> Array:
-    """The cheapest of many points where as many thrusters rest as the null space has dimensions: minima like these."""
-    k = Z.shape[1]
-    moving = np.flatnonzero(np.any(np.abs(Z) > 1e-12, axis=1))
-    rng = np.random.default_rng(0)
-    sets = np.array([rng.permutation(moving)[:k] for _ in range(_RESTS)])
-    sets = sets[np.abs(np.linalg.det(Z[sets])) > 1e-3 / 2.0**k]
-    shifts = np.linalg.solve(Z[sets], start[sets][:, :, None])[:, :, 0]
-    T = start - shifts @ Z.T
-    np.put_along_axis(T, sets, 0.0, axis=1)
-    T = T[np.all((layout.lower_N <= T) & (layout.upper_N >= T), axis=1)]
-    values = np.array([cost(G, row, previous, packed) for row in T])
-    return np.ascontiguousarray(T[np.argsort(values, kind="stable")[:_RESTS_KEPT]])
-
-
-def _reach(layout: Layout, start: Array, step: Array, most: float) -> float:
-    """Largest t <= most that keeps start + t step within limits."""
-    moving = np.abs(step) > 1e-12
-    room = np.where(step > 0.0, layout.upper_N, layout.lower_N) - start
-    return max(float(np.min(room[moving] / step[moving], initial=most)), 0.0)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from wakewise.arrays import Array, freeze, frozen
+from wakewise.arrays import Array, BoolArray, freeze, frozen
 from wakewise.errors import InputError
 
 MOST_SPARE = 8
@@ -40,6 +41,11 @@ class Layout:
     def k(self) -> int:
         """Dimension of the null space."""
         return int(self.null.shape[1])
+
+    @cached_property
+    def owners(self) -> BoolArray:
+        """Thrusters of each of the blocks, shape (b, n)."""
+        return np.array([np.any(np.abs(block) > 1e-12, axis=1) for block in self.blocks]).reshape(-1, self.B.shape[1])
 
     @property
     def rank(self) -> int:

@@ -26,6 +26,7 @@ from wakewise.allocation.allocate import Allocation, Weights, disturbance_of
 from wakewise.allocation.layout import Layout
 from wakewise.allocation.search import cost
 from wakewise.arrays import Array, freeze
+from wakewise.compiled import njit
 
 _SHARES = np.linspace(0.0, 1.0, 33)
 _MOST_ORDERED = 3
@@ -49,11 +50,31 @@ class PowerLaw:
 
     def power_W(self, thrusts_N: Array) -> Array:
         """Sum over thrusters, shape (...), for thrusts of shape (..., n)."""
-        T = np.asarray(thrusts_N, dtype=np.float64)
-        size, ahead = np.abs(T), T >= 0.0
-        least = np.where(ahead, self.least_forward_N, self.least_reverse_N)
-        each = np.where(ahead, self.forward, self.reverse) * size * np.sqrt(np.maximum(size, least))
-        return np.asarray(each.sum(axis=-1))
+        T = np.array(thrusts_N, dtype=np.float64)
+        rows = T.reshape(-1, T.shape[-1])
+        power = _power_of(rows, self.forward, self.reverse, self.least_forward_N, self.least_reverse_N)
+        return np.asarray(power.reshape(T.shape[:-1]))
+
+
+@njit
+def _power_of(rows, forward, reverse, least_forward, least_reverse):  # type: ignore[no-untyped-def]
+    """`PowerLaw.power_W` of rows of thrusts, shape (r, n)."""
+    power = np.zeros(rows.shape[0])
+    for r in range(rows.shape[0]):
+        for i in range(rows.shape[1]):
+            T = rows[r, i]
+            each, least = (forward[i], least_forward) if T >= 0.0 else (reverse[i], least_reverse)
+            power[r] += each * abs(T) * np.sqrt(max(abs(T), least))
+    return power
+
+
+@njit
+def _costs_of(rows, G, previous, weights):  # type: ignore[no-untyped-def]
+    """`cost` of rows of thrusts, shape (r, n)."""
+    costs = np.empty(rows.shape[0])
+    for r in range(rows.shape[0]):
+        costs[r] = cost(G, rows[r], previous, weights)
+    return costs
 
 
 def within_power(
@@ -90,8 +111,7 @@ def within_power(
         return found
     G, packed = np.array(gram), weights.packed
     previous = np.zeros(len(least_N)) if previous_N is None else np.array(previous_N)
-    owners = [np.any(np.abs(block) > 1e-12, axis=1) for block in layout.blocks]
-    ways = [np.where(own, found.thrusts_N - least_N, 0.0) for own in owners]
+    ways = [np.where(own, found.thrusts_N - least_N, 0.0) for own in layout.owners]
     orders = permutations(ways) if len(ways) <= _MOST_ORDERED else (tuple(ways),)
     best = np.array(least_N)
     value = float(cost(G, best, previous, packed))
@@ -99,9 +119,10 @@ def within_power(
         thrusts, spent = np.array(least_N), value
         for way in order:
             tried = thrusts + _SHARES[:, None] * way
-            tried = tried[: max(int(np.sum(law.power_W(tried) <= most_W)), 1)]
-            costs = [float(cost(G, row, previous, packed)) for row in tried]
-            thrusts, spent = tried[int(np.argmin(costs))], min(costs)
+            tried = tried[: max(int(np.count_nonzero(law.power_W(tried) <= most_W)), 1)]
+            costs = _costs_of(tried, G, previous, packed)
+            least = int(costs.argmin())
+            thrusts, spent = tried[least], float(costs[least])
         if spent < value:
             best, value = thrusts, spent
     return replace(found, thrusts_N=best, wrench_B=layout.B @ best, disturbance=disturbance_of(G, best))

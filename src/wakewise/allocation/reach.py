@@ -5,6 +5,8 @@ Solvers are imported where they are needed: layouts whose null space is lines ne
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from wakewise.allocation.layout import Layout, axis_scaling
@@ -21,7 +23,7 @@ _EXACT = 1e-10
 def within_limits(layout: Layout, thrusts: Array) -> tuple[Array, float]:
     """Least-norm thrusts within limits that make the largest possible share of the same wrench, and that share."""
     lower, upper = layout.lower_N, layout.upper_N
-    if np.all(thrusts >= lower) and np.all(thrusts <= upper):
+    if ((thrusts >= lower) & (thrusts <= upper)).all():
         return thrusts, 1.0
     if len(layout.lines) != layout.k:
         result, scale = _within_polytope(layout, thrusts)
@@ -103,7 +105,7 @@ def by_priority(layout: Layout, wrench_B: Array, groups: tuple[tuple[int, ...], 
 def is_all(layout: Layout, thrusts: Array, wrench_B: Array) -> bool:
     """Whether thrusts make a wrench but for rounding."""
     missing = layout.B @ thrusts - wrench_B
-    return bool(np.linalg.norm(missing) <= _EXACT * (1.0 + np.linalg.norm(wrench_B)))
+    return math.sqrt(missing @ missing) <= _EXACT * (1.0 + math.sqrt(wrench_B @ wrench_B))
 
 
 def _line_scale(thrusts: Array, line: Array, lower: Array, upper: Array) -> float:

@@ -8,11 +8,12 @@ Start reading in `methods.py` (which methods there are; `dynamic_positioning.py`
 model predictive control and the exact allocator behind it) and `instant.py` (the tracker and the gentlest thrusts of an
 instant). `tracker.py` and `stability.py` are the PID and its margins, `loop.py` flies it with any allocation,
 `receding.py` flies a plan, `levers.py` adds the water that counts, `watch.py` follows it where the current carries it,
-`meeting.py` says what jets that meet become, `spare.py` shares a plan's wrench out anew, `thrift.py` says how much power that may cost, `posture.py` and `poised.py`
-choose the body's attitude, `pulses.py` sends thrusts that no thruster can hold as pulses, `safeguard.py` sees to it
-that something that can be flown is sent in time, `intent.py` turns an operator's stick into goals, `firmness.py` keeps
-a plan from putting them off, `easing.py` moves what must not jump, `switching.py` changes the method in flight with
-what `carried.py` hands over, `trim.py` advises ballast for a mission, `hover_trim.py` from a hover.
+`meeting.py` says what jets that meet become, `spare.py` shares a plan's wrench out anew, `thrift.py` says how much
+power that may cost, `posture.py` and `poised.py` choose the body's attitude, `pulses.py` sends thrusts that no thruster
+can hold as pulses, `safeguard.py` sees to it that something that can be flown is sent in time, `intent.py` turns an
+operator's stick into goals, `firmness.py` keeps a plan from putting them off, `easing.py` moves what must not jump,
+`switching.py` changes the method in flight with what `carried.py` hands over, `trim.py` advises ballast for a mission,
+`hover_trim.py` from a hover.
 """
 
 from wakewise.control.levers import LeverSettings

@@ -11,6 +11,7 @@ pulses, the lag of rotors, corrections between two searches.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,10 +22,11 @@ from wakewise.allocation import (
     PowerLaw,
     Weights,
     compile_layout,
+    disturbance_of,
     gentle_allocation,
-    least_thrusts,
     within_power,
 )
+from wakewise.allocation.reach import within_limits
 from wakewise.arrays import Array
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
 from wakewise.thrusters import electrical_power_W
@@ -45,7 +47,8 @@ none of it comes straight, a half and less)."""
 
 def allowed(speed_m_s: float) -> float:
     """Most power over that of the least thrusts, if these leave a mean speed at the target."""
-    return float(np.interp(speed_m_s, (CALM_M_S, TROUBLE_M_S), (CALM, TROUBLE)))
+    share = min(max((speed_m_s - CALM_M_S) / (TROUBLE_M_S - CALM_M_S), 0.0), 1.0)
+    return CALM + share * (TROUBLE - CALM)
 
 
 def power_law(vehicle: Vehicle) -> PowerLaw:
@@ -77,10 +80,10 @@ class Sharer:
         found = gentle_allocation(self.layout, wrench_B, seen.gram, weights, previous_N)
         if self.law is None:
             return found
-        least = least_thrusts(self.layout, wrench_B, seen.sent)
-        speed_m_s = float(np.sqrt(max(least.disturbance or 0.0, 0.0) / total_weight)) / TOO_FAST
-        most_W = allowed(speed_m_s) * float(self.law.power_W(least.thrusts_N))
-        return within_power(self.layout, found, least.thrusts_N, self.law, most_W, seen.gram, weights, previous_N)
+        least_N, _ = within_limits(self.layout, self.layout.inverse @ wrench_B)
+        speed_m_s = math.sqrt(max(disturbance_of(seen.sent, least_N), 0.0) / total_weight) / TOO_FAST
+        most_W = allowed(speed_m_s) * float(self.law.power_W(least_N))
+        return within_power(self.layout, found, least_N, self.law, most_W, seen.gram, weights, previous_N)
 
 
 def sharer_of(vehicle: Vehicle, settings: ControlSettings) -> Sharer:
