@@ -10,6 +10,7 @@ from wakewise.thrusters import ThrustSteps, library_curve
 
 T200 = library_curve("t200")
 AT_16_V = ThrustSteps.of_curve(T200, 16.0)
+AT_16_V.delivered_N(0.0)  # compiled before a test is timed
 
 
 @pytest.mark.parametrize(("volts", "forward", "reverse"), [(10.0, 0.40, 0.31), (14.0, 0.44, 0.31), (16.0, 0.40, 0.36)])
@@ -50,6 +51,22 @@ def test_a_step_that_is_given_is_given_again() -> None:
     wishes = np.linspace(-60.0, 60.0, 4001)
     once = AT_16_V.delivered_N(wishes)
     assert np.array_equal(AT_16_V.delivered_N(once), once)
+
+
+ONE_WAY = ThrustSteps(least_forward_N=0.4, least_reverse_N=0.3, levels_N=np.array([0.4, 0.9, 1.7]))
+LEVELS = (AT_16_V, ONE_WAY, ThrustSteps(least_forward_N=0.4, least_reverse_N=0.3))
+
+
+@pytest.mark.parametrize("steps", LEVELS)
+@pytest.mark.parametrize("shape", [(), (8,), (2, 3, 4)])
+def test_what_is_delivered_is_its_twin(steps: ThrustSteps, shape: tuple[int, ...]) -> None:
+    """The compiled loop is the nearest running thrust outside the gap and none inside it, of any shape."""
+    for seed in range(20):
+        wished = np.random.default_rng(seed).normal(0.0, 2.0, shape).round(1)
+        runs = (wished >= steps.least_forward_N - 1e-9) | (wished <= -steps.least_reverse_N + 1e-9)
+        delivered = steps.delivered_N(wished)
+        assert delivered.shape == shape
+        assert np.array_equal(delivered, np.where(runs, steps.nearest_N(wished), 0.0))
 
 
 def test_without_levels_only_the_gap_is_left_out() -> None:

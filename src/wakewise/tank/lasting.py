@@ -25,6 +25,6 @@ class Lasting:
         """The error at a time, not before the last one asked for, shape (3,)."""
         kept = math.exp((self._time_s - time_s) / self._lasts_s)
         spread = self._sigma * math.sqrt(max(1.0 - kept * kept, 0.0))
-        self._value = kept * self._value + self._rng.normal(0.0, spread, 3)
+        self._value = kept * self._value + spread * self._rng.standard_normal(3)
         self._time_s = time_s
         return self._value

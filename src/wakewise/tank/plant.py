@@ -9,7 +9,7 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.compiled import njit
 from wakewise.errors import InputError
-from wakewise.geometry import Pose, matrix_from_quat
+from wakewise.geometry import Pose, matrix_from_quat, skew
 from wakewise.interfaces import BodyState
 from wakewise.physics import GRAVITY_M_S2
 from wakewise.tank.contact import Surroundings, clear
@@ -92,8 +92,10 @@ class VehiclePlant:
         self._arms_B, self._axes_B = np.array(vehicle.thruster_positions_B_m), np.array(vehicle.thruster_axes_B)
         self._force_B_m_s2 = -_GRAVITY_W_M_S2 @ start.X_WB.R
         self._still = ambient.steady and ambient.uniform
+        self._steady = ambient.steady
         self._steps = vehicle.thrust_steps
-        self._asked_N, self._turned_N = np.full(n, np.nan), np.zeros(n)
+        self._asked, self._turned_N = b"", np.zeros(n)
+        self._follows = _following(vehicle, self._body.added_mass, density_kg_m3)
         self._calm = self._still and tether is None and not failures  # so that nothing is asked of between two events
         # Velocity in the world before the last step, that step, and 1 if the hull was surely clear of everything then.
         self._last = np.zeros(5)
@@ -135,23 +137,30 @@ class VehiclePlant:
         return self._state
 
     @property
+    def R_WB(self) -> Array:
+        """True attitude, shape (3, 3), which is not to be written to."""
+        return self._R
+
+    @property
     def time_s(self) -> float:
         """Sum of the steps."""
         return self._time
 
     def advance(self, commands_N: Array, until_s: float, inflow_W_m_s: Array | None = None) -> str:
         """Move on to a time in steps of at most 5 ms; what the hull was stopped by on the way. Arguments as `step`."""
-        commands, touched = self._steps_of(np.asarray(commands_N, dtype=np.float64)), ""
+        commands, touched = self._steps_of(np.array(commands_N, dtype=np.float64)), ""
         while until_s - self._time > _TIME_TOLERANCE_S:
             if self._calm and inflow_W_m_s is None:
-                self._glide(commands, until_s)
+                self._move(commands, until_s, np.zeros(6), self._water_W)
             else:
-                self.step(commands, min(self._time + PLANT_STEP_S, until_s) - self._time, inflow_W_m_s)
+                self._step(commands, min(self._time + PLANT_STEP_S, until_s) - self._time, inflow_W_m_s)
             touched = touched or self.contact
         return touched
 
-    def _glide(self, commands_N: Array, until_s: float) -> None:
-        """Steps in steady, even water, up to a time or to where the hull may touch something."""
+    def _move(
+        self, wanted_N: Array, until_s: float, wrench_B: Array, water_W: Array, longest_s: float = PLANT_STEP_S
+    ) -> None:
+        """Steps under one wrench in steady, even water, up to a time or to where the hull may touch something."""
         self._time = _steps_in_free_water(
             self._packed,
             self._allocation,
@@ -160,10 +169,10 @@ class VehiclePlant:
             self._lags_s,
             self._gains,
             self._factors,
-            commands_N,
-            np.zeros(6),
-            self._water_W,
-            np.array([self._time, until_s, PLANT_STEP_S]),
+            wanted_N,
+            wrench_B,
+            water_W,
+            np.array([self._time, until_s, longest_s]),
             self._surroundings.packed,
             self._state,
             self._motors_N,
@@ -199,8 +208,11 @@ class VehiclePlant:
         inflow_W_m_s : ndarray, shape (n, 3), or None
             Velocity of the water at the disks without each thruster's own jet; None leaves inflow losses out.
         """
-        given = self._steps_of(np.asarray(commands_N, dtype=np.float64))
-        wanted = self._failing.wanted(self._time, given, self._motors_N)
+        self._step(self._steps_of(np.array(commands_N, dtype=np.float64)), dt_s, inflow_W_m_s)
+
+    def _step(self, given_N: Array, dt_s: float, inflow_W_m_s: Array | None) -> None:
+        """`step` of what the speed controllers have made of the commands."""
+        wanted = self._failing.wanted(self._time, given_N, self._motors_N)
         if inflow_W_m_s is not None:
             motors = thruster_lag(self._motors_N, saturate(wanted, self._lower_N, self._upper_N), self._lags_s, dt_s)
             self._factors = self._inflow_factors(self._gains * 0.5 * (self._motors_N + motors), inflow_W_m_s)
@@ -208,31 +220,12 @@ class VehiclePlant:
         if not self._still and dt_s > 0.0:
             self._water_W = self._ambient.velocity(self._state[None, :3], self._time + dt_s)[0]
             water = 0.5 * (water + self._water_W)
-            if not self._ambient.steady:
+            if not self._steady:
                 wrench += self._push_of_water(dt_s)
         if self._tether is not None:
             pose = Pose(self._state[:3], self._state[3:7])
             wrench += self._tether.wrench_B(pose, self._state[7:], self._ambient, self._time)
-        self._last[:3], self._last[3] = self._R @ self._state[7:10], dt_s
-        _lag_and_move(
-            self._packed,
-            self._allocation,
-            self._lower_N,
-            self._upper_N,
-            self._lags_s,
-            self._gains,
-            self._factors,
-            wanted,
-            wrench,
-            water,
-            float(dt_s),
-            self._state,
-            self._motors_N,
-            self._impulse_N_s,
-            self._R,
-        )
-        self._hold()
-        self._time += dt_s
+        self._move(wanted, self._time + dt_s, wrench, water, dt_s)
 
     def drag(self) -> tuple[Array, Array]:
         """Velocity through the ambient water in m/s and the drag on the water in N, both shape (3,), in the world."""
@@ -256,18 +249,16 @@ class VehiclePlant:
         """What the speed controllers make of commands, shape (n,); looked up once for each new command."""
         if self._steps is None:
             return commands_N
-        if not np.array_equal(commands_N, self._asked_N):
-            self._asked_N, self._turned_N = commands_N.copy(), self._steps.delivered_N(commands_N)
+        asked = commands_N.tobytes()  # told apart in a tenth of the time that a comparison of arrays takes
+        if asked != self._asked:
+            self._asked, self._turned_N = asked, self._steps.delivered_N(commands_N)
         return self._turned_N
 
     def _push_of_water(self, dt_s: float) -> Array:
         """Wrench of water that speeds up at a fixed place: its pressure gradient and the added mass."""
         rate_W = (self._water_W - self._ambient.velocity(self._state[None, :3], self._time)[0]) / dt_s
-        rate_B = rate_W @ self._R
-        pressure = self._density * self.vehicle.displaced_volume_m3 * rate_B
-        push: Array = self._body.added_mass[:, :3] @ rate_B
-        (x, y, z), (f, g, h) = self.vehicle.p_BB_m, pressure
-        return push + np.array([f, g, h, y * h - z * g, z * f - x * h, x * g - y * f])
+        push: Array = self._follows @ (rate_W @ self._R)
+        return push
 
     def _inflow_factors(self, thrusts_N: Array, inflow_W_m_s: Array) -> Array:
         vehicle = self.vehicle
@@ -277,6 +268,13 @@ class VehiclePlant:
         jets = -np.sign(thrusts_N)[:, None] * vehicle.thruster_axes_B
         along = np.einsum("ij,ij->i", past_B, jets)
         return inflow_factors(thrusts_N, along, vehicle.disk_areas_m2, self._density)
+
+
+def _following(vehicle: Vehicle, added_mass: Array, density_kg_m3: float) -> Array:
+    """Wrench in the body frame per acceleration of the water, shape (6, 3): pressure on the volume, and added mass."""
+    displaced_kg = density_kg_m3 * vehicle.displaced_volume_m3
+    pressure = displaced_kg * np.concatenate([np.eye(3), skew(vehicle.p_BB_m)])
+    return np.asarray(pressure + added_mass[:, :3])
 
 
 @njit
@@ -374,6 +372,8 @@ def _steps_in_free_water(
         last[4] = 1.0 if clear(around, state, R) else 0.0
         if last[4] == 0.0:
             return time_s
+    if last[3] == 0.0:
+        return time_s
     rate = np.empty(3)
     for i in range(3):
         now = R[i, 0] * state[7] + R[i, 1] * state[8] + R[i, 2] * state[9]

@@ -61,7 +61,8 @@ class Sensors:
             settings.tracking_rate_hz,
         )
         self._taken = [0] * len(self._samplers)
-        self._next_s = self._soonest_s()
+        self._due_s = [1 / rate if rate > 0.0 else math.inf for rate in self._rates_hz]
+        self._next_s = min(self._due_s)
         self._under_way: list[tuple[float, int, Measurement]] = []
         self._count = 0
 
@@ -96,23 +97,21 @@ class Sensors:
         turbidity_per_m : float
             Beam attenuation between camera and target.
         """
-        for kind, (take, rate_hz) in enumerate(zip(self._samplers, self._rates_hz, strict=True)):
-            if rate_hz > 0.0 and (self._taken[kind] + 1) / rate_hz <= time_s + _TICK_TOLERANCE_S:
+        for kind, due_s in enumerate(self._due_s):
+            if due_s <= time_s + _TICK_TOLERANCE_S:
                 self._taken[kind] += 1
-                take(time_s, state, force_B_m_s2, turbidity_per_m)
-        self._next_s = self._soonest_s()
-
-    def _soonest_s(self) -> float:
-        return min((n + 1) / rate for n, rate in zip(self._taken, self._rates_hz, strict=True) if rate > 0.0)
+                self._due_s[kind] = (self._taken[kind] + 1) / self._rates_hz[kind]
+                self._samplers[kind](time_s, state, force_B_m_s2, turbidity_per_m)
+        self._next_s = min(self._due_s)
 
     def _pose(self, time_s: float, state: Array, _force: Array, turbidity_per_m: float) -> None:
         s = self._settings
         # Drawn whether or not it is lost, so that a lost pose leaves the noise of the next ones alone.
-        turn = self._pose_rng.normal(0.0, s.pose_noise_rad, 3)
-        shift = self._pose_rng.normal(0.0, s.pose_noise_m, 3)
+        turn = s.pose_noise_rad * self._pose_rng.standard_normal(3)
+        shift = s.pose_noise_m * self._pose_rng.standard_normal(3)
         if self._pose_rng.uniform() < pose_loss(turbidity_per_m, s.pose_range_m, s.pose_dropout):
             return
-        if any(begin <= time_s < end for begin, end in s.pose_outages_s):
+        if s.pose_outages_s and any(begin <= time_s < end for begin, end in s.pose_outages_s):
             return
         shift, turn = shift + self._place_off.at(time_s), turn + self._turn_off.at(time_s)
         if self._far_rng.uniform() < s.pose_outliers:
@@ -125,10 +124,10 @@ class Sensors:
     def _imu(self, time_s: float, state: Array, force_B_m_s2: Array, _turbidity: float) -> None:
         s = self._settings
         step = math.sqrt(1.0 / s.imu_rate_hz)
-        self._gyro_bias_B = self._gyro_bias_B + self._walk_rng.normal(0.0, GYRO_WALK_RAD_S * step, 3)
-        self._force_bias_B = self._force_bias_B + self._walk_rng.normal(0.0, FORCE_WALK_M_S2 * step, 3)
-        omega = state[10:] + self._gyro_bias_B + self._gyro_rng.normal(0.0, s.gyro_noise_rad_s, 3)
-        force = force_B_m_s2 + self._force_bias_B + self._force_rng.normal(0.0, s.accelerometer_noise_m_s2, 3)
+        self._gyro_bias_B = self._gyro_bias_B + GYRO_WALK_RAD_S * step * self._walk_rng.standard_normal(3)
+        self._force_bias_B = self._force_bias_B + FORCE_WALK_M_S2 * step * self._walk_rng.standard_normal(3)
+        omega = state[10:] + self._gyro_bias_B + s.gyro_noise_rad_s * self._gyro_rng.standard_normal(3)
+        force = force_B_m_s2 + self._force_bias_B + s.accelerometer_noise_m_s2 * self._force_rng.standard_normal(3)
         self._send(time_s, Measurement(time_s=time_s, omega_B_rad_s=omega, force_B_m_s2=force))
 
     def _depth(self, time_s: float, state: Array, _force: Array, _turbidity: float) -> None:

@@ -345,12 +345,11 @@ class Tank:
         """What the hull's drag did to the water since the last step of the water: the mean of its ends."""
         plant, before_N = self._plant, self._drag_before_N
         through, self._drag_before_N = plant.drag()
-        state = plant.state
         return HullPush(
-            p_WB_m=state.X_WB.p_m,
-            R_WB=state.X_WB.R,
-            size_m=np.array(plant.vehicle.size_m),
-            velocity_W_m_s=state.X_WB.R @ state.nu_B[:3],
+            p_WB_m=plant.vector[:3],
+            R_WB=plant.R_WB,
+            size_m=plant.vehicle.size_m,
+            velocity_W_m_s=plant.R_WB @ plant.vector[7:10],
             through_W_m_s=through,
             impulse_W_N_s=0.5 * dt_s * (before_N + self._drag_before_N),
         )

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wakewise.arrays import Array, freeze
+from wakewise.arrays import Array, freeze, frozen
+from wakewise.compiled import njit
 from wakewise.errors import InputError
 from wakewise.thrusters.thrust_curve import ThrustCurve
 
@@ -20,6 +21,7 @@ PULSE_STEP_US = 1.0
 """Autopilots state servo pulses in whole microseconds (MAVLink, message SERVO_OUTPUT_RAW: uint16, us)."""
 
 _TOLERANCE_N = 1e-9  # a wish for the least thrust itself is met however it was rounded
+_NO_LEVELS = frozen([], (0,), "levels_N")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,9 +74,10 @@ class ThrustSteps:
 
     def delivered_N(self, wished_N: ArrayLike) -> Array:
         """Thrusts that wished thrusts of any shape turn into: none below the least, else the nearest step."""
-        wished = np.asarray(wished_N, dtype=np.float64)
-        runs = (wished >= self.least_forward_N - _TOLERANCE_N) | (wished <= -self.least_reverse_N + _TOLERANCE_N)
-        return np.where(runs, self.nearest_N(wished), 0.0)
+        thrusts = np.array(wished_N, dtype=np.float64, order="C")
+        levels = _NO_LEVELS if self.levels_N is None else self.levels_N
+        _deliver(thrusts.reshape(-1), levels, self.least_forward_N, self.least_reverse_N)
+        return thrusts
 
     def nearest_N(self, wished_N: ArrayLike) -> Array:
         """The running thrusts nearest to wished ones of any shape, in the wish's own direction (0 counts as forward).
@@ -91,3 +94,23 @@ class ThrustSteps:
         found = np.where(beyond - low < high - beyond, low, high)
         # A thruster that runs one way only is not turned about to be near.
         return np.where(np.sign(found) == np.where(forward, 1.0, -1.0), found, 0.0)
+
+
+@njit
+def _deliver(thrusts_N: Array, levels_N: Array, least_forward_N: float, least_reverse_N: float) -> None:
+    """Turn wished thrusts, shape (n,), in place into those held: 0 in the gap, else as `ThrustSteps.nearest_N`."""
+    last = levels_N.shape[0] - 1
+    for i in range(thrusts_N.shape[0]):
+        wished = thrusts_N[i]
+        if not (wished >= least_forward_N - _TOLERANCE_N or wished <= -least_reverse_N + _TOLERANCE_N):
+            thrusts_N[i] = 0.0
+            continue
+        forward = wished >= 0.0
+        found = max(wished, least_forward_N) if forward else min(wished, -least_reverse_N)
+        if last >= 0:
+            above = min(max(np.searchsorted(levels_N, found), 1), max(last, 1))
+            low, high = levels_N[above - 1], levels_N[min(above, last)]
+            found = low if found - low < high - found else high
+            # A thruster that runs one way only is not turned about to be near.
+            found = found if (found > 0.0 if forward else found < 0.0) else 0.0
+        thrusts_N[i] = found

@@ -56,13 +56,14 @@ class HullPush:
 
 def frontal_area_m2(size_m: Array, direction_B: Array) -> float:
     """Area of a box as seen along a unit vector."""
-    a, b, c = size_m
-    return float(np.abs(direction_B) @ (b * c, a * c, a * b))
+    (a, b, c), (x, y, z) = size_m.tolist(), direction_B.tolist()
+    return float(abs(x) * b * c + abs(y) * a * c + abs(z) * a * b)
 
 
 def lee_m(size_m: Array, direction_B: Array) -> float:
     """Distance from the middle of a box to its side along a unit vector."""
-    return float(np.min(0.5 * size_m / np.maximum(np.abs(direction_B), 1e-9)))
+    sides = zip(size_m.tolist(), direction_B.tolist(), strict=True)
+    return min(0.5 * size / max(abs(along), 1e-9) for size, along in sides)
 
 
 def first_wake(strength_m3_s: float, speed_m_s: float, area_m2: float) -> tuple[float, float]:
@@ -94,11 +95,11 @@ class HullWake:
 
     def sent(self, dt_s: float, push: HullPush, rng: np.random.Generator) -> Parcels:
         """Parcels of a step of dt_s, their place and age those of its end; mostly none."""
-        speed = float(np.linalg.norm(push.through_W_m_s))
+        speed = math.hypot(*push.through_W_m_s.tolist())
         self.waiting_m4_s = self.waiting_m4_s + push.impulse_W_N_s / self._density
         self._way += speed * dt_s
         self._time += dt_s
-        impulse = float(np.linalg.norm(self.waiting_m4_s))
+        impulse = math.hypot(*self.waiting_m4_s.tolist())
         if speed < _STILL_M_S or impulse == 0.0:
             return Parcels.none()
         ahead = push.through_W_m_s / speed
