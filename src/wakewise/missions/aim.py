@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -45,7 +46,12 @@ class CameraAim:
 
     def level_tilt(self, pitch_rad: float) -> float:
         """Tilt with which the camera of a level body looks at a pitch above the horizon, stops or no stops."""
-        return pitch_rad - math.asin(float(np.clip(-self.X_BC.R[2, 2], -1.0, 1.0)))
+        return pitch_rad - self._mounted_at_rad
+
+    @cached_property
+    def _mounted_at_rad(self) -> float:
+        """Pitch of the camera on a level body at no tilt."""
+        return math.asin(min(max(-float(self.X_BC.R[2, 2]), -1.0), 1.0))
 
     def mount(self, tilt_rad: float) -> Pose:
         """Camera mount at a tilt."""

@@ -52,10 +52,15 @@ def layered_orbits(settings: MissionSettings) -> tuple[Orbit, ...]:
 
 def camera_pose(centre_W_m: Array, azimuth_rad: float, elevation_rad: float, range_m: float) -> Pose:
     """X_WC of a camera on the sphere, looking at the centre, image level with the horizon."""
-    ca, sa = np.cos(azimuth_rad), np.sin(azimuth_rad)
-    ce, se = np.cos(elevation_rad), np.sin(elevation_rad)
+    return Pose(*camera_place(centre_W_m, azimuth_rad, elevation_rad, range_m))
+
+
+def camera_place(centre_W_m: Array, azimuth_rad: float, elevation_rad: float, range_m: float) -> tuple[Array, Array]:
+    """Position, shape (3,), and quaternion, shape (4,), of `camera_pose`."""
+    ca, sa = math.cos(azimuth_rad), math.sin(azimuth_rad)
+    ce, se = math.cos(elevation_rad), math.sin(elevation_rad)
     p_WC = centre_W_m + range_m * np.array([ce * ca, ce * sa, -se])
-    return Pose(p_WC, quat_multiply(quat_from_euler(0.0, -elevation_rad, azimuth_rad + np.pi), _Q_FC))
+    return p_WC, quat_multiply(quat_from_euler(0.0, -elevation_rad, azimuth_rad + math.pi), _Q_FC)
 
 
 def camera_twist(
@@ -70,15 +75,17 @@ def camera_twist(
 
     The angular velocity is yaw rate about the world's down axis plus pitch rate about the level right axis.
     """
-    ca, sa = np.cos(azimuth_rad), np.sin(azimuth_rad)
-    ce, se = np.cos(elevation_rad), np.sin(elevation_rad)
-    radial = np.array([ce * ca, ce * sa, -se])
-    along_azimuth = np.array([-ce * sa, ce * ca, 0.0])
-    along_elevation = np.array([-se * ca, -se * sa, -ce])
-    v_W = range_rate_m_s * radial + range_m * (
-        azimuth_rate_rad_s * along_azimuth + elevation_rate_rad_s * along_elevation
+    ca, sa = math.cos(azimuth_rad), math.sin(azimuth_rad)
+    ce, se = math.cos(elevation_rad), math.sin(elevation_rad)
+    # Along the view's radius, towards growing azimuth (-sin az, cos az, 0), and towards growing elevation.
+    out, turning, rising = range_rate_m_s, range_m * azimuth_rate_rad_s * ce, range_m * elevation_rate_rad_s
+    v_W = np.array(
+        [
+            out * ce * ca - turning * sa - rising * se * ca,
+            out * ce * sa + turning * ca - rising * se * sa,
+            -out * se - rising * ce,
+        ]
     )
     # Right axis of the level view frame with yaw az + pi: (-sin yaw, cos yaw, 0) = (sin az, -cos az, 0).
-    right = np.array([sa, -ca, 0.0])
-    omega_W = azimuth_rate_rad_s * np.array([0.0, 0.0, 1.0]) - elevation_rate_rad_s * right
+    omega_W = np.array([-elevation_rate_rad_s * sa, elevation_rate_rad_s * ca, azimuth_rate_rad_s])
     return v_W, omega_W

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
-from wakewise.geometry import Pose
+from wakewise.geometry import Pose, matrix_from_quat, quat_conjugate, quat_multiply
 from wakewise.interfaces import BodyState, Goal
 from wakewise.missions.aim import CameraAim
-from wakewise.missions.orbit import camera_pose, camera_twist, layered_orbits
+from wakewise.missions.orbit import camera_place, camera_pose, camera_twist, layered_orbits
 from wakewise.missions.order import downstream_first
 from wakewise.missions.settings import MissionSettings
 
@@ -121,11 +123,11 @@ class Route:
 
     def leg_at(self, time_s: float) -> int:
         """Index of the leg under way; before the first leg begins it is the first, held at its start."""
-        return int(np.clip(np.searchsorted(self.starts_s, time_s, side="right") - 1, 0, len(self.legs) - 1))
+        return min(max(bisect_right(self._starts, time_s) - 1, 0), len(self.legs) - 1)
 
     def camera(self, time_s: float) -> tuple[Pose, Array, Array]:
         """Wished camera pose X_WC, its velocity and its angular velocity in W (shape (3,) each)."""
-        place, rate = self.on_sphere(time_s)
+        place, rate = (numbers.tolist() for numbers in self.on_sphere(time_s))
         v_W, omega_W = camera_twist(*place, *rate)
         return camera_pose(self.centre_W_m, *place), v_W, omega_W
 
@@ -133,27 +135,42 @@ class Route:
         """Wished angle of the camera's joint and its rate; zeros where it is not aimed with."""
         if isinstance(aim, Pose):
             return 0.0, 0.0
-        (_, elevation, _), (_, elevation_rate, _) = self.on_sphere(time_s)
-        return aim.tilt(-float(elevation), -float(elevation_rate))
+        (_, elevation, _), (_, elevation_rate, _) = (numbers.tolist() for numbers in self.on_sphere(time_s))
+        return aim.tilt(-elevation, -elevation_rate)
 
     def body(self, time_s: float, aim: CameraAim | Pose) -> BodyState:
         """Wished pose and twist of a body that aims its camera so, or carries it at a fixed mount X_BC."""
-        if isinstance(aim, Pose):
-            aim = CameraAim(X_BC=aim)
-        X_WC, v_WC, omega_W = self.camera(time_s)
-        tilt, tilt_rate = self.tilt(time_s, aim)
+        X_WB, nu_B, _ = self.wished(time_s, CameraAim(X_BC=aim) if isinstance(aim, Pose) else aim)
+        return BodyState(X_WB=X_WB, nu_B=nu_B)
+
+    def wished(self, time_s: float, aim: CameraAim) -> tuple[Pose, Array, float]:
+        """Wished pose of a body, its twist, shape (6,), and the angle of the camera's joint.
+
+        As `camera` and `tilt` say, but the route is asked once and no pose of the camera is made: control asks this in
+        each of its steps.
+        """
+        place, rate = (numbers.tolist() for numbers in self.on_sphere(time_s))
+        v_WC, omega_W = camera_twist(*place, *rate)
+        p_WC, q_WC = camera_place(self.centre_W_m, *place)
+        tilt, tilt_rate = aim.tilt(-place[1], -rate[1])
         X_BC = aim.mount(tilt)
-        X_WB = X_WC @ X_BC.inverse()
-        R_BW = X_WB.R.T
+        q_WB = quat_multiply(q_WC, quat_conjugate(X_BC.q))
+        R_WB = matrix_from_quat(q_WB)
         v_BC, omega_BC = aim.carried(tilt, tilt_rate)
-        omega_B = R_BW @ omega_W - omega_BC
-        v_B = R_BW @ v_WC - v_BC - np.cross(omega_B, X_BC.p_m)
-        return BodyState(X_WB=X_WB, nu_B=np.concatenate([v_B, omega_B]))
+        p, q, r = omega_B = omega_W @ R_WB - omega_BC
+        x, y, z = X_BC.p_m
+        v_B = v_WC @ R_WB - v_BC - np.array([q * z - r * y, r * x - p * z, p * y - q * x])
+        return Pose(p_WC - R_WB @ X_BC.p_m, q_WB), np.concatenate([v_B, omega_B]), tilt
+
+    @cached_property
+    def _starts(self) -> list[float]:
+        """`starts_s` as plain numbers, which are quicker to look one up in."""
+        return list(self.starts_s.tolist())
 
     def on_sphere(self, time_s: float) -> tuple[Array, Array]:
         """Azimuth, elevation and range of the camera, and their rates, shape (3,) each."""
         leg = self.legs[i := self.leg_at(time_s)]
-        fraction, rate = leg.progress(time_s - float(self.starts_s[i]))
+        fraction, rate = leg.progress(time_s - self._starts[i])
         return (1 - fraction) * leg.start + fraction * leg.end, rate * (leg.end - leg.start)
 
 
@@ -251,5 +268,9 @@ class RoutePilot:
 
     def goal(self, time_s: float, estimate: BodyState) -> Goal:  # noqa: ARG002  (a clock needs no estimate)
         """Wished body pose and twist now, and angle of the camera's joint."""
-        wished, (tilt, _) = self.route.body(time_s, self.aim), self.route.tilt(time_s, self.aim)
-        return Goal(X_WB=wished.X_WB, nu_B=wished.nu_B, tilt_rad=tilt)
+        X_WB, nu_B, tilt = self.route.wished(time_s, self._aim)
+        return Goal(X_WB=X_WB, nu_B=nu_B, tilt_rad=tilt)
+
+    @cached_property
+    def _aim(self) -> CameraAim:
+        return CameraAim(X_BC=self.aim) if isinstance(self.aim, Pose) else self.aim
