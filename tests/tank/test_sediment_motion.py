@@ -11,6 +11,7 @@ from wakewise.tank.sediment_motion import (
     cells_to_look_at,
     due,
     feel,
+    lift,
     mix,
     moved_cells,
     settle,
@@ -138,7 +139,30 @@ def test_a_bed_feels_the_water_that_was_looked_at():
     expected[tuple(cells.T)] = law[1:]
     assert star == pytest.approx(expected, rel=1e-4)
     bed = (rng.uniform(size=SHAPE) < 0.5).astype(float)
-    assert np.array_equal(moved_cells(star, bed, 0.01), np.argwhere((star > 0.01) & (bed > 0.0)))
+    moved = (star > 0.01) & (bed > 0.0)
+    for found, expected in zip(
+        moved_cells(star, bed, 0.01), (np.argwhere(moved), star[moved], bed[moved]), strict=True
+    ):
+        assert np.array_equal(found, expected)
+
+
+@pytest.mark.parametrize("firm_kg_m2", [0.0, 0.3])
+def test_lifting_is_its_twin(firm_kg_m2):
+    """Whole particles leave, the loose layer first and never more than there is; what leaves is what the bed lacks."""
+    rng = np.random.default_rng(5)
+    bed = rng.choice([0.01, 0.3, 0.3005, 0.5], SHAPE)
+    cells, birth_kg, area_m2 = np.argwhere(bed > 0.0)[::3], 1e-5, 0.0025
+    drawn, before = rng.uniform(0.0, 4.0, len(cells)), bed.copy()
+    expected = []
+    for (i, j), particles in zip(cells, drawn, strict=True):
+        loose = before[i, j] - firm_kg_m2
+        most = (loose if loose > 1e-9 else before[i, j]) * area_m2
+        if particles >= 1.0:
+            expected.append((i, j, min(math.floor(particles) * birth_kg, most)))
+    lifted = lift(cells, drawn, birth_kg, area_m2, firm_kg_m2, bed)
+    assert np.allclose(lifted, expected, rtol=1e-13)
+    assert (before - bed).sum() * area_m2 == pytest.approx(lifted[:, 2].sum(), rel=1e-9)
+    assert bed.min() >= 0.0
 
 
 def test_particles_are_looked_at_when_they_have_gone_far_or_long():

@@ -65,11 +65,20 @@ def friction_velocity_m_s(speed_m_s: ArrayLike, height_m: float, grain_m: float)
 
 
 def _log_law_m_s(speed: Array, height_m: float, grain_m: float) -> Array:
-    star = np.maximum(0.05 * speed, 1e-9)
-    for _ in range(8):  # each round shrinks the error about tenfold
-        rough = 2.5 * grain_m / 30 + VISCOSITY_M2_S / (9 * star)
-        star = np.maximum(VON_KARMAN * speed / np.log(np.maximum(height_m / rough, 3.0)), 1e-9)
-    return star
+    stars = speed.flatten()
+    _follow_log_law(stars, height_m, grain_m)
+    return stars.reshape(speed.shape)
+
+
+@njit(nogil=True)
+def _follow_log_law(speeds: Array, height_m: float, grain_m: float) -> None:
+    """Turn speeds, shape (n,), in place into the friction velocities of the log law."""
+    for k in range(speeds.shape[0]):
+        star = max(0.05 * speeds[k], 1e-9)
+        for _ in range(8):  # each round shrinks the error about tenfold
+            rough = 2.5 * grain_m / 30 + VISCOSITY_M2_S / (9 * star)
+            star = max(VON_KARMAN * speeds[k] / math.log(max(height_m / rough, 3.0)), 1e-9)
+        speeds[k] = star
 
 
 def friction_table_m_s(height_m: float, grain_m: float) -> Array:
@@ -135,7 +144,11 @@ def erosion_rates_kg_m2_s(stress: Array, threshold: Array, rate_kg_m2_s: float, 
     """
     rates = np.empty(stress.shape[0])
     for k in range(stress.shape[0]):
-        rates[k] = rate_kg_m2_s * mean_excess(stress[k] / threshold[k], intensity)
+        # Where no jet reaches, one cell after another feels the same.
+        if k and stress[k] == stress[k - 1] and threshold[k] == threshold[k - 1]:
+            rates[k] = rates[k - 1]
+        else:
+            rates[k] = rate_kg_m2_s * mean_excess(stress[k] / threshold[k], intensity)
     return rates
 
 

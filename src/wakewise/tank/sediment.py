@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -27,10 +28,12 @@ from wakewise.tank.grains import (
     threshold_stress_Pa,
 )
 from wakewise.tank.sediment_motion import (
+    LEAST_LOOSE_KG_M2,
     carry,
     cells_to_look_at,
     due,
     feel,
+    lift,
     mix,
     moved_cells,
     settle,
@@ -44,6 +47,7 @@ SHEAR_HEIGHT_M = 0.01  # where the log law takes the water's speed from; the wal
 BACKGROUND_DIFFUSIVITY_M2_S = 1e-5  # still tank water, low end of 1e-5..1e-4
 MIXING_HEIGHT_M = 0.065  # 0.40 u* h reaches a jet's 0.022 sqrt(T/rho) about here, and grows no more
 SUSPENDED_NEAR_M = 0.8  # particles of grains suspended from the start are finer within this of the target
+_MIXING = np.array([VON_KARMAN, MIXING_HEIGHT_M, BACKGROUND_DIFFUSIVITY_M2_S])
 # A particle keeps the water's velocity until it has gone this far or this long, whichever is sooner.
 _HELD_M, _HELD_S, _NEVER_S = 0.015, 0.3, 1e9
 _FIRST_HEIGHT_M = 0.005  # silt that leaves the bed starts evenly spread below this
@@ -116,9 +120,9 @@ class SiltLaws:
     def loose_kg_m2(self, load_kg_m2: Array) -> Array:
         """What of loads, shape (n,), lies above the firm layer, same shape; 0 where only that is left."""
         above = load_kg_m2 - self.firm_kg_m2
-        return np.where(above > 1e-9, above, 0.0)
+        return np.where(above > LEAST_LOOSE_KG_M2, above, 0.0)
 
-    @property
+    @cached_property
     def stirring_Pa(self) -> float:
         """Mean stress below which nothing is lifted."""
         return self.threshold_Pa * least_mean(self.stress_intensity)
@@ -223,7 +227,7 @@ class Silt:
     @property
     def suspended_kg(self) -> float:
         """In the water."""
-        return math.fsum(self.mass_kg)
+        return float(self.mass_kg.sum())
 
     def step(self, flow: Flow, stirred_W_m: Array, dt_s: float) -> None:
         """Erode, carry, mix and settle over dt_s.
@@ -243,23 +247,26 @@ class Silt:
             self._mix(dt_s)
             self._pair()
 
-    def concentration(self, origin_W_m: Array, spacing_m: float, shape: tuple[int, int, int]) -> ScalarGrid:
-        """Silt in kg/m3 on a grid; each particle is shared among the eight nodes round it (cloud in cell)."""
+    def concentration(
+        self, origin_W_m: Array, spacing_m: float, shape: tuple[int, int, int], outer: ScalarGrid | None = None
+    ) -> ScalarGrid:
+        """Silt in kg/m3 on a grid; each particle is shared among the eight nodes round it (cloud in cell).
+
+        `outer` is the coarser grid that holds outside it.
+        """
         values = np.zeros(shape)
         if len(self.mass_kg):
             # The lowest layer of nodes may lie on the bed: what is below it is counted there, not lost.
             origin = np.array(origin_W_m, dtype=np.float64)
             shared_among_nodes(self.position_m, self.mass_kg / spacing_m**3, origin, float(spacing_m), values)
-        bed = (self._size[2] - origin_W_m[2]) / spacing_m
+        (x, y), depth = self._low.tolist(), float(self._size[2])
+        at = np.asarray(origin_W_m, dtype=np.float64).tolist()
         # A node on the bed has water only on its upper side, one on a wall only before it.
-        if 0 <= bed <= shape[2] - 1 and abs(bed - round(bed)) < 1e-6:
-            values[:, :, round(bed)] *= 2.0
-        for axis in range(2):
-            for wall in (self._low[axis], -self._low[axis]):
-                node = (wall - origin_W_m[axis]) / spacing_m
-                if 0 <= round(node) < shape[axis] and abs(node - round(node)) < 1e-6:
-                    np.moveaxis(values, axis, 0)[round(node)] *= 2.0
-        return ScalarGrid(origin_W_m=origin_W_m, spacing_m=spacing_m, values=values)
+        for axis, face in ((2, depth), (0, x), (0, -x), (1, y), (1, -y)):
+            node = (face - at[axis]) / spacing_m
+            if 0 <= round(node) < shape[axis] and abs(node - round(node)) < 1e-6:
+                values[(slice(None),) * axis + (round(node),)] *= 2.0
+        return ScalarGrid(origin_W_m=origin_W_m, spacing_m=spacing_m, values=values, outer=outer)
 
     def _shear(self, flow: Flow, stirred_W_m: Array) -> None:
         """Friction velocity of every cell: from the water over it where jets reach, from the current elsewhere."""
@@ -292,27 +299,22 @@ class Silt:
         laws = self.laws
         least = math.sqrt(laws.stirring_Pa / laws.water_density_kg_m3)
         area = float(self._cell.prod())
-        i, j = moved_cells(self._star_m_s, self.bed_kg_m2, least).T
-        if not len(i):
+        cells, star, load = moved_cells(self._star_m_s, self.bed_kg_m2, least)
+        if not len(cells):
             return
-        stress = laws.water_density_kg_m3 * self._star_m_s[i, j] ** 2
-        load = self.bed_kg_m2[i, j]
-        worth = laws.lifted_kg_m2_s(stress, load) * area * dt_s / self._birth_kg
-        lifted = np.floor(worth + self._rng.uniform(size=len(i)))
-        i, j, lifted, load = i[lifted > 0], j[lifted > 0], lifted[lifted > 0], load[lifted > 0]
-        # What is loose goes first: the firm layer below it gives up its first grain in the step after.
-        loose = laws.loose_kg_m2(load)
-        mass = np.minimum(lifted * self._birth_kg, np.where(loose > 0.0, loose, load) * area)
+        rates = laws.lifted_kg_m2_s(laws.water_density_kg_m3 * star**2, load)
+        drawn = rates * area * dt_s / self._birth_kg + self._rng.uniform(size=len(cells))
+        lifted = lift(cells, drawn, self._birth_kg, area, laws.firm_kg_m2, self.bed_kg_m2)
+        new, mass = len(lifted), lifted[:, 2]
         self.lifted_kg += math.fsum(mass)
-        self.bed_kg_m2[i, j] = np.maximum(self.bed_kg_m2[i, j] - mass / area, 0.0)
-        place = self._rng.uniform(size=(len(i), 3))
-        position = np.empty((len(i), 3))
-        position[:, :2] = self._low + (np.stack([i, j], axis=1) + place[:, :2]) * self._cell
+        place = self._rng.uniform(size=(new, 3))
+        position = np.empty((new, 3))
+        position[:, :2] = self._low + (lifted[:, :2] + place[:, :2]) * self._cell
         position[:, 2] = self._size[2] - _FIRST_HEIGHT_M * place[:, 2]
         self.position_m = np.concatenate([self.position_m, position])
         self.mass_kg = np.concatenate([self.mass_kg, mass])
-        self._u_m_s = np.concatenate([self._u_m_s, np.zeros((len(i), 3))])
-        self._age_s = np.concatenate([self._age_s, np.full(len(i), _NEVER_S)])
+        self._u_m_s = np.concatenate([self._u_m_s, np.zeros((new, 3))])
+        self._age_s = np.concatenate([self._age_s, np.full(new, _NEVER_S)])
 
     def _carry(self, flow: Flow, dt_s: float) -> None:
         """Move with the water and sink; what sinks onto the bed stays there."""
@@ -330,9 +332,8 @@ class Silt:
     def _mix(self, dt_s: float) -> None:
         """Random walk with drift; the bed turns it back, since only sinking deposits (flux w_s C, Krone 1962)."""
         kicks = self._rng.standard_normal(self.position_m.shape)
-        laws = np.array([VON_KARMAN, MIXING_HEIGHT_M, BACKGROUND_DIFFUSIVITY_M2_S])
         position = self.position_m.copy()
-        mix(position, kicks, self._star_m_s, self._low, self._cell, float(self._size[2]), dt_s, laws)
+        mix(position, kicks, self._star_m_s, self._low, self._cell, float(self._size[2]), dt_s, _MIXING)
         self.position_m = position
 
     def _pair(self) -> None:

@@ -13,6 +13,8 @@ from wakewise.arrays import Array, IntArray
 from wakewise.compiled import njit
 from wakewise.tank.grains import friction_from
 
+LEAST_LOOSE_KG_M2 = 1e-9  # less than this above the firm layer is none
+
 
 @njit(nogil=True)
 def stirred_cells(circles: Array, low: Array, cell: Array, margin_m: float, near: np.ndarray) -> None:
@@ -73,15 +75,37 @@ def feel(star: Array, kept: np.ndarray, cells: IntArray, u: Array, table: Array)
 
 
 @njit(nogil=True)
-def moved_cells(star: Array, bed: Array, least: float) -> IntArray:
-    """Cells, shape (m, 2), that have a load and a friction velocity above the least."""
+def moved_cells(star: Array, bed: Array, least: float) -> tuple[IntArray, Array, Array]:
+    """Cells, shape (m, 2), that have a load and a friction velocity above the least, and both there, shape (m,)."""
     cells, count = np.empty((star.size, 2), np.int64), 0
+    stars, loads = np.empty(star.size), np.empty(star.size)
     for i in range(star.shape[0]):
         for j in range(star.shape[1]):
             if star[i, j] > least and bed[i, j] > 0.0:
                 cells[count, 0], cells[count, 1] = i, j
+                stars[count], loads[count] = star[i, j], bed[i, j]
                 count += 1
-    return cells[:count].copy()
+    return cells[:count].copy(), stars[:count].copy(), loads[:count].copy()
+
+
+@njit(nogil=True)
+def lift(cells: IntArray, particles: Array, birth_kg: float, area_m2: float, firm_kg_m2: float, bed: Array) -> Array:
+    """Take whole particles of a mass from cells of the bed, shape (m, 2): as many as `particles`, shape (m,), holds.
+
+    What is loose goes first: the firm layer below it gives up its first grain in the step after. Returns the particles
+    in use, shape (k, 3): the two numbers of the cell, and the mass.
+    """
+    lifted, count = np.empty((cells.shape[0], 3)), 0
+    for q in range(cells.shape[0]):
+        many, i, j = math.floor(particles[q]), cells[q, 0], cells[q, 1]
+        if many < 1:
+            continue
+        loose = bed[i, j] - firm_kg_m2
+        mass = min(many * birth_kg, (loose if loose > LEAST_LOOSE_KG_M2 else bed[i, j]) * area_m2)
+        bed[i, j] = max(bed[i, j] - mass / area_m2, 0.0)
+        lifted[count, 0], lifted[count, 1], lifted[count, 2] = i, j, mass
+        count += 1
+    return lifted[:count].copy()
 
 
 @njit(nogil=True)

@@ -260,8 +260,7 @@ class Tank:
         layers = int(min(_GRID_HEIGHT_M, depth) / GRID_SPACING_M + 1e-9) + 1
         across = 2 * round(_GRID_HALF_M / GRID_SPACING_M) + 1
         origin = np.array([centre[0] - _GRID_HALF_M, centre[1] - _GRID_HALF_M, depth - (layers - 1) * GRID_SPACING_M])
-        near = self.silt.concentration(origin, GRID_SPACING_M, (across, across, layers))
-        return replace(near, outer=self._outer_grid())
+        return self.silt.concentration(origin, GRID_SPACING_M, (across, across, layers), self._outer_grid())
 
     def _outer_grid(self) -> ScalarGrid:
         """Silt in kg/m3 in all the water, on some 8,000 nodes no closer than 0.2 m."""
