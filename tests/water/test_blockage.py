@@ -79,3 +79,13 @@ def test_a_jet_goes_round_a_solid_target():
         deepest = min(deepest, away.min(initial=1.0) / 0.1)
     assert deepest > 0.9
     assert isinstance(target, Target)
+
+
+def test_a_body_is_felt_where_any_point_is_near():
+    """Within four times its radius, as its sources are."""
+    body = Blockage.of(_dome())
+    x, y, z, reach = body.rows.ball
+    far = np.array([[x + 1.01 * reach, y, z], [x, y - 2.0 * reach, z]])
+    assert not body.felt_at(far)
+    assert not body.felt_at(far[:0])
+    assert body.felt_at(np.append(far, [[x, y + 0.99 * reach, z]], axis=0))

@@ -5,6 +5,11 @@ import threading
 import numpy as np
 import pytest
 
+from scipy.special import i0
+
+from wakewise.water.bedjets import layer_speed
+from wakewise.water.bedjets_sums import LOG_WIDTH, REACH
+from wakewise.water.parcels import CENTRE_SPEED
 from wakewise.water.water import Water
 
 AREAS_M2 = np.full(2, 2.8e-3)
@@ -80,3 +85,22 @@ def test_the_bed_is_stirred_where_it_is_fast():
     inside = grid[np.any(apart < circles[:, 2], axis=1)]
     u = now.excess_velocity(np.column_stack([inside, np.full(len(inside), 1.5)]))
     assert np.linalg.norm(u, axis=1).max() > 0.05
+
+
+def test_circles_are_their_readable_twin():
+    """Of rings and of parcels, those that are fast enough, as the laws are written for all of them at once."""
+    least = 0.02
+    now = _water().now
+    rings, parcels = now.rings, now.parcels
+    speed, (heading, kappa) = layer_speed(rings), rings.heading_kappa
+    fast = speed > least
+    beyond = np.exp(np.minimum(LOG_WIDTH * np.sqrt(2 * np.log(np.maximum(speed / least, 1.0))), REACH))
+    ahead, behind = (beyond * rings.radius_m * (np.exp(s * kappa) / i0(kappa)) ** 0.25 for s in (1.0, -1.0))
+    middle = rings.centre_m + (0.5 * (ahead - behind))[:, None] * heading
+    swift = 4 * CENTRE_SPEED * parcels.size_m4_s / parcels.sigma_m**3 > least
+    low = swift & (1.5 - parcels.position_m[:, 2] < 4 * parcels.sigma_m)
+    under_rings = np.column_stack([middle, 0.5 * (ahead + behind)])[fast]
+    under_jets = np.column_stack([parcels.position_m[:, :2], 4 * parcels.sigma_m])[low]
+    assert len(under_rings)
+    assert len(under_jets)
+    np.testing.assert_allclose(now.stirred_bed(least), np.concatenate([under_rings, under_jets]), rtol=1e-12)

@@ -7,7 +7,8 @@ import pytest
 from scipy.special import erf
 
 from wakewise.water import chunks
-from wakewise.water.parcels import parcel_velocity
+from wakewise.water.closure import first_sigma_m
+from wakewise.water.parcels import Parcels, gusty_impulse_m4_s, parcel_velocity, row_widening
 
 BED_Z_M = 1.5
 
@@ -89,3 +90,16 @@ def test_threads_do_not_change_a_byte(monkeypatch):
     monkeypatch.setattr(chunks, "_THREADED_PAIRS", 1)
     monkeypatch.setattr("os.cpu_count", lambda: 4)
     assert parcel_velocity(points, *parcels, BED_Z_M).tobytes() == one.tobytes()
+
+
+@pytest.mark.parametrize("scale", [0.0, 0.4])
+def test_gusts_are_their_readable_twin(scale):
+    """Of a share that grows along the core, and less by the root of how much coarser an old row is."""
+    _, impulse, sigma = _some_parcels()
+    rng, diameter, none = np.random.default_rng(4), np.full(len(sigma), 0.08), np.zeros_like(impulse)
+    gust = rng.normal(size=impulse.shape)
+    parcels = Parcels.sent(none, impulse, sigma, diameter, np.zeros(len(sigma), np.int64), gust, none)
+    first = first_sigma_m(diameter)
+    share = np.clip((sigma - first) / (diameter / 2 - first), 0.0, 1.0) / np.sqrt(row_widening(sigma, diameter))
+    expected = impulse + (scale * share * np.linalg.norm(impulse, axis=1))[:, None] * gust
+    np.testing.assert_allclose(gusty_impulse_m4_s(parcels, scale), expected, rtol=1e-12)

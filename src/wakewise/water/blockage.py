@@ -113,10 +113,9 @@ class Blockage:
         strengths: Array = answer(self.rows, np.ascontiguousarray(undisturbed_m_s))
         return strengths
 
-    def near(self, points_W_m: Array) -> IntArray:
-        """Indices of the points, shape (n, 3), that are within four times the body's radius."""
-        near: IntArray = near_body(self.rows, points_W_m)
-        return near
+    def felt_at(self, points_W_m: Array) -> bool:
+        """Whether any of the points, shape (n, 3), is within four times the body's radius."""
+        return bool(any_near(self.rows.ball, points_W_m))
 
     def velocity(self, points_W_m: Array, strengths_m3_s: Array) -> Array:
         """What the sources add, shape (n, 3), at points, shape (n, 3); nothing beyond four times the body's radius."""
@@ -150,6 +149,16 @@ def answer(body: BodyRows, undisturbed_m_s: Array) -> Array:
         for i in range(out.shape[0]):
             out[i] += unit[i] * across
     return out
+
+
+@njit(nogil=True)
+def any_near(ball: Array, points: Array) -> bool:
+    """Whether any point, shape (n, 3), is in a ball: its middle and radius, shape (4,)."""
+    for p in range(points.shape[0]):
+        dx, dy, dz = points[p, 0] - ball[0], points[p, 1] - ball[1], points[p, 2] - ball[2]
+        if dx * dx + dy * dy + dz * dz < ball[3] ** 2:
+            return True
+    return False
 
 
 @njit(apart=True, nogil=True)

@@ -6,12 +6,14 @@ look at it at once. What takes long to prepare is prepared when first asked for.
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 
 import numpy as np
 from scipy.special import i0
 
 from wakewise.arrays import Array, IntArray
+from wakewise.compiled import njit
 from wakewise.interfaces import Current
 from wakewise.water.bedjets import Rings, layer_speed
 from wakewise.water.bedjets_sums import LOG_WIDTH, REACH
@@ -45,6 +47,8 @@ class Instant:
     body : Blockage or None
     gust_scale : float
         Of the parcels' turbulence; 0 for the mean flow.
+    answer_to_ambient : ndarray, shape (s,), or None
+        The body's answer to the ambient water, where that is known already.
     """
 
     def __init__(
@@ -59,6 +63,7 @@ class Instant:
         ambient: Current,
         body: Blockage | None,
         gust_scale: float,
+        answer_to_ambient: Array | None = None,
     ) -> None:
         self.time_s = time_s
         self.parcels = parcels
@@ -69,6 +74,7 @@ class Instant:
         self._ambient = ambient
         self._body = body
         self._gust_scale = gust_scale
+        self._known_answer = answer_to_ambient
 
     def velocity(self, points_W_m: Array) -> Array:
         """Velocity of the water in m/s, shape (n, 3), at points, shape (n, 3)."""
@@ -102,25 +108,15 @@ class Instant:
 
     def stirred_bed(self, least_speed_m_s: float) -> Array:
         """Circles (x, y, radius), shape (n, 3), round the bed where jets may be faster than a speed."""
-        speed = layer_speed(self.rings)
-        fast = speed > least_speed_m_s
-        rings = self.rings.take(fast)
-        # Beyond its crest a wall jet's speed falls off as a Gaussian of the logarithm of the distance.
-        beyond = np.exp(np.minimum(LOG_WIDTH * np.sqrt(2 * np.log(speed[fast] / least_speed_m_s)), REACH))
-        # A leaning one reaches w^(1/4) times farther: a circle round its foremost and its hindmost place.
+        rings, parcels = self.rings, self.parcels
         heading, kappa = rings.heading_kappa
-        widest = beyond * rings.radius_m
-        ahead, behind = (widest * (np.exp(s * kappa) / i0(kappa)) ** 0.25 for s in (1.0, -1.0))
-        middle, reach = rings.centre_m + (0.5 * (ahead - behind))[:, None] * heading, 0.5 * (ahead + behind)
-        parcels = self.parcels
-        # On the bed a parcel and its image are at most twice as fast as one at its centre.
-        swift = 4 * CENTRE_SPEED * parcels.size_m4_s / parcels.sigma_m**3 > least_speed_m_s
-        near = self._bed - parcels.position_m[:, 2] < 4 * parcels.sigma_m
-        low, wide = parcels.position_m[near & swift], parcels.sigma_m[near & swift]
-        circles: Array = np.concatenate(
-            [np.column_stack([middle, reach]), np.column_stack([low[:, :2], 4 * wide])],
+        under_rings = ring_circles(
+            layer_speed(rings), rings.centre_m, rings.radius_m, heading, kappa, i0(kappa), least_speed_m_s
         )
-        return circles
+        under_jets = parcel_circles(
+            parcels.position_m, parcels.impulse_m4_s, parcels.sigma_m, self._bed, least_speed_m_s
+        )
+        return np.concatenate([under_rings, under_jets])
 
     @cached_property
     def _field(self) -> ImpulseField:
@@ -138,15 +134,53 @@ class Instant:
         body = self._body
         if body is None:
             return np.zeros(0)
+        if self._known_answer is not None:
+            return self._known_answer
         return body.strengths_m3_s(self._ambient.velocity(body.points_m, self.time_s))
 
     def _turned_aside(self, points: Array, u: Array, *, jets: bool, ambient: bool) -> Array:
         """Add the body's answer to the jets and to the ambient water, if any point is near enough to feel it."""
         body = self._body
-        if body is None or not len(body.near(points)):
+        if body is None or not body.felt_at(points):
             return u
         u = u.copy()
-        strengths = [self._answer_to_jets] if jets else []
-        strengths += [self._answer_to_ambient] if ambient else []
-        body.add_velocity(points, np.add.reduce(strengths), u)
+        strengths = self._answer_to_jets if jets else self._answer_to_ambient
+        if jets and ambient:
+            strengths = strengths + self._answer_to_ambient
+        body.add_velocity(points, strengths, u)
         return u
+
+
+@njit(nogil=True)
+def ring_circles(
+    speed: Array, centre: Array, radius: Array, heading: Array, kappa: Array, bessel: Array, least: float
+) -> Array:
+    """Circles (x, y, radius) round rings faster than the least, shape (n, 3); `bessel` is I0 of their kappa."""
+    out, count = np.empty((speed.shape[0], 3)), 0
+    for j in range(speed.shape[0]):
+        if speed[j] <= least:
+            continue
+        # Beyond its crest a wall jet's speed falls off as a Gaussian of the logarithm of the distance.
+        widest = radius[j] * math.exp(min(LOG_WIDTH * math.sqrt(2.0 * math.log(speed[j] / least)), REACH))
+        # A leaning one reaches w^(1/4) times farther: a circle round its foremost and its hindmost place.
+        ahead = widest * (math.exp(kappa[j]) / bessel[j]) ** 0.25
+        behind = widest * (math.exp(-kappa[j]) / bessel[j]) ** 0.25
+        for k in range(2):
+            out[count, k] = centre[j, k] + 0.5 * (ahead - behind) * heading[j, k]
+        out[count, 2] = 0.5 * (ahead + behind)
+        count += 1
+    return out[:count]
+
+
+@njit(nogil=True)
+def parcel_circles(position: Array, impulse: Array, sigma: Array, bed_z: float, least: float) -> Array:
+    """Circles (x, y, radius), shape (n, 3), round parcels near the bed that may be faster there than the least."""
+    out, count = np.empty((sigma.shape[0], 3)), 0
+    for j in range(sigma.shape[0]):
+        size = math.sqrt(impulse[j, 0] ** 2 + impulse[j, 1] ** 2 + impulse[j, 2] ** 2)
+        # On the bed a parcel and its image are at most twice as fast as one at its centre.
+        swift = 4.0 * CENTRE_SPEED * size > least * sigma[j] ** 3
+        if swift and bed_z - position[j, 2] < 4.0 * sigma[j]:
+            out[count, 0], out[count, 1], out[count, 2] = position[j, 0], position[j, 1], 4.0 * sigma[j]
+            count += 1
+    return out[:count]

@@ -14,7 +14,7 @@ import numpy as np
 
 from wakewise.arrays import Array, IntArray
 from wakewise.compiled import njit
-from wakewise.water.closure import disk_share, first_sigma_m
+from wakewise.water.closure import FIRST_D, disk_share
 from wakewise.water.faces import Room
 from wakewise.water.induction import impulse_velocity
 
@@ -180,12 +180,24 @@ def gusty_impulse_m4_s(parcels: Parcels, scale: float) -> Array:
     """Impulse with its turbulent part, which grows along the core and is full beyond it, shape (n, 3)."""
     if scale == 0.0 or parcels.count == 0:
         return parcels.impulse_m4_s
-    first = first_sigma_m(parcels.diameter_m)
-    share = np.clip((parcels.sigma_m - first) / (parcels.diameter_m / 2 - first), 0.0, 1.0)
-    # Of fewer parcels each may fluctuate less for their sum to fluctuate as much.
-    share *= scale / np.sqrt(row_widening(parcels.sigma_m, parcels.diameter_m))
-    gusty: Array = parcels.impulse_m4_s + (share * parcels.size_m4_s)[:, None] * parcels.gust
+    gusty: Array = gusty_impulses(parcels.impulse_m4_s, parcels.gust, parcels.sigma_m, parcels.diameter_m, scale)
     return gusty
+
+
+@njit(nogil=True)
+def gusty_impulses(impulse: Array, gust: Array, sigma: Array, diameter: Array, scale: float) -> Array:
+    """`gusty_impulse_m4_s` of the columns of parcels; `row_widening` is written out."""
+    out = np.empty(impulse.shape)
+    for j in range(sigma.shape[0]):
+        first = FIRST_D * diameter[j]
+        share = min(max((sigma[j] - first) / (0.5 * diameter[j] - first), 0.0), 1.0)
+        # Of fewer parcels each may fluctuate less for their sum to fluctuate as much.
+        wide = min(max(sigma[j] / (_OLD_D * diameter[j]), 1.0), _OLD_SPACING)
+        size = math.sqrt(impulse[j, 0] ** 2 + impulse[j, 1] ** 2 + impulse[j, 2] ** 2)
+        part = share * scale / math.sqrt(wide) * size
+        for k in range(3):
+            out[j, k] = impulse[j, k] + part * gust[j, k]
+    return out
 
 
 def merged(parcels: Parcels, spacing: float) -> Parcels:

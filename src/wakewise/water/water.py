@@ -195,6 +195,7 @@ class Water:
                 ambient=self._ambient,
                 body=self._body,
                 gust_scale=self._gust_scale,
+                answer_to_ambient=self._answer_to_steady,
             )
         return self._now
 
