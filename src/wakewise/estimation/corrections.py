@@ -76,7 +76,13 @@ def _shift(mean: Array, change: Array) -> None:
 @njit
 def correct(mean: Array, P: Array, H: Array, residual: Array, std: float, gate: float) -> float:
     """Correct by a measurement with rows H, shape (m, E), residual (m,) and the same white noise in each."""
-    PH = H @ P
+    PH = np.zeros(H.shape)
+    for i in range(H.shape[0]):
+        # Row by row of P, as much of it as the measurement knows of: for few rows quicker than a product of matrices.
+        for k in range(H.shape[1]):
+            if H[i, k] != 0.0:
+                for r in range(H.shape[1]):
+                    PH[i, r] += H[i, k] * P[k, r]
     S = PH @ H.T
     for i in range(S.shape[0]):
         S[i, i] += std**2

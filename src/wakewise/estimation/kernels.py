@@ -220,10 +220,7 @@ def moved(
     before = mean.copy()
     A, B = np.empty((MOVING, MOVING)), np.empty((MOVING, 6))
     rk4_jacobian_kernel(own, mean[:13], inputs, dt_s, A, B)
-    halfway = mean.copy()
-    assign(halfway[:13], 0.5 * (before[:13] + mean[:13]))
-    assign(halfway[3:7], halfway[3:7] / np.sqrt(np.dot(halfway[3:7], halfway[3:7])))
-    effect = _effects(own, halfway, inputs)
+    effect = _effects(own, _halfway(before, mean), inputs)
     for i in range(6):
         for j in range(12):
             by[i, DRAG + j] += effect[i, j]
@@ -233,6 +230,18 @@ def moved(
             F[i, j] += A[i, j]
     _add_current(F, A, before, dt_s)
     return F
+
+
+@njit(inline="always")
+def _halfway(before: Array, after: Array) -> Array:
+    """Mean half-way through a step, its quaternion of unit length."""
+    halfway = after.copy()
+    for i in range(13):
+        halfway[i] = 0.5 * (before[i] + after[i])
+    length = np.sqrt(halfway[3] ** 2 + halfway[4] ** 2 + halfway[5] ** 2 + halfway[6] ** 2)
+    for i in range(3, 7):
+        halfway[i] /= length
+    return halfway
 
 
 @njit
