@@ -33,6 +33,12 @@ def test_euler_angles_come_back(roll: float, pitch: float, yaw: float) -> None:
     np.testing.assert_allclose(matrix_from_quat(q), Rz @ Ry @ Rx, atol=1e-12)
 
 
+@given(st.lists(st.tuples(*[st.floats(0.1, 2.0)] * 4), min_size=1, max_size=5).map(np.array))
+def test_one_quaternion_has_the_angles_that_it_has_among_many(many: np.ndarray) -> None:
+    """One by one, in plain numbers, as all at once; of any length."""
+    np.testing.assert_allclose([euler_from_quat(q) for q in many], euler_from_quat(many), atol=1e-13)
+
+
 @given(vectors)
 def test_matrix_and_quaternion_agree_both_ways(rotvec: np.ndarray) -> None:
     """Quaternion -> matrix -> quaternion gives the same rotation, for every angle, half turns included."""

@@ -83,9 +83,12 @@ def quat_from_matrix(R_AB: ArrayLike) -> Array:
 
 def quat_from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Array:
     """Quaternion q_WB, shape (4,), of the Euler angles in ZYX order (yaw first, about z; Fossen eq. 2.32)."""
-    cr, sr = np.cos(roll_rad / 2), np.sin(roll_rad / 2)
-    cp, sp = np.cos(pitch_rad / 2), np.sin(pitch_rad / 2)
-    cy, sy = np.cos(yaw_rad / 2), np.sin(yaw_rad / 2)
+    roll, pitch, yaw = float(roll_rad) / 2, float(pitch_rad) / 2, float(yaw_rad) / 2
+    if not math.isfinite(roll + pitch + yaw):
+        return np.full(4, np.nan)
+    cr, sr = math.cos(roll), math.sin(roll)
+    cp, sp = math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
     return np.array(
         [
             cr * cp * cy + sr * sp * sy,
@@ -99,6 +102,12 @@ def quat_from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Array:
 def euler_from_quat(q_WB: ArrayLike) -> Array:
     """Roll, pitch and yaw in radians, shape (..., 3), of quaternions q_WB, shape (..., 4); pitch in [-pi/2, pi/2]."""
     q = np.asarray(q_WB, dtype=np.float64)
+    if q.ndim == 1:
+        w, x, y, z = q.tolist()
+        twice = 2.0 / (w * w + x * x + y * y + z * z)
+        roll = math.atan2(twice * (w * x + y * z), 1.0 - twice * (x * x + y * y))
+        pitch = math.asin(min(max(twice * (w * y - z * x), -1.0), 1.0))
+        return np.array([roll, pitch, math.atan2(twice * (w * z + x * y), 1.0 - twice * (y * y + z * z))])
     w, x, y, z = np.moveaxis(q / np.linalg.norm(q, axis=-1, keepdims=True), -1, 0)
     roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
