@@ -13,6 +13,8 @@ from wakewise.errors import InputError
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
+_FEW = 16
+"""So many numbers Python adds up before NumPy has begun."""
 _ONE_THREAD = 8192
 """OpenBLAS takes longer dot products to all cores, and its threads spin for a while after each."""
 
@@ -41,8 +43,11 @@ def frozen(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
         wanted = "(" + ", ".join("n" if s is None else str(s) for s in shape) + ")"
         raise InputError(f"{name}: shape {array.shape}, allowed {wanted}")
     flat = array.ravel()
-    # A NaN or infinity shows in the sum of squares, at a fraction of the cost; so may numbers that are merely large.
-    quick = flat.size <= _ONE_THREAD and math.isfinite(np.dot(flat, flat))
+    # A NaN or infinity shows in a sum, at a fraction of the cost; so may numbers that are merely large.
+    if flat.size <= _FEW:
+        quick = math.isfinite(sum(flat.tolist()))
+    else:
+        quick = flat.size <= _ONE_THREAD and math.isfinite(flat.dot(flat))
     if not quick and not np.isfinite(array).all():
         raise InputError(f"{name}: holds NaN or infinity, every element must be finite")
     array.setflags(write=False)

@@ -76,7 +76,7 @@ class FilterState:
 
     def __post_init__(self) -> None:
         errors = len(self.mean) - 1
-        freeze(self, mean=(None,), covariance=(errors, errors), thrusts_N=(None,), rest_q=(4,), leaning=(6,))
+        freeze(self, mean=(errors + 1,), covariance=(errors, errors), thrusts_N=(None,), rest_q=(4,), leaning=(6,))
 
     @property
     def unmodelled_force_W_N(self) -> Array:
