@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wakewise.allocation import Weights, compile_layout, gentle_allocation, least_thrusts
+from wakewise.allocation.allocate import is_incoherent
 from wakewise.allocation.boxes import box_search, coordinates
-from wakewise.allocation.convex import convex_allocation, is_incoherent
+from wakewise.allocation.convex import convex_allocation
 from wakewise.allocation.layout import independent_blocks
 from wakewise.allocation.search import cost
 from wakewise.errors import InputError

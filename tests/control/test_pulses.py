@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wakewise.control import in_pulses
-from wakewise.control.pulses import PulseState, pulsed
+from wakewise.control.pulses import PulseState, nearest, pulsed
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Command, Goal
 from wakewise.thrusters import ThrustSteps, library_curve
@@ -119,3 +119,44 @@ def test_a_pulse_lasts_a_lag_unless_told_otherwise() -> None:
     vehicle = load_vehicle("bluerov2-heavy")
     assert in_pulses(Asking(), vehicle).shortest_s == pytest.approx(np.full(8, 0.0287))
     assert in_pulses(Asking(), vehicle, 0.3).shortest_s == pytest.approx(np.full(8, 0.3))
+
+
+def pulsed_twin(state, wished_N, dt_s, steps, shortest_s):
+    """`pulsed` as whole arrays."""
+    span_s = np.maximum(shortest_s, dt_s)
+    forward_N, reverse_N, owed = steps.least_forward_N, steps.least_reverse_N, state.owed_N_s
+    holdable = np.where(wished_N >= forward_N, 1.0, np.where(wished_N <= -reverse_N, -1.0, 0.0))
+    starts = np.where(owed >= forward_N * span_s, 1.0, np.where(owed <= -reverse_N * span_s, -1.0, 0.0))
+    goes_on = np.where(state.running * owed > 0.0, state.running, starts)
+    running = np.where(holdable != 0.0, holdable, goes_on)
+    least, wish = np.where(running > 0.0, forward_N, -reverse_N), wished_N + owed / span_s
+    level = steps.nearest_N(np.where(wish * running > 0.0, wish, least))
+    thrusts = np.where(holdable != 0.0, level, np.where(running != 0.0, least, 0.0))
+    return running, owed + (wished_N - thrusts) * dt_s, thrusts
+
+
+@pytest.mark.parametrize("steps", [T200, PLAIN], ids=["steps", "any"])
+def test_pulses_are_those_of_the_rule_as_whole_arrays(steps) -> None:
+    """Over a thousand steps of wishes below the least thrusts and above, either way: the same to the last digits."""
+    rng, state = np.random.default_rng(8), PulseState.at_rest(8)
+    shortest_s = np.array([0.0, 0.01, 0.05, 0.1, 0.1, 0.2, 0.3, 0.5])
+    for _ in range(1000):
+        wishes = rng.normal(size=8) * rng.choice([0.1, 0.4, 5.0])
+        wanted = pulsed_twin(state, wishes, DT_S, steps, shortest_s)
+        state, thrusts = pulsed(state, wishes, DT_S, steps, shortest_s)
+        for found, want in zip((state.running, state.owed_N_s, thrusts), wanted, strict=True):
+            np.testing.assert_allclose(found, want, rtol=1e-12, atol=1e-15)
+
+
+def test_the_nearest_step_is_that_of_the_steps() -> None:
+    """Of wishes within the levels and beyond, for thrusters that run both ways, one way, and by one step alone."""
+    for steps in (
+        T200,
+        PLAIN,
+        ThrustSteps(least_forward_N=0.5, least_reverse_N=0.5, levels_N=np.array([0.5, 0.7, 1.2])),
+        ThrustSteps(least_forward_N=0.5, least_reverse_N=0.5, levels_N=np.array([-0.6])),
+    ):
+        wishes = np.concatenate([np.linspace(-70.0, 70.0, 1001), np.linspace(-1.0, 1.0, 401)])
+        levels = np.empty(0) if steps.levels_N is None else np.array(steps.levels_N)
+        found = [nearest(float(w), steps.least_forward_N, steps.least_reverse_N, levels) for w in wishes]
+        np.testing.assert_array_equal(found, steps.nearest_N(wishes))

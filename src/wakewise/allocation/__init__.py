@@ -8,7 +8,7 @@ comes in as the Gram matrix G of `s' G s`, where s are roots of thrusts.
 
 Start reading in `allocate.py` (what is asked and answered). `layout.py` is the matrix and its null space, `reach.py`
 what the limits leave. The search for the minimum: `search.py` for one or two spare thrusts, `boxes.py` with
-`starts.py`, `cells.py` and `coupled.py` (branch and bound) for more, `convex.py` for the convex cost of effort alone.
+`cells.py` and `coupled.py` (branch and bound) for more, `convex.py` for the convex cost of effort alone.
 `power.py` keeps what was found within a bound on electrical power.
 """
 

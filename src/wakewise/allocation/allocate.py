@@ -14,11 +14,11 @@ import numpy as np
 
 from wakewise.allocation.boxes import box_search
 from wakewise.allocation.cells import CLOSED
-from wakewise.allocation.convex import convex_allocation, is_incoherent
+from wakewise.allocation.convex import convex_allocation
+from wakewise.allocation.coupled import feasible_starts, start_directions, starts_at_rest, tied_parts
 from wakewise.allocation.layout import Layout, compile_layout
 from wakewise.allocation.reach import AXES, by_priority, is_all, parse_priority, within_limits
 from wakewise.allocation.search import cost, disjoint_search, split_allocation
-from wakewise.allocation.starts import feasible_starts, start_directions, starts_at_rest, tied_parts
 from wakewise.arrays import Array, freeze, frozen
 from wakewise.errors import InputError
 
@@ -271,6 +271,11 @@ def _search(
             thrusts[own] = result[own]
         gap += part
     return thrusts, method, gap
+
+
+def is_incoherent(G: Array) -> bool:
+    """Whether squares of speeds add up: a Gram matrix that is diagonal."""
+    return int(np.count_nonzero(G)) == int(np.count_nonzero(G.diagonal()))
 
 
 def _coupled_groups(layout: Layout, G: Array) -> list[Array]:

@@ -11,11 +11,6 @@ import numpy as np
 from wakewise.arrays import Array
 
 
-def is_incoherent(gram: Array) -> bool:
-    """Whether a Gram matrix is diagonal."""
-    return int(np.count_nonzero(gram)) == int(np.count_nonzero(np.diag(gram)))
-
-
 def convex_allocation(
     B: Array, start: Array, lower: Array, upper: Array, gram: Array, previous: Array, weights: Array
 ) -> tuple[Array, float] | None:

@@ -20,9 +20,13 @@ from typing import Any
 import numpy as np
 
 from wakewise.arrays import Array, freeze
+from wakewise.compiled import njit
 from wakewise.interfaces import BodyState, Command, Controller, Goal
 from wakewise.thrusters import ThrustSteps
 from wakewise.vehicles import Vehicle
+
+_ANY = np.empty(0)
+_ANY.setflags(write=False)  # as the steps of a thruster are: a kernel is compiled for the one or the other
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,18 +66,57 @@ def pulsed(
         What is owed after the step, and the thrusts. Owed is never more than the least thrust times the shortest pulse
         and one step, as long as the wishes lie within the thruster's limits.
     """
-    span_s = np.maximum(shortest_s, dt_s)
-    forward_N, reverse_N = steps.least_forward_N, steps.least_reverse_N
-    owed = state.owed_N_s
-    holdable = np.where(wished_N >= forward_N, 1.0, np.where(wished_N <= -reverse_N, -1.0, 0.0))
-    goes_on = state.running * owed > 0.0
-    starts = np.where(owed >= forward_N * span_s, 1.0, np.where(owed <= -reverse_N * span_s, -1.0, 0.0))
-    running = np.where(holdable != 0.0, holdable, np.where(goes_on, state.running, starts))
-    least = np.where(running > 0.0, forward_N, -reverse_N)
-    # What is owed is made up for over a pulse; the way the thruster runs stays that of the wish.
-    level = steps.nearest_N(np.where((wished_N + owed / span_s) * running > 0.0, wished_N + owed / span_s, least))
-    thrusts = np.where(holdable != 0.0, level, np.where(running != 0.0, least, 0.0))
-    return PulseState(running=running, owed_N_s=owed + (wished_N - thrusts) * dt_s), thrusts
+    levels_N = _ANY if steps.levels_N is None else steps.levels_N
+    least = (steps.least_forward_N, steps.least_reverse_N)
+    running, owed, thrusts = _pulses(state.running, state.owed_N_s, wished_N, dt_s, shortest_s, *least, levels_N)
+    return PulseState(running=running, owed_N_s=owed), thrusts
+
+
+@njit
+def _pulses(running, owed, wished, dt, shortest, least_forward, least_reverse, levels):  # type: ignore[no-untyped-def]
+    """Which way each thruster runs, what it owes, and its thrust, shape (n,) each; arguments as for `pulsed`."""
+    n = wished.size
+    ways, owes, thrusts = np.zeros(n), np.empty(n), np.zeros(n)
+    for i in range(n):
+        span, wish = max(shortest[i], dt), wished[i]
+        if wish >= least_forward or wish <= -least_reverse:
+            ways[i] = 1.0 if wish >= least_forward else -1.0
+            # What is owed is made up for over a pulse; the way the thruster runs stays that of the wish.
+            level = wish + owed[i] / span
+            if not level * ways[i] > 0.0:
+                level = least_forward if ways[i] > 0.0 else -least_reverse
+            thrusts[i] = nearest(level, least_forward, least_reverse, levels)
+        else:
+            if running[i] * owed[i] > 0.0:
+                ways[i] = running[i]
+            elif owed[i] >= least_forward * span or owed[i] <= -least_reverse * span:
+                ways[i] = 1.0 if owed[i] >= least_forward * span else -1.0
+            if ways[i] != 0.0:
+                thrusts[i] = least_forward if ways[i] > 0.0 else -least_reverse
+        owes[i] = owed[i] + (wish - thrusts[i]) * dt
+    return ways, owes, thrusts
+
+
+@njit
+def nearest(wish: float, least_forward: float, least_reverse: float, levels: Array) -> float:
+    """`ThrustSteps.nearest_N` of one wish; of no levels all are held."""
+    forward = wish >= 0.0
+    beyond = max(wish, least_forward) if forward else min(wish, -least_reverse)
+    if levels.size == 0:
+        return beyond
+    # The first level that is not below: between `low` and `high` of them.
+    low, high = 0, levels.size
+    while low < high:
+        middle = (low + high) // 2
+        if levels[middle] < beyond:
+            low = middle + 1
+        else:
+            high = middle
+    above = min(max(low, 1), max(levels.size - 1, 1))
+    over, under = levels[min(above, levels.size - 1)], levels[above - 1]
+    found = under if beyond - under < over - beyond else over
+    # A thruster that runs one way only is not turned about to be near.
+    return found if (found > 0.0 if forward else found < 0.0) else 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -115,9 +158,9 @@ class Pulsed:
     def step(self, state: PulsedState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[PulsedState, Command]:
         """Decide the thrusts for the next `dt_s` seconds."""
         inner, command = self.inner.step(state.inner, dt_s, estimate, goal)
-        wished = np.clip(command.thrusts_N, self.lower_N, self.upper_N)
+        wished = np.minimum(np.maximum(command.thrusts_N, self.lower_N), self.upper_N)
         pulses, thrusts = pulsed(state.pulses, wished, dt_s, self.steps, self.shortest_s)
-        sent = replace(command, thrusts_N=np.clip(thrusts, self.lower_N, self.upper_N))
+        sent = replace(command, thrusts_N=np.minimum(np.maximum(thrusts, self.lower_N), self.upper_N))
         return PulsedState(inner=inner, pulses=pulses), sent
 
 

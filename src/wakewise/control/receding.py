@@ -15,9 +15,11 @@ in the plan; the PID's integral makes up for what is left.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -97,6 +99,10 @@ class PlanningController:
         """What the planner believes."""
         return self.guard.planner.model
 
+    @cached_property
+    def _total_weight(self) -> float:
+        return float(np.sum(self.model.region.weights))
+
     def init(self) -> PlanState:
         """State before the first step."""
         n = self.model.thrusters
@@ -153,12 +159,10 @@ class PlanningController:
     def _unusable(self, estimate: BodyState, goal: Goal) -> str | None:
         count = self.guard.count
         for what, X_WB, nu_B in (("estimate", estimate.X_WB, estimate.nu_B), ("goal", goal.X_WB, goal.nu_B)):
-            if not np.isfinite(X_WB.p_m.sum() + X_WB.q.sum() + nu_B.sum()):
+            if not math.isfinite(sum(X_WB.p_m.tolist()) + sum(X_WB.q.tolist()) + sum(nu_B.tolist())):
                 return count(f"{what} not finite", f"{what} not finite: holding the last thrusts, fading")
         if estimate.covariance is not None:
-            spread = float(
-                np.sqrt(max(estimate.covariance[0, 0], estimate.covariance[1, 1], estimate.covariance[2, 2]))
-            )
+            spread = float(np.sqrt(estimate.covariance.diagonal()[:3].max()))
             if not spread <= self.tube.lost_m:
                 return count("lost", f"pose lost ({spread:.2f} m unsure): holding the last thrusts, fading")
         return None
@@ -169,7 +173,7 @@ class PlanningController:
             return np.zeros(6)
         change = (goal.nu_B - state.goal_nu) / dt_s
         push = self.tracker.body.mass_matrix @ change
-        return change if np.all(np.abs(push) <= self.tracker.integral_limit) else np.zeros(6)
+        return change if (np.abs(push) <= self.tracker.integral_limit).all() else np.zeros(6)
 
     def _replan(self, state: PlanState, estimate: BodyState, goal: Goal, change_B: Array) -> PlanState:
         settings = self.model.settings
@@ -239,14 +243,14 @@ class PlanningController:
         model = self.model
         stage_s = model.settings.stage_s
         nominal = _at(plan, state.age_s, stage_s)
-        path = Goal(X_WB=Pose(nominal[:3], nominal[3:7]), nu_B=nominal[7:])
         # All feed-forward, acceleration and load included, is in the plan; given twice it would run ahead of it.
-        tracker, correction = self.tracker.correction(state.tracker, dt_s, estimate, path, saturated=state.saturated)
+        tracker, correction = self.tracker.to_path(state.tracker, dt_s, estimate, nominal, saturated=state.saturated)
         planned = plan.commands_N[_stage(plan, state.age_s, stage_s)]
         wished = planned + share @ correction
-        thrusts = np.clip(wished, model.table.lower, model.table.upper)
+        thrusts = np.minimum(np.maximum(wished, model.table.lower), model.table.upper)
         if not np.isfinite(thrusts).all():
             state = replace(state, plan=None, trouble=self.guard.count("not finite", "correction not finite"))
+            path = Goal(X_WB=Pose(nominal[:3], nominal[3:7]), nu_B=nominal[7:])
             return self._fall_back(state, dt_s, estimate, path)
         over = float(np.abs(wished - thrusts).max())
         trouble = state.trouble
@@ -255,7 +259,7 @@ class PlanningController:
         command = Command(
             thrusts_N=thrusts,
             wrench_B=model.table.allocation @ planned + correction,
-            disturbance=plan.disturbance * float(np.sum(model.region.weights)),
+            disturbance=plan.disturbance * self._total_weight,
             fallback=trouble,
         )
         state = replace(
@@ -291,8 +295,11 @@ def correction_share(model: PlanModel, plan: Horizon) -> Array:
     weight = plan.curvature[np.ix_(alive, alive)] + effort * np.eye(int(alive.sum()))
     B = table.allocation[:, alive]
     easy = np.linalg.solve(weight, B.T)
+    # The pseudo-inverse: wrenches that nothing makes are left out.
+    sizes, axes = np.linalg.eigh(B @ easy)
+    made = sizes > 1e-9 * sizes[-1]
     share = np.zeros((model.thrusters, 6))
-    share[alive] = easy @ np.linalg.pinv(B @ easy, rcond=1e-9)
+    share[alive] = easy @ (axes[:, made] / sizes[made]) @ axes[:, made].T
     return share
 
 

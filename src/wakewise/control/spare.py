@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -83,8 +84,8 @@ class Respared:
                 held = self._jumped(replace(state, thrusts_N=moved, free_age_s=0.0), wrench, estimate)
             else:
                 held = replace(state, thrusts_N=watch.follow(wrench, state.seen, state.thrusts_N).thrusts_N)
-            held = replace(held, age_s=held.age_s + dt_s, free_age_s=held.free_age_s + dt_s)
-            held = replace(held, inner=self._told(inner, held.thrusts_N, dt_s))
+            told = self._told(inner, held.thrusts_N, dt_s)
+            held = replace(held, inner=told, age_s=held.age_s + dt_s, free_age_s=held.free_age_s + dt_s)
             return held, replace(command, thrusts_N=held.thrusts_N, disturbance=held.disturbance)
         shared = watch.share_out(wrench, estimate, state.thrusts_N)
         if shared is None:
@@ -92,7 +93,7 @@ class Respared:
             return SpareState(inner=inner, thrusts_N=command.thrusts_N), replace(command, fallback=words)
         found, seen = shared
         # The first search is made with the first plan, the next ones between two plans.
-        age_s = dt_s if np.isfinite(state.age_s) else EVERY_S - APART_S + dt_s
+        age_s = dt_s if math.isfinite(state.age_s) else EVERY_S - APART_S + dt_s
         told = self._told(inner, found.thrusts_N, dt_s)
         new = SpareState(told, found.thrusts_N, age_s, found.disturbance, state.free_age_s + dt_s, seen)
         return new, replace(command, thrusts_N=found.thrusts_N, disturbance=found.disturbance)

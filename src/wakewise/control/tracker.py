@@ -78,7 +78,8 @@ class Tracker:
         wrench (`saturated`), the integral does not grow.
         """
         feed = -restoring_wrench(self.body, goal.X_WB.q)
-        integral, wrench, twist_B = self._pid(state, dt_s, estimate, goal, feed, saturated)
+        place = (goal.X_WB.p_m, goal.X_WB.q, goal.nu_B)
+        integral, wrench, twist_B = self._pid(state, dt_s, estimate, *place, feed, saturated)
         wrench -= damping_wrench(self.body, twist_B) + coriolis_wrench(self.body, twist_B)
         wrench -= np.clip(estimate.load_B, -self.integral_limit, self.integral_limit)
         if state.goal_nu is not None and dt_s > 0.0:
@@ -92,11 +93,30 @@ class Tracker:
         self, state: TrackerState, dt_s: float, estimate: BodyState, goal: Goal, *, saturated: bool = False
     ) -> tuple[TrackerState, Array]:
         """The same without feed-forward, for a goal on a path whose thrusts are known; wrench in B, shape (6,)."""
-        integral, wrench, _ = self._pid(state, dt_s, estimate, goal, _NO_FEED, saturated)
+        place = (goal.X_WB.p_m, goal.X_WB.q, goal.nu_B)
+        integral, wrench, _ = self._pid(state, dt_s, estimate, *place, _NO_FEED, saturated)
+        return integral, wrench
+
+    def to_path(
+        self, state: TrackerState, dt_s: float, estimate: BodyState, nominal: Array, *, saturated: bool = False
+    ) -> tuple[TrackerState, Array]:
+        """`correction` towards a state of a path, shape (13,): position, unit quaternion, twist; made read-only."""
+        nominal.setflags(write=False)  # as goals are: the kernel is compiled for the one or the other
+        integral, wrench, _ = self._pid(
+            state, dt_s, estimate, nominal[:3], nominal[3:7], nominal[7:], _NO_FEED, saturated
+        )
         return integral, wrench
 
     def _pid(
-        self, state: TrackerState, dt_s: float, estimate: BodyState, goal: Goal, feed: Array, saturated: bool
+        self,
+        state: TrackerState,
+        dt_s: float,
+        estimate: BodyState,
+        goal_p: Array,
+        goal_q: Array,
+        goal_nu: Array,
+        feed: Array,
+        saturated: bool,
     ) -> tuple[TrackerState, Array, Array]:
         """New integral, wrench, and the goal's twist in B."""
         wrench = np.empty(6)
@@ -106,9 +126,9 @@ class Tracker:
             estimate.X_WB.p_m,
             estimate.X_WB.q,
             estimate.nu_B,
-            goal.X_WB.p_m,
-            goal.X_WB.q,
-            goal.nu_B,
+            goal_p,
+            goal_q,
+            goal_nu,
             state.force_W_N,
             state.moment_B_Nm,
             self.kp,

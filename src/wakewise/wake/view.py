@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
@@ -64,7 +65,7 @@ class WakeView:
             superposition=superposition,
         )
 
-    @property
+    @cached_property
     def total_weight(self) -> float:
         """Sum of the region's weights: D divided by it is a mean square speed."""
         return float(np.sum(self.weights))

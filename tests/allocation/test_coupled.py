@@ -1,9 +1,9 @@
-"""Where branch and bound begins: parts of the null space that belong together, and thrusts to descend from."""
+"""Parts of the null space that belong together, and thrusts to descend from."""
 
 import numpy as np
 
 from wakewise.allocation import compile_layout
-from wakewise.allocation.starts import feasible_starts, reach, start_directions, tied_parts
+from wakewise.allocation.coupled import feasible_starts, reach, start_directions, tied_parts
 from wakewise.vehicles import load_vehicle
 
 PAPER = load_vehicle("paper")
