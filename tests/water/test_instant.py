@@ -4,7 +4,6 @@ import threading
 
 import numpy as np
 import pytest
-
 from scipy.special import i0
 
 from wakewise.water.bedjets import layer_speed

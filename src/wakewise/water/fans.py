@@ -173,17 +173,18 @@ def _crossing_pairs(X: Array, sigma: Array, stream: IntArray, some: IntArray, un
         i, best, least = some[p], -1, np.inf
         for q in range(p + 1, n):
             j = some[q]
-            if stream[i] == stream[j] or used[q]:
-                continue
             c = unit[p, 0] * unit[q, 0] + unit[p, 1] * unit[q, 1] + unit[p, 2] * unit[q, 2]
-            if c > NARROWEST or c <= WIDEST:
+            if c > NARROWEST or c <= WIDEST or stream[i] == stream[j] or used[q]:
                 continue
             dx, dy, dz = X[j, 0] - X[i, 0], X[j, 1] - X[i, 1], X[j, 2] - X[i, 2]
             ahead = dx * unit[p, 0] + dy * unit[p, 1] + dz * unit[p, 2]
             back = dx * unit[q, 0] + dy * unit[q, 1] + dz * unit[q, 2]
-            s, t = (ahead - c * back) / (1.0 - c * c), (c * ahead - back) / (1.0 - c * c)
+            s, t = ahead - c * back, c * ahead - back
+            if s <= 0.0 or t <= 0.0:  # as of all but one in a hundred: nothing need be divided for them
+                continue
+            s, t = s / (1.0 - c * c), t / (1.0 - c * c)
             slant = math.sqrt(0.5 * (1.0 - c))  # sin alpha
-            if s <= 0.0 or t <= 0.0 or slant * s > STRIKE_HEIGHT * sigma[i] or slant * t > STRIKE_HEIGHT * sigma[j]:
+            if slant * s > STRIKE_HEIGHT * sigma[i] or slant * t > STRIKE_HEIGHT * sigma[j]:
                 continue
             gap2 = dx * dx + dy * dy + dz * dz + s * s + t * t + 2.0 * (t * back - s * ahead - s * t * c)
             if gap2 > (0.5 * (sigma[i] + sigma[j])) ** 2 or abs(s - t) >= least:
