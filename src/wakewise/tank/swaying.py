@@ -28,7 +28,7 @@ from wakewise.errors import InputError
 from wakewise.interfaces import Current, Posture
 from wakewise.tank.probes import surface_samples
 from wakewise.targets import Sway, Target
-from wakewise.targets.sway import BENDS_TO
+from wakewise.targets.sway import BENDS_TO, ways_m
 from wakewise.water.instant import Instant
 
 _POINTS = 300
@@ -174,8 +174,11 @@ class Swaying:
         away = alone = np.zeros((len(self._pieces.points_W_m), 3))
         stress = 0.0
         if self.sway is not None:
-            away = self.sway.moved(self._pieces.stem, self._pieces.points_W_m, self.tips_m)
-            alone = self.sway.moved(self._pieces.stem, self._pieces.points_W_m, self.alone_m)
+            stem, pieces = np.maximum(self._pieces.stem, 0), self._pieces
+            away, alone = (
+                ways_m(tips[stem], pieces.shape, pieces.drop, self.sway.axes_W[stem])
+                for tips in (self.tips_m, self.alone_m)
+            )
             stress = float(np.hypot.reduce(self.tips_m * self.sway.stress_Pa_m, axis=1).max())
         far = np.linalg.norm(away, axis=1)
         return Posture(

@@ -149,7 +149,7 @@ class Sway:
         """How far points at rest have moved, shape (n, 3), when the tips have moved by `tips_m`, shape (k, 2)."""
         shape, _, drop = self.at(stem, points_W_m[:, 2])
         place = np.where(stem >= 0, stem, 0)
-        return _moved(tips_m[place], shape, drop, self.axes_W[place])
+        return ways_m(tips_m[place], shape, drop, self.axes_W[place])
 
     def bent(self, tips_m: Array) -> tuple[Array, Array]:
         """How far the target's vertices have moved, shape (n, 3), and the slope (x, y) of the axis there, (n, 2).
@@ -158,7 +158,7 @@ class Sway:
         """
         place, axes, shape, slope, drop = self._vertices
         tips = tips_m[place]
-        return _moved(tips, shape, drop, axes), _along(tips * slope, axes)
+        return ways_m(tips, shape, drop, axes), _along(tips * slope, axes)
 
     @cached_property
     def _vertices(self) -> tuple[IntArray, Array, Array, Array, Array]:
@@ -172,7 +172,11 @@ def _along(ways: Array, axes: Array) -> Array:
     return np.asarray(ways[:, :1] * axes[:, 0] + ways[:, 1:] * axes[:, 1])
 
 
-def _moved(tips: Array, shape: Array, drop: Array, axes: Array) -> Array:
+def ways_m(tips: Array, shape: Array, drop: Array, axes: Array) -> Array:
+    """How far points have moved, shape (n, 3): `Sway.moved` where each one's tip and all about its stem is known.
+
+    `tips`, `shape` and `drop`, shape (n, 2), and `axes`, shape (n, 2, 2), are those of each point's own stem.
+    """
     down = tips[:, 0] ** 2 * drop[:, 0] + tips[:, 1] ** 2 * drop[:, 1]
     return np.column_stack([_along(tips * shape, axes), down])
 

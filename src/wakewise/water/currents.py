@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -193,10 +194,14 @@ class BackgroundTurbulence:
 
     def velocity(self, points_W_m: Array, time_s: float) -> Array:
         """Velocity of the water, shape (n, 3)."""
-        waves, cosines, sines = self._columns
         u = np.zeros((len(points_W_m), 3))
-        add_modes(np.ascontiguousarray(points_W_m), waves, self.frequencies_rad_s * time_s, cosines, sines, u)
+        self.add_velocity(points_W_m, time_s, u)
         return u
+
+    def add_velocity(self, points_W_m: Array, time_s: float, out: Array) -> None:
+        """Add the velocity of the water to `out`, shape (n, 3)."""
+        waves, cosines, sines = self._columns
+        add_modes(np.ascontiguousarray(points_W_m), waves, self.frequencies_rad_s * time_s, cosines, sines, out)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -205,12 +210,12 @@ class AmbientSum:
 
     parts: tuple[Current, ...] = ()
 
-    @property
+    @cached_property
     def steady(self) -> bool:
         """Whether nothing in it changes with time."""
         return all(getattr(part, "steady", False) for part in self.parts)
 
-    @property
+    @cached_property
     def uniform(self) -> bool:
         """Whether it is the same everywhere."""
         return all(getattr(part, "uniform", False) for part in self.parts)
@@ -222,10 +227,25 @@ class AmbientSum:
 
     def velocity(self, points_W_m: Array, time_s: float) -> Array:
         """Velocity of the water, shape (n, 3)."""
-        total = np.zeros((len(points_W_m), 3))
-        for part in self.parts:
-            total += part.velocity(points_W_m, time_s)
+        total = np.empty((len(points_W_m), 3))
+        total[:] = self._even_m_s
+        for part in self._uneven:
+            # Turbulence, which is asked for most, adds to what is there: of a few points a new array costs as much.
+            if isinstance(part, BackgroundTurbulence):
+                part.add_velocity(points_W_m, time_s, total)
+            else:
+                total += part.velocity(points_W_m, time_s)
         return total
+
+    @cached_property
+    def _even_m_s(self) -> Array:
+        """Sum of the steady currents, shape (3,)."""
+        even = [part.velocity_W_m_s for part in self.parts if isinstance(part, SteadyCurrent)]
+        return np.asarray(sum(even, np.zeros(3)))
+
+    @cached_property
+    def _uneven(self) -> tuple[Current, ...]:
+        return tuple(part for part in self.parts if not isinstance(part, SteadyCurrent))
 
     def stirred_bed(self) -> Array:
         """Circles (x, y, radius), shape (n, 3), in which it sweeps the bed faster than it does elsewhere."""
