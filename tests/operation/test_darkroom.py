@@ -107,6 +107,19 @@ def test_a_worker_that_cannot_be_started_is_told_and_the_flight_goes_on(parts, e
             darkroom.finish()
 
 
+def test_made_ready_for_nothing_it_ends_by_itself(parts, tmp_path):
+    """Begun before the flight, once however often it is asked; without an exposure it ends well and makes nothing."""
+    with warnings.catch_warnings(), Darkroom(parts, tmp_path) as darkroom:
+        warnings.simplefilter("error")
+        darkroom.ready()
+        process = darkroom._process
+        darkroom.ready()
+        assert darkroom._process is process
+        darkroom.finish()
+        assert process.returncode == 0
+    assert not (tmp_path / "images").exists()
+
+
 def test_leaving_early_ends_the_other_process(parts, exposures, tmp_path):
     """An error in the flight leaves no process behind and no half of a photograph."""
     with pytest.raises(KeyboardInterrupt), Darkroom(parts, tmp_path) as darkroom:

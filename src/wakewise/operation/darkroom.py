@@ -68,20 +68,25 @@ class Darkroom:
         sweep(self._folder)
         self._close()
 
+    def ready(self) -> None:
+        """Have the other process load its libraries and make its scene, which takes seconds; never waits."""
+        if not self._able or self._process is not None:
+            return
+        try:
+            self._begin()
+        except OSError as fault:
+            self._able = False
+            _warn(str(fault))
+            self._close()
+
     def take(self, number: int, exposure: ExposureRecord) -> None:
         """Have an exposure rendered if there is room for it; never waits."""
-        if not self._able or self._waiting.full():
+        if self._waiting.full():
             return
-        if self._process is None:
-            try:
-                self._begin()
-            except OSError as fault:
-                self._able = False
-                _warn(str(fault))
-                self._close()
-                return
-        with suppress(queue.Full):
-            self._waiting.put_nowait(packed(number, exposure))
+        self.ready()
+        if self._able:
+            with suppress(queue.Full):
+                self._waiting.put_nowait(packed(number, exposure))
 
     def finish(self) -> None:
         """Wait until what was taken is rendered; says in a warning if the other process failed."""
@@ -151,6 +156,7 @@ def develop(pipe: IO[bytes]) -> None:
         return
     scenario, folder = pickle.loads(first)
     parts = scenario.parts()
+    _ = parts.scene, parts.yielding, parts.route  # made while the vehicle is still on its way to the first view
     while (message := _message(pipe)) is not None:
         take_photograph(parts, folder, *unpacked(message))
 

@@ -164,6 +164,7 @@ def _fly(parts: Parts, folder: Path, darkroom: Darkroom, progress: Callable[...,
     if parts.scenario.pilot == BY_HAND and "pilot" not in parts.given:
         fly_hands(parts, folder)
     else:
+        darkroom.ready()
         fly_trial(parts, folder, progress, darkroom.take)
 
 
