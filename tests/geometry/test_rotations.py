@@ -35,8 +35,10 @@ def test_euler_angles_come_back(roll: float, pitch: float, yaw: float) -> None:
 
 @given(st.lists(st.tuples(*[st.floats(0.1, 2.0)] * 4), min_size=1, max_size=5).map(np.array))
 def test_one_quaternion_has_the_angles_that_it_has_among_many(many: np.ndarray) -> None:
-    """One by one, in plain numbers, as all at once; of any length."""
-    np.testing.assert_allclose([euler_from_quat(q) for q in many], euler_from_quat(many), atol=1e-13)
+    """One by one, in plain numbers, as all at once, there and back; of any length."""
+    angles = euler_from_quat(many)
+    np.testing.assert_allclose([euler_from_quat(q) for q in many], angles, atol=1e-13)
+    np.testing.assert_allclose([quat_from_euler(*one) for one in angles], quat_from_euler(*angles.T), atol=1e-15)
 
 
 @given(vectors)

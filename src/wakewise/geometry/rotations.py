@@ -7,6 +7,7 @@ Equations: T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Contr
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -81,22 +82,25 @@ def quat_from_matrix(R_AB: ArrayLike) -> Array:
     return q if q[0] >= 0 else -q
 
 
-def quat_from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Array:
-    """Quaternion q_WB, shape (4,), of the Euler angles in ZYX order (yaw first, about z; Fossen eq. 2.32)."""
-    roll, pitch, yaw = float(roll_rad) / 2, float(pitch_rad) / 2, float(yaw_rad) / 2
-    if not math.isfinite(roll + pitch + yaw):
-        return np.full(4, np.nan)
-    cr, sr = math.cos(roll), math.sin(roll)
-    cp, sp = math.cos(pitch), math.sin(pitch)
-    cy, sy = math.cos(yaw), math.sin(yaw)
-    return np.array(
-        [
-            cr * cp * cy + sr * sp * sy,
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-        ]
-    )
+def quat_from_euler(roll_rad: float | Array, pitch_rad: float | Array, yaw_rad: float | Array) -> Array:
+    """Quaternions q_WB, shape (..., 4), of Euler angles in ZYX order (yaw first, about z; Fossen eq. 2.32)."""
+    if isinstance(roll_rad, float) and isinstance(pitch_rad, float) and isinstance(yaw_rad, float):
+        halves = 0.5 * float(roll_rad), 0.5 * float(pitch_rad), 0.5 * float(yaw_rad)
+        if math.isfinite(sum(halves)):
+            return np.array(_quat(*((math.cos(half), math.sin(half)) for half in halves)))
+    many = [0.5 * np.asarray(angle, dtype=np.float64) for angle in (roll_rad, pitch_rad, yaw_rad)]
+    return np.stack(_quat(*((np.cos(half), np.sin(half)) for half in many)), axis=-1)
+
+
+def _quat(roll: tuple[Any, Any], pitch: tuple[Any, Any], yaw: tuple[Any, Any]) -> list[Any]:
+    """The four entries, of the cosine and the sine of half of each angle."""
+    (cr, sr), (cp, sp), (cy, sy) = roll, pitch, yaw
+    return [
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    ]
 
 
 def euler_from_quat(q_WB: ArrayLike) -> Array:

@@ -79,7 +79,7 @@ def _pose(log: VehicleLog, depth: Series | None, turned: Array, time_s: Array) -
         place[:, 2] = _straight(depth, time_s, 1)[:, 0]
     attitude = np.full((len(time_s), 4), np.nan)
     known = np.isfinite(turned).all(axis=1)
-    attitude[known] = quat_from_euler(*turned[known].T).T  # its formula holds for arrays, too
+    attitude[known] = quat_from_euler(*turned[known].T)
     return {f"est_{name}": column for name, column in zip(_POSE, np.column_stack([place, attitude]).T, strict=True)}
 
 
