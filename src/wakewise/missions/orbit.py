@@ -52,15 +52,10 @@ def layered_orbits(settings: MissionSettings) -> tuple[Orbit, ...]:
 
 def camera_pose(centre_W_m: Array, azimuth_rad: float, elevation_rad: float, range_m: float) -> Pose:
     """X_WC of a camera on the sphere, looking at the centre, image level with the horizon."""
-    return Pose(*camera_place(centre_W_m, azimuth_rad, elevation_rad, range_m))
-
-
-def camera_place(centre_W_m: Array, azimuth_rad: float, elevation_rad: float, range_m: float) -> tuple[Array, Array]:
-    """Position, shape (3,), and quaternion, shape (4,), of `camera_pose`."""
     ca, sa = math.cos(azimuth_rad), math.sin(azimuth_rad)
     ce, se = math.cos(elevation_rad), math.sin(elevation_rad)
     p_WC = centre_W_m + range_m * np.array([ce * ca, ce * sa, -se])
-    return p_WC, quat_multiply(quat_from_euler(0.0, -elevation_rad, azimuth_rad + math.pi), _Q_FC)
+    return Pose(p_WC, quat_multiply(quat_from_euler(0.0, -elevation_rad, azimuth_rad + math.pi), _Q_FC))
 
 
 def camera_twist(

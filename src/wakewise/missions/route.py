@@ -13,7 +13,7 @@ from wakewise.errors import InputError
 from wakewise.geometry import Pose, matrix_from_quat, quat_conjugate, quat_multiply
 from wakewise.interfaces import BodyState, Goal
 from wakewise.missions.aim import CameraAim
-from wakewise.missions.orbit import camera_place, camera_pose, camera_twist, layered_orbits
+from wakewise.missions.orbit import camera_pose, camera_twist, layered_orbits
 from wakewise.missions.order import downstream_first
 from wakewise.missions.settings import MissionSettings
 
@@ -146,21 +146,19 @@ class Route:
     def wished(self, time_s: float, aim: CameraAim) -> tuple[Pose, Array, float]:
         """Wished pose of a body, its twist, shape (6,), and the angle of the camera's joint.
 
-        As `camera` and `tilt` say, but the route is asked once and no pose of the camera is made: control asks this in
-        each of its steps.
+        As `camera` and `tilt` say, which other routes may have their own of; in plain numbers, since control asks this
+        in each of its steps.
         """
-        place, rate = (numbers.tolist() for numbers in self.on_sphere(time_s))
-        v_WC, omega_W = camera_twist(*place, *rate)
-        p_WC, q_WC = camera_place(self.centre_W_m, *place)
-        tilt, tilt_rate = aim.tilt(-place[1], -rate[1])
+        X_WC, v_WC, omega_W = self.camera(time_s)
+        tilt, tilt_rate = self.tilt(time_s, aim)
         X_BC = aim.mount(tilt)
-        q_WB = quat_multiply(q_WC, quat_conjugate(X_BC.q))
+        q_WB = quat_multiply(X_WC.q, quat_conjugate(X_BC.q))
         R_WB = matrix_from_quat(q_WB)
         v_BC, omega_BC = aim.carried(tilt, tilt_rate)
         p, q, r = omega_B = omega_W @ R_WB - omega_BC
         x, y, z = X_BC.p_m
         v_B = v_WC @ R_WB - v_BC - np.array([q * z - r * y, r * x - p * z, p * y - q * x])
-        return Pose(p_WC - R_WB @ X_BC.p_m, q_WB), np.concatenate([v_B, omega_B]), tilt
+        return Pose(X_WC.p_m - R_WB @ X_BC.p_m, q_WB), np.concatenate([v_B, omega_B]), tilt
 
     @cached_property
     def _starts(self) -> list[float]:
