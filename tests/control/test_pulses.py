@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wakewise.control import in_pulses
-from wakewise.control.pulses import PulseState, nearest, pulsed
+from wakewise.control.pulses import PulseState, pulsed
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Command, Goal
 from wakewise.thrusters import ThrustSteps, library_curve
@@ -146,17 +146,3 @@ def test_pulses_are_those_of_the_rule_as_whole_arrays(steps) -> None:
         state, thrusts = pulsed(state, wishes, DT_S, steps, shortest_s)
         for found, want in zip((state.running, state.owed_N_s, thrusts), wanted, strict=True):
             np.testing.assert_allclose(found, want, rtol=1e-12, atol=1e-15)
-
-
-def test_the_nearest_step_is_that_of_the_steps() -> None:
-    """Of wishes within the levels and beyond, for thrusters that run both ways, one way, and by one step alone."""
-    for steps in (
-        T200,
-        PLAIN,
-        ThrustSteps(least_forward_N=0.5, least_reverse_N=0.5, levels_N=np.array([0.5, 0.7, 1.2])),
-        ThrustSteps(least_forward_N=0.5, least_reverse_N=0.5, levels_N=np.array([-0.6])),
-    ):
-        wishes = np.concatenate([np.linspace(-70.0, 70.0, 1001), np.linspace(-1.0, 1.0, 401)])
-        levels = np.empty(0) if steps.levels_N is None else np.array(steps.levels_N)
-        found = [nearest(float(w), steps.least_forward_N, steps.least_reverse_N, levels) for w in wishes]
-        np.testing.assert_array_equal(found, steps.nearest_N(wishes))

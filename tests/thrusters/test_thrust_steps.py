@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from wakewise.errors import InputError
 from wakewise.thrusters import ThrustSteps, library_curve
+from wakewise.thrusters.thrust_steps import nearest
 
 T200 = library_curve("t200")
 AT_16_V = ThrustSteps.of_curve(T200, 16.0)
@@ -67,6 +68,15 @@ def test_what_is_delivered_is_its_twin(steps: ThrustSteps, shape: tuple[int, ...
         delivered = steps.delivered_N(wished)
         assert delivered.shape == shape
         assert np.array_equal(delivered, np.where(runs, steps.nearest_N(wished), 0.0))
+
+
+def test_the_nearest_step_of_one_is_that_of_many() -> None:
+    """Of wishes within the levels and beyond, for thrusters that run both ways, one way, and by one step alone."""
+    one_step = ThrustSteps(least_forward_N=0.5, least_reverse_N=0.5, levels_N=np.array([-0.6]))
+    for steps in (*LEVELS, one_step):
+        wishes = np.concatenate([np.linspace(-70.0, 70.0, 1001), np.linspace(-1.0, 1.0, 401)])
+        found = [nearest(float(w), steps.least_forward_N, steps.least_reverse_N, steps.levels) for w in wishes]
+        np.testing.assert_array_equal(found, steps.nearest_N(wishes))
 
 
 def test_without_levels_only_the_gap_is_left_out() -> None:

@@ -100,6 +100,7 @@ def test_gusts_are_their_readable_twin(scale):
     gust = rng.normal(size=impulse.shape)
     parcels = Parcels.sent(none, impulse, sigma, diameter, np.zeros(len(sigma), np.int64), gust, none)
     first = first_sigma_m(diameter)
-    share = np.clip((sigma - first) / (diameter / 2 - first), 0.0, 1.0) / np.sqrt(row_widening(sigma, diameter))
+    wide = np.array([row_widening(*one) for one in zip(sigma, diameter, strict=True)])
+    share = np.clip((sigma - first) / (diameter / 2 - first), 0.0, 1.0) / np.sqrt(wide)
     expected = impulse + (scale * share * np.linalg.norm(impulse, axis=1))[:, None] * gust
     np.testing.assert_allclose(gusty_impulse_m4_s(parcels, scale), expected, rtol=1e-12)

@@ -288,7 +288,7 @@ def meeting_pairs(layout: Layout) -> tuple[tuple[int, int], ...]:
 
     Only there can the allocation choose between them; other pairs would tie together parts that are searched exactly.
     """
-    moves = [np.flatnonzero(np.any(np.abs(block) > 1e-12, axis=1)) for block in layout.blocks]
+    moves = [np.flatnonzero(own) for own in layout.owners]
     return tuple(sorted({(int(i), int(j)) for own in moves for i in own for j in own if i < j}))
 
 

@@ -23,10 +23,8 @@ from wakewise.arrays import Array, freeze
 from wakewise.compiled import njit
 from wakewise.interfaces import BodyState, Command, Controller, Goal
 from wakewise.thrusters import ThrustSteps
+from wakewise.thrusters.thrust_steps import nearest
 from wakewise.vehicles import Vehicle
-
-_ANY = np.empty(0)
-_ANY.setflags(write=False)  # as the steps of a thruster are: a kernel is compiled for the one or the other
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,9 +64,8 @@ def pulsed(
         What is owed after the step, and the thrusts. Owed is never more than the least thrust times the shortest pulse
         and one step, as long as the wishes lie within the thruster's limits.
     """
-    levels_N = _ANY if steps.levels_N is None else steps.levels_N
     least = (steps.least_forward_N, steps.least_reverse_N)
-    running, owed, thrusts = _pulses(state.running, state.owed_N_s, wished_N, dt_s, shortest_s, *least, levels_N)
+    running, owed, thrusts = _pulses(state.running, state.owed_N_s, wished_N, dt_s, shortest_s, *least, steps.levels)
     return PulseState(running=running, owed_N_s=owed), thrusts
 
 
@@ -95,28 +92,6 @@ def _pulses(running, owed, wished, dt, shortest, least_forward, least_reverse, l
                 thrusts[i] = least_forward if ways[i] > 0.0 else -least_reverse
         owes[i] = owed[i] + (wish - thrusts[i]) * dt
     return ways, owes, thrusts
-
-
-@njit
-def nearest(wish: float, least_forward: float, least_reverse: float, levels: Array) -> float:
-    """`ThrustSteps.nearest_N` of one wish; of no levels all are held."""
-    forward = wish >= 0.0
-    beyond = max(wish, least_forward) if forward else min(wish, -least_reverse)
-    if levels.size == 0:
-        return beyond
-    # The first level that is not below: between `low` and `high` of them.
-    low, high = 0, levels.size
-    while low < high:
-        middle = (low + high) // 2
-        if levels[middle] < beyond:
-            low = middle + 1
-        else:
-            high = middle
-    above = min(max(low, 1), max(levels.size - 1, 1))
-    over, under = levels[min(above, levels.size - 1)], levels[above - 1]
-    found = under if beyond - under < over - beyond else over
-    # A thruster that runs one way only is not turned about to be near.
-    return found if (found > 0.0 if forward else found < 0.0) else 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

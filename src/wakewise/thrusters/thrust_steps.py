@@ -72,11 +72,15 @@ class ThrustSteps:
             least_forward_N=forward, least_reverse_N=-reverse, levels_N=np.unique(thrusts[np.abs(thrusts) > 0.0])
         )
 
+    @property
+    def levels(self) -> Array:
+        """`levels_N` as kernels take them: empty where all thrusts beyond the least are held."""
+        return _NO_LEVELS if self.levels_N is None else self.levels_N
+
     def delivered_N(self, wished_N: ArrayLike) -> Array:
         """Thrusts that wished thrusts of any shape turn into: none below the least, else the nearest step."""
         thrusts = np.array(wished_N, dtype=np.float64, order="C")
-        levels = _NO_LEVELS if self.levels_N is None else self.levels_N
-        _deliver(thrusts.reshape(-1), levels, self.least_forward_N, self.least_reverse_N)
+        _deliver(thrusts.reshape(-1), self.levels, self.least_forward_N, self.least_reverse_N)
         return thrusts
 
     def nearest_N(self, wished_N: ArrayLike) -> Array:
@@ -99,18 +103,21 @@ class ThrustSteps:
 @njit
 def _deliver(thrusts_N: Array, levels_N: Array, least_forward_N: float, least_reverse_N: float) -> None:
     """Turn wished thrusts, shape (n,), in place into those held: 0 in the gap, else as `ThrustSteps.nearest_N`."""
-    last = levels_N.shape[0] - 1
     for i in range(thrusts_N.shape[0]):
         wished = thrusts_N[i]
-        if not (wished >= least_forward_N - _TOLERANCE_N or wished <= -least_reverse_N + _TOLERANCE_N):
-            thrusts_N[i] = 0.0
-            continue
-        forward = wished >= 0.0
-        found = max(wished, least_forward_N) if forward else min(wished, -least_reverse_N)
-        if last >= 0:
-            above = min(max(np.searchsorted(levels_N, found), 1), max(last, 1))
-            low, high = levels_N[above - 1], levels_N[min(above, last)]
-            found = low if found - low < high - found else high
-            # A thruster that runs one way only is not turned about to be near.
-            found = found if (found > 0.0 if forward else found < 0.0) else 0.0
-        thrusts_N[i] = found
+        runs = wished >= least_forward_N - _TOLERANCE_N or wished <= -least_reverse_N + _TOLERANCE_N
+        thrusts_N[i] = nearest(wished, least_forward_N, least_reverse_N, levels_N) if runs else 0.0
+
+
+@njit
+def nearest(wished_N: float, least_forward_N: float, least_reverse_N: float, levels_N: Array) -> float:
+    """`ThrustSteps.nearest_N` of one wish; of no levels all are held."""
+    forward, last = wished_N >= 0.0, levels_N.shape[0] - 1
+    found = max(wished_N, least_forward_N) if forward else min(wished_N, -least_reverse_N)
+    if last < 0:
+        return float(found)
+    above = min(max(np.searchsorted(levels_N, found), 1), max(last, 1))
+    low, high = levels_N[above - 1], levels_N[min(above, last)]
+    found = low if found - low < high - found else high
+    # A thruster that runs one way only is not turned about to be near.
+    return float(found) if (found > 0.0 if forward else found < 0.0) else 0.0

@@ -170,10 +170,10 @@ def confined_velocity(
     return u
 
 
-def row_widening(sigma_m: Array, diameter_m: Array) -> Array:
-    """How much coarser than a young jet's an old one's row may be, shape (n,): from 1 to 1.4."""
-    wide: Array = np.clip(sigma_m / (_OLD_D * diameter_m), 1.0, _OLD_SPACING)
-    return wide
+@njit(inline="always")
+def row_widening(sigma_m: float, diameter_m: float) -> float:
+    """How much coarser than a young jet's an old one's row may be: from 1 to 1.4."""
+    return min(max(sigma_m / (_OLD_D * diameter_m), 1.0), _OLD_SPACING)
 
 
 def gusty_impulse_m4_s(parcels: Parcels, scale: float) -> Array:
@@ -186,15 +186,15 @@ def gusty_impulse_m4_s(parcels: Parcels, scale: float) -> Array:
 
 @njit(nogil=True)
 def gusty_impulses(impulse: Array, gust: Array, sigma: Array, diameter: Array, scale: float) -> Array:
-    """`gusty_impulse_m4_s` of the columns of parcels; `row_widening` is written out."""
+    """`gusty_impulse_m4_s` of the columns of parcels."""
     out = np.empty(impulse.shape)
     for j in range(sigma.shape[0]):
         first = FIRST_D * diameter[j]
         share = min(max((sigma[j] - first) / (0.5 * diameter[j] - first), 0.0), 1.0)
         # Of fewer parcels each may fluctuate less for their sum to fluctuate as much.
-        wide = min(max(sigma[j] / (_OLD_D * diameter[j]), 1.0), _OLD_SPACING)
+        share /= math.sqrt(row_widening(sigma[j], diameter[j]))
         size = math.sqrt(impulse[j, 0] ** 2 + impulse[j, 1] ** 2 + impulse[j, 2] ** 2)
-        part = share * scale / math.sqrt(wide) * size
+        part = share * scale * size
         for k in range(3):
             out[j, k] = impulse[j, k] + part * gust[j, k]
     return out
