@@ -1,11 +1,22 @@
-"""How much power gentle shares may cost: next to nothing in calm water, a fair share where there is wash to save."""
+"""How much power gentle shares may cost: next to nothing in calm water, what it is worth where there is wash."""
 
 import numpy as np
 import pytest
 
 from wakewise.allocation import Weights, least_thrusts
 from wakewise.control import vehicle_layout
-from wakewise.control.thrift import CALM, CALM_M_S, TROUBLE, TROUBLE_M_S, Sharer, allowed, power_law
+from wakewise.control.thrift import (
+    CALM,
+    CALM_M_S,
+    MOST,
+    MOST_M_S,
+    TOO_FAST,
+    TROUBLE,
+    TROUBLE_M_S,
+    Sharer,
+    allowed,
+    power_law,
+)
 from wakewise.geometry import Pose
 from wakewise.thrusters import electrical_power_W
 from wakewise.vehicles import load_vehicle
@@ -26,10 +37,12 @@ VIEW = WakeView(
 )
 
 
-def test_the_bound_rises_from_calm_to_trouble():
-    """The two ends are those set beforehand, between them it never falls."""
-    assert allowed(0.0) == allowed(CALM_M_S) == CALM and allowed(TROUBLE_M_S) == allowed(1.0) == TROUBLE
-    assert np.all(np.diff([allowed(v) for v in np.linspace(0.0, 0.02, 50)]) >= 0.0)
+def test_the_bound_rises_from_calm_to_trouble_and_on():
+    """Calm and trouble are those set beforehand, beyond it goes with the speed, and it never falls."""
+    assert allowed(0.0) == allowed(CALM_M_S) == CALM and allowed(TROUBLE_M_S) == TROUBLE
+    assert allowed(2.0 * TROUBLE_M_S) - 1.0 == pytest.approx(2.0 * (TROUBLE - 1.0))
+    assert allowed(MOST_M_S) == allowed(1.0) == MOST
+    assert np.all(np.diff([allowed(v) for v in np.linspace(0.0, 0.04, 50)]) >= 0.0)
 
 
 def test_the_power_law_is_the_tank_s_own_above_the_least_thrust():
@@ -40,20 +53,53 @@ def test_the_power_law_is_the_tank_s_own_above_the_least_thrust():
     assert float(LAW.power_W(small)) > 1.5 * float(electrical_power_W(small, VEHICLE.disk_areas_m2).sum())
 
 
-@pytest.mark.parametrize(("scale", "most"), [(1e-5, CALM), (1.0, TROUBLE)])
-def test_shares_keep_the_bound_that_the_water_asks_for(scale, most):
-    """Astern push ahead of a target: three tenths more than the least power where jets stir it, little if faint."""
-    wrench = np.array([-4.0, 0.0, 1.0, 0.0, 0.05, 0.0])
+WRENCH = np.array([-4.0, 0.0, 1.0, 0.0, 0.05, 0.0])
+"""Astern push ahead of a target."""
+WEIGHTS = Weights(disturbance=50.0, effort=1e-3)
+
+
+def shared(scale, law=LAW):
+    """Thrusts by a share of the wake's own matrix, and their power over that of the least thrusts."""
     G = scale * VIEW.gram(Pose(np.zeros(3)))
-    sharer = Sharer(layout=LAYOUT, law=LAW)
-    weights = Weights(disturbance=150.0 / 3.0 / scale, effort=1e-3)
-    seen = Seen(gram=G, sent=G)
-    found, least = sharer.shares(wrench, seen, weights, 3.0), least_thrusts(LAYOUT, wrench, G)
-    free = Sharer(layout=LAYOUT).shares(wrench, seen, weights, 3.0)
-    ratio = float(LAW.power_W(found.thrusts_N) / LAW.power_W(least.thrusts_N))
-    assert float(LAW.power_W(free.thrusts_N) / LAW.power_W(least.thrusts_N)) > TROUBLE
-    assert ratio <= most + 1e-9 and ratio > 0.95 * most
-    assert free.disturbance < found.disturbance < least.disturbance
+    found = Sharer(layout=LAYOUT, law=law).shares(WRENCH, Seen(gram=G, sent=G), WEIGHTS, 3.0)
+    least = least_thrusts(LAYOUT, WRENCH, G)
+    return found, least, float(LAW.power_W(found.thrusts_N) / LAW.power_W(least.thrusts_N))
+
+
+def speed_m_s(scale):
+    """What the least thrusts leave at the target, by the wake model and what it is known to be wrong by."""
+    G = scale * VIEW.gram(Pose(np.zeros(3)))
+    return float(np.sqrt(least_thrusts(LAYOUT, WRENCH, G).disturbance / 3.0)) / TOO_FAST
+
+
+def test_trouble_is_worth_half_as_much_power_again():
+    """Jets straight at the target are taken away whole, and little is paid for where they are faint."""
+    found, least, ratio = shared(1.0)
+    assert speed_m_s(1.0) > MOST_M_S and TROUBLE < ratio < MOST
+    assert found.disturbance < 0.05 * least.disturbance
+    faint, _, little = shared(0.1 * (CALM_M_S / speed_m_s(1.0)) ** 2)
+    assert little <= CALM + 1e-9 and faint.disturbance <= least.disturbance
+
+
+@pytest.mark.parametrize("speed", [0.006, 0.012, 0.02])
+def test_shares_keep_the_bound_that_the_water_asks_for(speed):
+    """At whatever speed the least thrusts leave; without a law of power shares cost what they cost."""
+    scale = (speed / speed_m_s(1.0)) ** 2
+    assert speed_m_s(scale) == pytest.approx(speed)
+    found, least, ratio = shared(scale)
+    free, _, dear = shared(scale, law=None)
+    assert 1.0 <= ratio <= allowed(speed) + 1e-9
+    assert dear > TROUBLE and free.disturbance <= found.disturbance <= least.disturbance
+
+
+def test_two_shares_are_compared_by_cost_and_power():
+    """Two percent of power must save a percent of speed, over what counts as calm; without a law the cost decides."""
+    sharer, calm = Sharer(layout=LAYOUT, law=LAW), WEIGHTS.disturbance * 3.0 * (TOO_FAST * CALM_M_S) ** 2
+    T = np.ones(8)
+    worth = sharer.worth(9.0 * calm, T, WEIGHTS, 3.0)
+    assert sharer.worth(9.0 * calm, 2.0 ** (2.0 / 3.0) * T, WEIGHTS, 3.0) == pytest.approx(2.0 * worth)
+    assert sharer.worth(4.0 * calm, 2.0 ** (2.0 / 3.0) * T, WEIGHTS, 3.0) == pytest.approx(worth)
+    assert Sharer(layout=LAYOUT).worth(7.0, T, WEIGHTS, 3.0) == 7.0
 
 
 def test_what_may_join_a_jet_opens_no_bound():

@@ -9,7 +9,7 @@ comes in as the Gram matrix G of `s' G s`, where s are roots of thrusts.
 Start reading in `allocate.py` (what is asked and answered). `layout.py` is the matrix and its null space, `reach.py`
 what the limits leave. The search for the minimum: `search.py` for one or two spare thrusts, `boxes.py` with
 `cells.py` and `coupled.py` (branch and bound) for more, `convex.py` for the convex cost of effort alone.
-`power.py` keeps what was found within a bound on electrical power.
+`power.py` leaves what is not worth its electrical power, and keeps a bound on it.
 """
 
 from wakewise.allocation.allocate import (
@@ -22,7 +22,7 @@ from wakewise.allocation.allocate import (
     least_thrusts,
     pseudo_inverse,
 )
-from wakewise.allocation.power import PowerLaw, within_power
+from wakewise.allocation.power import PowerLaw, worth, worthiest
 
 __all__ = [
     "Allocation",
@@ -34,5 +34,6 @@ __all__ = [
     "gentle_allocation",
     "least_thrusts",
     "pseudo_inverse",
-    "within_power",
+    "worth",
+    "worthiest",
 ]

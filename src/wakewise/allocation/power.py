@@ -10,15 +10,16 @@ Why not a higher price on effort. D is made of roots of thrusts, so along a way 
 rests and its weighted sum with effort has minima at rests alone: with a rising price the minimum jumps from the
 gentlest shares to about the least ones, past all that the bound allows.
 
-Which part is worth most: parts of the null space that share no thruster (the horizontal ones, the vertical ones) are
-gone along one after the other, in each order, as far as is cheapest and the power that is left allows; the cheapest
-result is taken.
+What is worth its power. Some of a way saves nearly all of the wash and some next to nothing, at the same price. So the
+parts of the null space that share no thruster (the horizontal ones, the vertical ones) are each gone along by
+themselves, and of all such points within the bound that of the least product of cost and power is taken: D goes as the
+square of a speed, so two percent of power must save a percent of it. The cost of what may count as calm is added to
+all, as nobody gains by water stiller than that.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import permutations
 
 import numpy as np
 
@@ -28,9 +29,10 @@ from wakewise.allocation.search import cost
 from wakewise.arrays import Array, freeze
 from wakewise.compiled import njit
 
-_SHARES = np.linspace(0.0, 1.0, 33)
-_MOST_ORDERED = 3
-"""Parts of the null space up to which each order is tried; beyond, only that in which they are listed."""
+_PARTS = 3
+"""Most parts of the null space gone along by themselves; what a layout has beyond goes with the last of them."""
+_STEPS = {0: 1, 1: 32, 2: 16, 3: 8}
+"""Steps on the way along each part, by the number of parts."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,37 +59,66 @@ class PowerLaw:
 
 
 @njit
-def _power_of(rows, forward, reverse, least_forward, least_reverse):  # type: ignore[no-untyped-def]
-    """`PowerLaw.power_W` of rows of thrusts, shape (r, n)."""
-    power = np.zeros(rows.shape[0])
-    for r in range(rows.shape[0]):
-        for i in range(rows.shape[1]):
-            T = rows[r, i]
-            each, least = (forward[i], least_forward) if T >= 0.0 else (reverse[i], least_reverse)
-            power[r] += each * abs(T) * np.sqrt(max(abs(T), least))
+def _power(T, forward, reverse, least_forward, least_reverse):  # type: ignore[no-untyped-def]
+    """`PowerLaw.power_W` of thrusts, shape (n,)."""
+    power = 0.0
+    for i in range(T.size):
+        each, least = (forward[i], least_forward) if T[i] >= 0.0 else (reverse[i], least_reverse)
+        power += each * abs(T[i]) * np.sqrt(max(abs(T[i]), least))
     return power
 
 
 @njit
-def _costs_of(rows, G, previous, weights):  # type: ignore[no-untyped-def]
-    """`cost` of rows of thrusts, shape (r, n)."""
-    costs = np.empty(rows.shape[0])
+def _power_of(rows, forward, reverse, least_forward, least_reverse):  # type: ignore[no-untyped-def]
+    """`PowerLaw.power_W` of rows of thrusts, shape (r, n)."""
+    power = np.empty(rows.shape[0])
     for r in range(rows.shape[0]):
-        costs[r] = cost(G, rows[r], previous, weights)
-    return costs
+        power[r] = _power(rows[r], forward, reverse, least_forward, least_reverse)
+    return power
 
 
-def within_power(
+@njit
+def _worthiest(  # type: ignore[no-untyped-def]
+    least, ways, steps, forward, reverse, least_forward, least_reverse, most_W, calm, G, previous, weights
+):
+    """Thrusts of the least `worth` on the grid of `steps` along each of `ways`, shape (k, n), within `most_W`.
+
+    Those that begin it, `least`, count whatever they need.
+    """
+    best, thrusts = least.copy(), np.empty(least.size)
+    value = np.inf
+    for point in range((steps + 1) ** ways.shape[0]):
+        thrusts[:] = least
+        rest = point
+        for way in ways:
+            thrusts += rest % (steps + 1) / steps * way
+            rest //= steps + 1
+        power = _power(thrusts, forward, reverse, least_forward, least_reverse)
+        if power <= most_W or point == 0:
+            own = (cost(G, thrusts, previous, weights) + calm) * power
+            if own < value:
+                value = own
+                best[:] = thrusts
+    return best
+
+
+def worth(cost_: float, power_W: float, calm: float) -> float:
+    """What shares are compared by: the product of power and of cost over what is calm; less is better."""
+    return (cost_ + calm) * power_W
+
+
+def worthiest(
     layout: Layout,
     found: Allocation,
     least_N: Array,
     law: PowerLaw,
     most_W: float,
+    calm: float,
     gram: Array,
     weights: Weights,
     previous_N: Array | None = None,
 ) -> Allocation:
-    """The gentlest shares found, or what lies between them and the least ones within a bound on power.
+    """Of what lies between the least thrusts and the gentlest found: the shares that are worth their power most.
 
     Parameters
     ----------
@@ -97,6 +128,9 @@ def within_power(
         Thrusts of the same wrench; where they alone need more than `most_W`, they are the answer.
     law : PowerLaw
     most_W : float
+        Bound on power.
+    calm : float
+        Cost of what counts as calm, in the units of the weights.
     gram : ndarray, shape (2 n, 2 n)
     weights : Weights
     previous_N : ndarray, shape (n,), optional
@@ -105,24 +139,16 @@ def within_power(
     Returns
     -------
     Allocation
-        With the gap of `found`, which is that of the minimum without a bound.
+        With the gap of `found`, which is that of the minimum of cost alone.
     """
-    if float(law.power_W(found.thrusts_N)) <= most_W:
-        return found
-    G, packed = np.array(gram), weights.packed
-    previous = np.zeros(len(least_N)) if previous_N is None else np.array(previous_N)
-    ways = [np.where(own, found.thrusts_N - least_N, 0.0) for own in layout.owners]
-    orders = permutations(ways) if len(ways) <= _MOST_ORDERED else (tuple(ways),)
-    best = np.array(least_N)
-    value = float(cost(G, best, previous, packed))
-    for order in orders:
-        thrusts, spent = np.array(least_N), value
-        for way in order:
-            tried = thrusts + _SHARES[:, None] * way
-            tried = tried[: max(int(np.count_nonzero(law.power_W(tried) <= most_W)), 1)]
-            costs = _costs_of(tried, G, previous, packed)
-            least = int(costs.argmin())
-            thrusts, spent = tried[least], float(costs[least])
-        if spent < value:
-            best, value = thrusts, spent
+    G, base = np.array(gram), np.array(least_N, dtype=np.float64)
+    previous = np.zeros(len(base)) if previous_N is None else np.array(previous_N, dtype=np.float64)
+    parts = list(layout.owners[: _PARTS - 1])
+    if len(layout.owners) >= _PARTS:
+        parts.append(layout.owners[_PARTS - 1 :].any(axis=0))
+    ways = np.array([np.where(own, found.thrusts_N - base, 0.0) for own in parts]).reshape(-1, len(base))
+    best = _worthiest(
+        base, ways, _STEPS[len(parts)], law.forward, law.reverse, law.least_forward_N, law.least_reverse_N, most_W,
+        calm, G, previous, weights.packed,
+    )  # fmt: skip
     return replace(found, thrusts_N=best, wrench_B=layout.B @ best, disturbance=disturbance_of(G, best))

@@ -43,7 +43,8 @@ class LeverSettings(Settings):
         default=True, description="follow the jets as the current bends, stops and brings them; needs spare"
     )
     thrift: bool = Field(
-        default=True, description="bound the power that gentle shares cost by what the least thrusts would stir"
+        default=True,
+        description="gentle shares only as far as they are worth their power, and bounded by what there is to save",
     )
     posture: bool | None = Field(
         default=None,

@@ -1,12 +1,14 @@
-"""How much power gentle shares may cost: more where there is something to save, next to nothing where there is not.
+"""How much power gentle shares may cost: what it is worth, within a bound that goes with what there is to save.
 
 Sparing a target means load on fewer thrusters, and those need more power for the same wrench, up to 1.7 times. That is
-bought where the least thrusts would stir the target's water, and wasted where they would not. So the bound on power,
-over that of the least thrusts, goes with the speed that these would leave at the target, by the wake model and what it
-is known to be wrong by: `CALM` up to `CALM_M_S`, `TROUBLE` from `TROUBLE_M_S`, straight in between. The numbers were
-set beforehand: a flight may cost 1.3 times the energy of `dp` where that leaves more than 10 mm/s, 1.05 times where it
-leaves less than 5 (docs/decisions/0036). Of what lies above 1, a twentieth stays for what the bound does not see:
-pulses, the lag of rotors, corrections between two searches.
+bought where the least thrusts would stir the target's water, and wasted where they would not. So shares must save a
+percent of speed for two percent of power (`allocation.power`), and the bound on power over that of the least thrusts
+goes with the speed that these would leave at the target, by the wake model and what it is known to be wrong by: `CALM`
+up to `CALM_M_S`, `TROUBLE` at `TROUBLE_M_S`, from there on in proportion to the speed up to `MOST` at `MOST_M_S`,
+straight in between. The first two were set beforehand: a flight may cost 1.3 times the energy of `dp` where that leaves
+more than 10 mm/s, 1.05 times where it leaves less than 5 (docs/decisions/0036). Of what lies above 1, a twentieth stays
+for what the bound does not see: pulses, the lag of rotors, corrections between two searches. An instant may cost more
+than a flight, since what is not worth it elsewhere pays (docs/decisions/0065).
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ from wakewise.allocation import (
     compile_layout,
     disturbance_of,
     gentle_allocation,
-    within_power,
+    worth,
+    worthiest,
 )
 from wakewise.allocation.reach import within_limits
 from wakewise.arrays import Array
@@ -38,7 +41,9 @@ KEPT = 0.95
 cost 1.307 and 1.299 times the energy of `dp`."""
 CALM, TROUBLE = 1.0 + KEPT * 0.05, 1.0 + KEPT * 0.3
 """Most power over that of the least thrusts, where these leave the target's water calm, and where they do not."""
-CALM_M_S, TROUBLE_M_S = 0.005, 0.010
+CALM_M_S, TROUBLE_M_S, MOST_M_S = 0.005, 0.010, 0.025
+MOST = 1.0 + (TROUBLE - 1.0) * MOST_M_S / TROUBLE_M_S
+"""About what the gentlest shares of a heavy vehicle need."""
 TOO_FAST = 2.6
 """How many times too fast the wake model has the target's water under the least thrusts, jets carried by the current:
 the median over ten hovers of `dp` in seven worlds (2 to 8 where it sees the wash that is there; in three, where next to
@@ -47,8 +52,7 @@ none of it comes straight, a half and less)."""
 
 def allowed(speed_m_s: float) -> float:
     """Most power over that of the least thrusts, if these leave a mean speed at the target."""
-    share = min(max((speed_m_s - CALM_M_S) / (TROUBLE_M_S - CALM_M_S), 0.0), 1.0)
-    return CALM + share * (TROUBLE - CALM)
+    return float(np.interp(speed_m_s, (CALM_M_S, TROUBLE_M_S, MOST_M_S), (CALM, TROUBLE, MOST)))
 
 
 def power_law(vehicle: Vehicle) -> PowerLaw:
@@ -65,7 +69,7 @@ def power_law(vehicle: Vehicle) -> PowerLaw:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sharer:
-    """Gentle shares of a wrench, within the bound on power if there is a power law."""
+    """Gentle shares of a wrench that are worth their power, within the bound on it, if there is a power law."""
 
     layout: Layout
     law: PowerLaw | None = None
@@ -83,11 +87,23 @@ class Sharer:
         least_N, _ = within_limits(self.layout, self.layout.inverse @ wrench_B)
         speed_m_s = math.sqrt(max(disturbance_of(seen.sent, least_N), 0.0) / total_weight) / TOO_FAST
         most_W = allowed(speed_m_s) * float(self.law.power_W(least_N))
-        return within_power(self.layout, found, least_N, self.law, most_W, seen.gram, weights, previous_N)
+        calm = _calm(weights, total_weight)
+        return worthiest(self.layout, found, least_N, self.law, most_W, calm, seen.gram, weights, previous_N)
+
+    def worth(self, cost: float, thrusts_N: Array, weights: Weights, total_weight: float) -> float:
+        """What shares of one wrench, shape (n,), are compared by: less is better; the cost alone if no law is known."""
+        if self.law is None:
+            return cost
+        return worth(cost, float(self.law.power_W(thrusts_N)), _calm(weights, total_weight))
+
+
+def _calm(weights: Weights, total_weight: float) -> float:
+    """Cost of the disturbance that counts as calm."""
+    return weights.disturbance * total_weight * (TOO_FAST * CALM_M_S) ** 2
 
 
 def sharer_of(vehicle: Vehicle, settings: ControlSettings) -> Sharer:
-    """What shares a vehicle's wrenches out, within the bound on power if that lever is on."""
+    """What shares a vehicle's wrenches out, with an eye on power if that lever is on."""
     layout = compile_layout(vehicle.allocation_matrix, vehicle.thrust_lower_N, vehicle.thrust_upper_N)
     return Sharer(layout=layout, law=power_law(vehicle) if settings.levers.thrift else None)
 

@@ -77,11 +77,16 @@ class Watch:
         return Flow(current_W_m_s=current, unsure_m_s=unsure_m_s, thrusts_N=thrusts_N)
 
     def cost(self, thrusts_N: Array, gram: Array, previous_N: Array | None = None) -> float:
-        """Cost of thrusts, shape (n,), by a Gram matrix; with thrusts of before, the price on change is in it."""
+        """What shares of a wrench, shape (n,), are compared by under a Gram matrix: their cost and their power.
+
+        With thrusts of before, the price on change is in it.
+        """
         weights = self.weights
         value = weights.disturbance * disturbance_of(gram, thrusts_N) + weights.effort * float(thrusts_N @ thrusts_N)
-        change = None if previous_N is None else thrusts_N - previous_N
-        return value if change is None else value + weights.previous * float(change @ change)
+        if previous_N is not None:
+            change = thrusts_N - previous_N
+            value += weights.previous * float(change @ change)
+        return self.sharer.worth(value, thrusts_N, weights, self.view.total_weight)
 
     def moved(self, wrench_B: Array, previous_N: Array) -> Array:
         """Thrusts of before with the least change that makes another wrench, shape (n,), whatever the limits."""
