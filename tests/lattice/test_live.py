@@ -85,22 +85,27 @@ def test_a_jet_decays_as_published():
 
 
 def test_a_current_goes_round_a_body_and_stays_what_it_was_beside():
-    """After it has passed twice the box's length it has its speed upstream, none in the body, less behind it."""
-    cells = (40, 30, 20)
+    """From once to three times the box's length it has its speed upstream, none in the body, less behind it, in the
+    mean: an instant of an eddying wake is another on every processor.
+    """
+    cells = (40, 46, 20)
     solid = np.zeros(cells, bool)
-    solid[14:18, 12:18, 12:] = True
+    solid[14:18, 20:26, 12:] = True
     water = box(cells, current=(0.1, 0.0, 0.0), solid=solid, fastest_m_s=0.5)
-    while water.time_s < 2 * 0.8 / 0.1:
-        water.advance(NOTHING, NOTHING)
     places = {
         "upstream": [-0.1, 0.0, 0.2],
         "body": [0.12, 0.0, 0.32],
         "lee": [0.2, 0.0, 0.32],
         "beside": [0.12, 0.24, 0.1],
     }
-    speeds = dict(zip(places, water.velocity(np.array(list(places.values())))[:, 0], strict=True))
-    assert speeds["upstream"] == pytest.approx(0.1, rel=0.15) and speeds["beside"] == pytest.approx(0.1, rel=0.25)
-    assert speeds["body"] == pytest.approx(0.0, abs=1e-6) and speeds["lee"] < 0.05
+    seen, passage_s = [], 0.8 / 0.1
+    while water.time_s < 3 * passage_s:
+        water.advance(NOTHING, NOTHING)
+        if water.time_s > passage_s:
+            seen.append(water.velocity(np.array(list(places.values())))[:, 0])
+    speeds = dict(zip(places, np.mean(seen, axis=0), strict=True))
+    assert speeds["upstream"] == pytest.approx(0.1, rel=0.05) and speeds["beside"] == pytest.approx(0.1, rel=0.15)
+    assert speeds["body"] == pytest.approx(0.0, abs=1e-6) and speeds["lee"] < 0.03
 
 
 def test_what_it_cannot_compute_is_refused_or_told():
