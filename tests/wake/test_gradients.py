@@ -33,6 +33,9 @@ POSITIONS = np.array([[x, y, 0.05] for x in (0.17, -0.17) for y in (0.13, -0.13)
                      + [[x, y, 0.0] for x in (0.225, -0.225) for y in (0.175, -0.175)])  # fmt: skip
 AXES = np.array([[H, -H, 0], [H, H, 0], [H, H, 0], [H, -H, 0], *[[0.0, 0.0, 1.0]] * 4])
 AREAS = np.full(8, np.pi * 0.03**2)
+# Read-only as a vehicle's and a region's are, so that kernels are those that planners use.
+for _known in (POSITIONS, AXES, AREAS):
+    _known.flags.writeable = False
 THRUSTS = np.array([2.0, -1.5, 0.7, -3.0, 1.2, -0.4, 5.0, -2.2])
 
 SMOOTH = PowerJet(label="smooth", edge_width_rad=np.deg2rad(6.0))
@@ -52,7 +55,9 @@ def region(n=150, seed=0):
     rng = np.random.default_rng(seed)
     points = rng.normal(size=(n, 3))
     points *= 0.09 * rng.random((n, 1)) ** (1 / 3) / np.linalg.norm(points, axis=1)[:, None]
-    return CENTRE + points, np.exp(-rng.random(n))
+    placed, weights = CENTRE + points, np.exp(-rng.random(n))
+    placed.flags.writeable = weights.flags.writeable = False
+    return placed, weights
 
 
 def pose(away=(0.25, 0.15, -0.45)):

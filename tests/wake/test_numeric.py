@@ -15,6 +15,7 @@ VEHICLE = load_vehicle("paper")
 X_WB = Pose(np.array([-0.6, 0.05, 1.0]), quat_from_euler(0.02, -0.35, 0.05))
 RNG = np.random.default_rng(3)
 POINTS, WEIGHTS = np.array([0.0, 0.0, 1.35]) + RNG.uniform(-0.12, 0.12, (60, 3)), RNG.uniform(0.2, 1.0, 60)
+POINTS.flags.writeable = WEIGHTS.flags.writeable = False  # as a region's are
 BODY = (VEHICLE.thruster_positions_B_m, VEHICLE.thruster_axes_B, VEHICLE.disk_areas_m2)
 THRUSTS_N = np.array([1.2, -0.7, -2.0, 0.4, 0.9, -1.1, 0.3, 2.0])
 

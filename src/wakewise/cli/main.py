@@ -8,6 +8,7 @@ import signal
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import cache
 from types import TracebackType
 from typing import Any
 
@@ -101,13 +102,19 @@ def _root(
         typer.echo(context.get_help())
 
 
+@cache
+def _commands() -> Any:
+    """All commands with their options, put together once however many are run in a process."""
+    return typer.main.get_command(app)
+
+
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code.
 
     0 done, 1 failed on good input, 2 bad input, 130 stopped by Ctrl-C, 143 ended by SIGTERM.
     """
     try:
-        code = app(args=arguments, standalone_mode=False)
+        code = _commands()(args=arguments, standalone_mode=False)
         sys.stdout.flush()
         if code == _INTERRUPTED:  # Ctrl-C inside a command
             return _stopped()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -10,12 +11,17 @@ import numpy as np
 import polars as pl
 
 from wakewise.geometry import quat_from_euler
-from wakewise.targets import coral, write_mesh
+from wakewise.targets import Mesh, coral, write_mesh
 
 POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
 TWIST = ("u_m_s", "v_m_s", "w_m_s", "p_rad_s", "q_rad_s", "r_rad_s")
 WRENCH = ("X_N", "Y_N", "Z_N", "K_Nm", "M_Nm", "N_Nm")
-MESH = coral("brain", 1)
+
+
+@cache
+def target_mesh() -> Mesh:
+    """The target of all of them."""
+    return coral("brain", 1)
 
 
 def make_trial(folder: Path, seed: int = 1, thrusters: int = 3, photographs: int = 2, real: bool = False) -> Path:
@@ -55,7 +61,7 @@ def make_trial(folder: Path, seed: int = 1, thrusters: int = 3, photographs: int
         f"pilot: route\nworld: payload\ntarget:\n  kind: {kind}\n"
     )
     if not real:
-        write_mesh(folder / "truth.ply", MESH)
+        write_mesh(folder / "truth.ply", target_mesh())
         camera = {"width": 8, "height": 6, "fx": 9.0, "fy": 9.0, "cx": 4.0, "cy": 3.0}
         (folder / "camera.json").write_text(json.dumps(camera))
         (folder / "metrics.json").write_text(

@@ -13,7 +13,7 @@ import polars as pl
 import pytest
 import trimesh
 from croissant_rules import complaints
-from made_trials import MESH, POSE, make_trial
+from made_trials import POSE, make_trial, target_mesh
 
 from wakewise.cli.main import run
 from wakewise.errors import InputError
@@ -110,7 +110,7 @@ def test_photographs_and_surfaces_are_the_same_bytes_and_places(campaign: Path, 
         taken = (campaign / "trials" / "2c3d" / "images" / name).read_bytes()
         assert (folder / "known" / "2c3d" / "images" / name).read_bytes() == taken
     mesh = trimesh.load(folder / "truth" / "2c3d" / "target.ply", process=False)
-    np.testing.assert_allclose(mesh.vertices, MESH.vertices_m, atol=1e-6)
+    np.testing.assert_allclose(mesh.vertices, target_mesh().vertices_m, atol=1e-6)
     assert "/home" not in (folder / "truth" / "2c3d" / "scenario.yaml").read_text()
     assert "kind: coral.ply" in (folder / "truth" / "2c3d" / "scenario.yaml").read_text()
 

@@ -1,0 +1,76 @@
+"""Which process of several runs which file of the tests next."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Sequence
+
+BESIDE = (
+    "tests/benches/test_campaign_bench.py",
+    "tests/campaigns/",
+    "tests/cli/test_campaign_command.py",
+    "tests/cli/test_computer_faults.py",
+    "tests/cli/test_heartbeat.py",
+    "tests/cli/test_link_meter_command.py",
+    "tests/cli/test_link_sitl_command.py",
+    "tests/cli/test_link_wire_commands.py",
+    "tests/cockpit/test_pictures.py",
+    "tests/cockpit/test_server.py",
+    "tests/links/ardusub/test_ardusub_page.py",
+    "tests/links/autopilot/test_behind_real_bytes.py",
+    "tests/links/sensors/",
+    "tests/meter/",
+    "tests/reconstruction/test_colmap.py",
+    "tests/studies/gentle/test_gentle_bench.py",
+    "tests/test_alone.py",
+    "tests/test_core.py",
+    "tests/trials/test_surface_maker.py",
+)
+"""Files and folders whose tests mostly wait, for a clock or for another process, and load few kernels themselves."""
+LONGEST = "tests/trials/test_whole_trial.py"
+"""Takes twice as long as any other: begun last, it would be waited for."""
+
+
+def room_of(file: str) -> str:
+    """The folder in `tests/` that a file lies in, however deep; a file that lies in none is its own."""
+    return "/".join(file.split("/")[:2])
+
+
+def waits(file: str) -> bool:
+    """Whether its tests mostly wait."""
+    return file.startswith(BESIDE)
+
+
+def next_file(left: Sequence[str], begun: Collection[str], own: str | None, waiter: bool | None) -> str | None:
+    """The file to run next of those that are left, in their order; None if there is none for this process.
+
+    A room's kernels are loaded, and what its tests share is made, once in each process that enters it. So a process
+    stays in its own room, then enters one that nobody has begun, then helps in that with the most files left. `LONGEST`
+    comes before all.
+
+    Parameters
+    ----------
+    left : sequence of str
+    begun : collection of str
+        Rooms that some process has entered.
+    own : str or None
+        The room that this process is in.
+    waiter : bool or None
+        Whether this is the process for what mostly waits, which runs nothing else. The others then run that only
+        when nothing else is left; None if there is no such process, and files are alike.
+    """
+    if waiter:
+        return next((file for file in left if waits(file)), None)
+    files = left if waiter is None else [file for file in left if not waits(file)] or left
+    if LONGEST in files:
+        return LONGEST
+    for file in files:
+        if room_of(file) == own:
+            return file
+    for file in files:
+        if room_of(file) not in begun:
+            return file
+    if not files:
+        return None
+    ((fullest, _),) = Counter(map(room_of, files)).most_common(1)
+    return next(file for file in reversed(files) if room_of(file) == fullest)
