@@ -111,18 +111,24 @@ def run_trial(
             _ = parts.target  # a file that cannot be read is refused before minutes of compiling
         with watch.stage("compile") as progress:
             warm(JOBS, progress)
-    if not _is_flown(folder):
-        _ = parts.pilot, parts.preflight
-    claim(folder, scenario)
-    with alone(folder), SurfaceMaker(folder, scenario.reconstruction, parts.target.bed_z_m) as surface:
-        result = _figures(parts, scenario, folder, watch, surface.ready if meanwhile is not None else lambda: None)
-        if told is not None:
-            told(result)
-        surface.make(watch, meanwhile)
-        return result
+    with Darkroom(parts, folder) as darkroom:
+        if not _is_flown(folder):
+            if not _by_hand(parts):
+                darkroom.ready()  # loads and makes its scene while this process looks through the parts
+            _ = parts.pilot, parts.preflight
+        claim(folder, scenario)
+        with alone(folder), SurfaceMaker(folder, scenario.reconstruction, parts.target.bed_z_m) as surface:
+            modelled = surface.begin if meanwhile is not None else lambda: None
+            result = _figures(parts, scenario, folder, watch, darkroom, modelled)
+            if told is not None:
+                told(result)
+            surface.make(watch, meanwhile)
+            return result
 
 
-def _figures(parts: Parts, scenario: Scenario, folder: Path, watch: Watch, modelled: Callable[[], None]) -> Figures:
+def _figures(
+    parts: Parts, scenario: Scenario, folder: Path, watch: Watch, darkroom: Darkroom, modelled: Callable[[], None]
+) -> Figures:
     """Run the stages that figures come from and write metrics.json; `modelled` is called when the model is there."""
     ledger = Ledger(folder / "stages.json")
 
@@ -136,9 +142,8 @@ def _figures(parts: Parts, scenario: Scenario, folder: Path, watch: Watch, model
     _forget_what_was_not_measured(folder)
     if not has_parts(folder):  # a flight by hand has no plan
         stage("plan", "planned.csv", lambda _: write_plan(parts, folder))
-    with Darkroom(parts, folder) as darkroom:
-        stage("fly", "steps.parquet", lambda progress: _fly(parts, folder, darkroom, progress))
-        stage("photograph", "images.csv", lambda progress: _photograph(parts, folder, darkroom, progress))
+    stage("fly", "steps.parquet", lambda progress: _fly(parts, folder, darkroom, progress))
+    stage("photograph", "images.csv", lambda progress: _photograph(parts, folder, darkroom, progress))
     stage("reconstruct", "model.json", lambda progress: reconstruct_trial(parts, folder, progress))
     modelled()
     stage("evaluate", "score.json", lambda _: write_json(folder / "score.json", evaluate_trial(parts, folder)))
@@ -157,11 +162,15 @@ def _is_flown(folder: Path) -> bool:
     return (folder / "steps.parquet").exists() or has_parts(folder)
 
 
+def _by_hand(parts: Parts) -> bool:
+    return parts.scenario.pilot == BY_HAND and "pilot" not in parts.given
+
+
 def _fly(parts: Parts, folder: Path, darkroom: Darkroom, progress: Callable[..., None]) -> None:
     """Fly, or put together what a flight by hand left that was cut off."""
     if gather(parts, folder):
         return
-    if parts.scenario.pilot == BY_HAND and "pilot" not in parts.given:
+    if _by_hand(parts):
         fly_hands(parts, folder)
     else:
         darkroom.ready()
