@@ -1,7 +1,8 @@
-"""Mesh and colours of a trial's model, for people: made by a process of their own while the model is judged and the report begun.
+"""Mesh and colours of a trial's model, for people: made by a process of their own beside evaluation and report.
 
 COLMAP's mesher holds Python's lock for as long as it works, ten seconds and more: a thread would hold up all others,
-and Ctrl-C with them. The other process begins when it is told to, and ends when whoever started it ends, however that ends.
+and Ctrl-C with them. The other process begins as soon as there is a model, and ends when whoever started it ends,
+however that ends.
 """
 
 from __future__ import annotations
@@ -87,7 +88,9 @@ class SurfaceMaker:
             self._asked = self._begin()
 
     def make(self, watch: Watch, meanwhile: Callable[[str], None] | None = None) -> None:
-        """Make what is missing or wait for what is begun, and call `meanwhile("mesh")` beside the mesh and `meanwhile("colours")` beside these.
+        """Make what is missing, or wait for what is begun.
+
+        `meanwhile("mesh")` is called beside the mesh and `meanwhile("colours")` beside these.
 
         Without anything to do meanwhile it is made in this process, which costs no second loading of libraries.
 

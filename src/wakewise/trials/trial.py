@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from wakewise.arrays import Array
 from wakewise.errors import InputError, StageError
 from wakewise.evaluation import SWAY_FIGURES, Crop, compare_surface, evaluate_surface, flight_figures
 from wakewise.extras import need
@@ -33,7 +34,7 @@ from wakewise.operation.flying import FLIGHT_JOBS
 from wakewise.operation.trial_folder import BY_HAND, as_flown, check_place, claim, write_plan
 from wakewise.processes import alone
 from wakewise.reconstruction import read_cloud, read_lens, reconstruct
-from wakewise.targets import Mesh, coral_kinds
+from wakewise.targets import Mesh, MeshDistance, coral_kinds
 from wakewise.trials.coverage import FROM_MODEL, coverage_figures
 from wakewise.trials.metrics import Figures, Gathering, comparison
 from wakewise.trials.size import SIZE_FIGURES, size_figures
@@ -274,16 +275,19 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
     gathering.add({key: summary.get(key) for key in _MODEL_FIGURES})
     if failure is None:
         try:
+            cloud, mesh = read_cloud(folder / "dense.ply").points_m, parts.target.mesh
+            distance = MeshDistance(mesh.vertices_m, mesh.faces)
             compared = compare_surface(
-                read_cloud(folder / "dense.ply").points_m,
-                parts.target.mesh,
+                cloud,
+                mesh,
+                distance=distance,
                 crop=Crop(bed_z_m=parts.target.bed_z_m),
                 camera_centres_W_m=photos.select("true_x_m", "true_y_m", "true_z_m").to_numpy(),
             )
             gathering.add(coverage_figures(parts, photos, compared.points_W_m))
             gathering.add({key: getattr(compared.score, key) for key in (*_SURFACE_FIGURES, "success")})
-            gathering.add({"rmse_mean_shape_mm": _rmse_mean_shape_mm(parts, folder)})
-            gathering.add(_size(parts, folder, photos))
+            gathering.add({"rmse_mean_shape_mm": _rmse_mean_shape_mm(parts, folder, cloud)})
+            gathering.add(_size(parts, folder, photos, cloud, distance))
         except StageError as fault:
             failure = str(fault)
     if parts.yielding is None:
@@ -296,7 +300,7 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
     return {"figures": gathering.figures, "reasons": gathering.reasons}
 
 
-def _rmse_mean_shape_mm(parts: Parts, folder: Path) -> float | None:
+def _rmse_mean_shape_mm(parts: Parts, folder: Path, cloud: Array) -> float | None:
     """`rmse_mm` against the mean of the shapes that were photographed; None of a target that does not yield."""
     if parts.yielding is None:
         return None
@@ -306,19 +310,19 @@ def _rmse_mean_shape_mm(parts: Parts, folder: Path) -> float | None:
     moved = np.mean([moved_m(parts, exposure) for exposure in exposures], axis=0)
     mesh = parts.target.mesh
     score = evaluate_surface(
-        read_cloud(folder / "dense.ply").points_m,
+        cloud,
         Mesh(mesh.vertices_m + moved, mesh.faces),
         crop=Crop(bed_z_m=parts.target.bed_z_m),
     )
     return score.rmse_mm
 
 
-def _size(parts: Parts, folder: Path, photos: pl.DataFrame) -> dict[str, float]:
+def _size(parts: Parts, folder: Path, photos: pl.DataFrame, cloud: Array, distance: MeshDistance) -> dict[str, float]:
     """Figures of the model's size; that they could not be computed takes no other figure away."""
     from wakewise.reconstruction.views import camera_centres
 
     true = dict(zip(photos["name"], photos.select("true_x_m", "true_y_m", "true_z_m").to_numpy(), strict=True))
-    cloud, crop = read_cloud(folder / "dense.ply").points_m, Crop(bed_z_m=parts.target.bed_z_m)
+    crop = Crop(bed_z_m=parts.target.bed_z_m)
     with suppress(StageError, InputError):
-        return size_figures(cloud, parts.target.mesh, crop, camera_centres(folder / "sparse"), true)
+        return size_figures(cloud, parts.target.mesh, crop, camera_centres(folder / "sparse"), true, distance)
     return {}
