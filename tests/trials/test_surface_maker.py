@@ -83,6 +83,20 @@ def test_the_other_process_makes_the_mesh_that_this_one_would(folder, monkeypatc
     assert (folder / "mesh.ply").read_bytes() == beside
 
 
+def test_what_was_begun_is_waited_for_and_not_made_twice(folder, monkeypatch):
+    """Also where the mesh is there before anybody asks for it: its stages ran, and none of them in this process."""
+    for name in ("_mesh", "_colours"):
+        monkeypatch.setattr(surface, name, lambda *_: pytest.fail("was made in this process"))
+    calls, watch = [], Stages()
+    with SurfaceMaker(folder, COARSE, 1.0) as maker:
+        maker.begin()
+        until = time.monotonic() + 120
+        while not (folder / "mesh.ply").exists() and time.monotonic() < until:
+            time.sleep(0.05)
+        maker.make(watch, calls.append)
+    assert (watch.ran, watch.skips, calls) == (["mesh", "colours"], [], ["mesh", "colours"])
+
+
 def test_what_is_there_is_skipped_and_no_process_is_begun(folder, monkeypatch):
     """Mesh and colours that are newer than what they are made of stay; without a wish for a mesh nothing is said."""
     monkeypatch.setattr(surface.subprocess, "Popen", lambda *_, **__: pytest.fail("a process was begun"))

@@ -225,6 +225,7 @@ def compare_surface(
     rng: np.random.Generator | None = None,
     samples: int = SAMPLES,
     thresholds_mm: tuple[float, ...] = (),
+    distance: MeshDistance | None = None,
 ) -> Comparison:
     """Score a cloud against a true mesh; `SurfaceScore` defines every figure.
 
@@ -246,6 +247,8 @@ def compare_surface(
         How many are drawn.
     thresholds_mm : tuple of float
         At which shares are wanted besides those of the score.
+    distance : MeshDistance, optional
+        That of this mesh, where it is there already.
 
     Raises
     ------
@@ -272,7 +275,7 @@ def compare_surface(
         moved = refinement.apply(cloud)
         kept = moved[crop.keeps(moved, low, high)]
     even = thin(kept, voxel_m)
-    distance = MeshDistance(mesh.vertices_m, mesh.faces)
+    distance = distance or MeshDistance(mesh.vertices_m, mesh.faces)
     to_truth_mm = 1e3 * distance(even)
     to_cloud_mm = 1e3 * np.asarray(KDTree(even).query(surface.points_m, workers=-1)[0])
     seen = None

@@ -15,6 +15,7 @@ from wakewise.errors import InputError
 from wakewise.evaluation import Crop, evaluate_surface
 from wakewise.evaluation.alignment import umeyama
 from wakewise.evaluation.surface import Mesh
+from wakewise.targets import MeshDistance
 
 SIZE_FIGURES = ("scale_error_pct", "rmse_scaled_mm")
 SAMPLES = 5_000
@@ -22,7 +23,12 @@ SAMPLES = 5_000
 
 
 def size_figures(
-    cloud_W_m: Array, mesh: Mesh, crop: Crop, model_centres: Mapping[str, Array], true_centres: Mapping[str, Array]
+    cloud_W_m: Array,
+    mesh: Mesh,
+    crop: Crop,
+    model_centres: Mapping[str, Array],
+    true_centres: Mapping[str, Array],
+    distance: MeshDistance | None = None,
 ) -> dict[str, float]:
     """`scale_error_pct` and `rmse_scaled_mm` of a model.
 
@@ -34,6 +40,8 @@ def size_figures(
         The truth and what counts of it.
     model_centres, true_centres : mapping
         Where each photograph was taken from, by the model in its own frame and in truth, shape (3,).
+    distance : MeshDistance, optional
+        That of the mesh, where it is there already.
 
     Returns
     -------
@@ -52,5 +60,5 @@ def size_figures(
     if len(names) < 3:
         raise InputError(f"scale: {len(names)} photographs are in model and truth, needs at least 3")
     to_truth = umeyama(np.array([model_centres[n] for n in names]), np.array([true_centres[n] for n in names]))
-    score = evaluate_surface(to_truth.apply(cloud_W_m), mesh, crop=crop, samples=SAMPLES)
+    score = evaluate_surface(to_truth.apply(cloud_W_m), mesh, crop=crop, samples=SAMPLES, distance=distance)
     return {"scale_error_pct": 100.0 * (1.0 / to_truth.scale - 1.0), "rmse_scaled_mm": score.rmse_mm}

@@ -1,8 +1,8 @@
-"""Mesh and colours of a trial's model, for people: made by a process of their own while the report is begun.
+"""Mesh and colours of a trial's model, for people: made by a process of their own beside evaluation and report.
 
 COLMAP's mesher holds Python's lock for as long as it works, ten seconds and more: a thread would hold up all others,
-and Ctrl-C with them. The other process loads its libraries while the model is judged, begins when it is told to, and
-ends when whoever started it ends, however that ends.
+and Ctrl-C with them. The other process begins as soon as there is a model, and ends when whoever started it ends,
+however that ends.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ class SurfaceMaker:
     def __init__(self, folder: Path, settings: ReconstructionSettings, bed_z_m: float) -> None:
         self._folder, self._settings, self._bed_z_m = folder, settings, bed_z_m
         self._process: subprocess.Popen[bytes] | None = None
+        self._asked = False
 
     def __enter__(self) -> SurfaceMaker:
         return self
@@ -81,8 +82,15 @@ class SurfaceMaker:
         except OSError as fault:
             _warn(str(fault))
 
+    def begin(self) -> None:
+        """Have the other process make mesh and colours from now on, if a mesh is wanted and not there."""
+        if not self._asked and self._wanted and not self._meshed:
+            self._asked = self._begin()
+
     def make(self, watch: Watch, meanwhile: Callable[[str], None] | None = None) -> None:
-        """Make what is missing, and call `meanwhile("mesh")` beside the mesh and `meanwhile("colours")` beside these.
+        """Make what is missing, or wait for what is begun.
+
+        `meanwhile("mesh")` is called beside the mesh and `meanwhile("colours")` beside these.
 
         Without anything to do meanwhile it is made in this process, which costs no second loading of libraries.
 
@@ -94,18 +102,19 @@ class SurfaceMaker:
         if not self._wanted:
             return
         beside = False
-        if self._meshed:
+        if self._meshed and not self._asked:
             watch.skipped("mesh")
         else:
-            beside = meanwhile is not None and self._begin()
+            beside = self._asked or (meanwhile is not None and self._begin())
             with watch.stage("mesh") as progress:
                 if beside and meanwhile is not None:
                     meanwhile("mesh")
                 beside = beside and self._await(progress)
                 if not beside:
                     _mesh(self._folder, self._settings, progress)
-        if not uncoloured(self._folder):
-            if (self._folder / "mesh.ply").exists():
+        there = (self._folder / "mesh.ply").exists()
+        if not (beside and there) and not uncoloured(self._folder):  # what is made beside may be done by now
+            if there:
                 watch.skipped("colours")
             return
         with watch.stage("colours") as progress:
@@ -207,7 +216,7 @@ def serve(asked: IO[bytes], answers: IO[bytes]) -> None:
     try:
         _mesh(folder, settings, no_progress)
         _send(answers, ("done", "mesh"))
-        if uncoloured(folder):
+        if (folder / "mesh.ply").exists():
             _colours(folder, bed_z_m, tell)
             _send(answers, ("done", "colours"))
     except (WakewiseError, OSError) as fault:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from wakewise.arrays import Array
 from wakewise.errors import InputError, StageError
 from wakewise.evaluation import SWAY_FIGURES, Crop, compare_surface, evaluate_surface, flight_figures
 from wakewise.extras import need
@@ -33,7 +34,7 @@ from wakewise.operation.flying import FLIGHT_JOBS
 from wakewise.operation.trial_folder import BY_HAND, as_flown, check_place, claim, write_plan
 from wakewise.processes import alone
 from wakewise.reconstruction import read_cloud, read_lens, reconstruct
-from wakewise.targets import Mesh, coral_kinds
+from wakewise.targets import Mesh, MeshDistance, coral_kinds
 from wakewise.trials.coverage import FROM_MODEL, coverage_figures
 from wakewise.trials.metrics import Figures, Gathering, comparison
 from wakewise.trials.size import SIZE_FIGURES, size_figures
@@ -111,18 +112,24 @@ def run_trial(
             _ = parts.target  # a file that cannot be read is refused before minutes of compiling
         with watch.stage("compile") as progress:
             warm(JOBS, progress)
-    if not _is_flown(folder):
-        _ = parts.pilot, parts.preflight
-    claim(folder, scenario)
-    with alone(folder), SurfaceMaker(folder, scenario.reconstruction, parts.target.bed_z_m) as surface:
-        result = _figures(parts, scenario, folder, watch, surface.ready if meanwhile is not None else lambda: None)
-        if told is not None:
-            told(result)
-        surface.make(watch, meanwhile)
-        return result
+    with Darkroom(parts, folder) as darkroom:
+        if not _is_flown(folder):
+            if not _by_hand(parts):
+                darkroom.ready()  # loads and makes its scene while this process looks through the parts
+            _ = parts.pilot, parts.preflight
+        claim(folder, scenario)
+        with alone(folder), SurfaceMaker(folder, scenario.reconstruction, parts.target.bed_z_m) as surface:
+            modelled = surface.begin if meanwhile is not None else lambda: None
+            result = _figures(parts, scenario, folder, watch, darkroom, modelled)
+            if told is not None:
+                told(result)
+            surface.make(watch, meanwhile)
+            return result
 
 
-def _figures(parts: Parts, scenario: Scenario, folder: Path, watch: Watch, modelled: Callable[[], None]) -> Figures:
+def _figures(
+    parts: Parts, scenario: Scenario, folder: Path, watch: Watch, darkroom: Darkroom, modelled: Callable[[], None]
+) -> Figures:
     """Run the stages that figures come from and write metrics.json; `modelled` is called when the model is there."""
     ledger = Ledger(folder / "stages.json")
 
@@ -136,9 +143,8 @@ def _figures(parts: Parts, scenario: Scenario, folder: Path, watch: Watch, model
     _forget_what_was_not_measured(folder)
     if not has_parts(folder):  # a flight by hand has no plan
         stage("plan", "planned.csv", lambda _: write_plan(parts, folder))
-    with Darkroom(parts, folder) as darkroom:
-        stage("fly", "steps.parquet", lambda progress: _fly(parts, folder, darkroom, progress))
-        stage("photograph", "images.csv", lambda progress: _photograph(parts, folder, darkroom, progress))
+    stage("fly", "steps.parquet", lambda progress: _fly(parts, folder, darkroom, progress))
+    stage("photograph", "images.csv", lambda progress: _photograph(parts, folder, darkroom, progress))
     stage("reconstruct", "model.json", lambda progress: reconstruct_trial(parts, folder, progress))
     modelled()
     stage("evaluate", "score.json", lambda _: write_json(folder / "score.json", evaluate_trial(parts, folder)))
@@ -157,11 +163,15 @@ def _is_flown(folder: Path) -> bool:
     return (folder / "steps.parquet").exists() or has_parts(folder)
 
 
+def _by_hand(parts: Parts) -> bool:
+    return parts.scenario.pilot == BY_HAND and "pilot" not in parts.given
+
+
 def _fly(parts: Parts, folder: Path, darkroom: Darkroom, progress: Callable[..., None]) -> None:
     """Fly, or put together what a flight by hand left that was cut off."""
     if gather(parts, folder):
         return
-    if parts.scenario.pilot == BY_HAND and "pilot" not in parts.given:
+    if _by_hand(parts):
         fly_hands(parts, folder)
     else:
         darkroom.ready()
@@ -265,16 +275,19 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
     gathering.add({key: summary.get(key) for key in _MODEL_FIGURES})
     if failure is None:
         try:
+            cloud, mesh = read_cloud(folder / "dense.ply").points_m, parts.target.mesh
+            distance = MeshDistance(mesh.vertices_m, mesh.faces)
             compared = compare_surface(
-                read_cloud(folder / "dense.ply").points_m,
-                parts.target.mesh,
+                cloud,
+                mesh,
+                distance=distance,
                 crop=Crop(bed_z_m=parts.target.bed_z_m),
                 camera_centres_W_m=photos.select("true_x_m", "true_y_m", "true_z_m").to_numpy(),
             )
             gathering.add(coverage_figures(parts, photos, compared.points_W_m))
             gathering.add({key: getattr(compared.score, key) for key in (*_SURFACE_FIGURES, "success")})
-            gathering.add({"rmse_mean_shape_mm": _rmse_mean_shape_mm(parts, folder)})
-            gathering.add(_size(parts, folder, photos))
+            gathering.add({"rmse_mean_shape_mm": _rmse_mean_shape_mm(parts, folder, cloud)})
+            gathering.add(_size(parts, folder, photos, cloud, distance))
         except StageError as fault:
             failure = str(fault)
     if parts.yielding is None:
@@ -287,7 +300,7 @@ def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
     return {"figures": gathering.figures, "reasons": gathering.reasons}
 
 
-def _rmse_mean_shape_mm(parts: Parts, folder: Path) -> float | None:
+def _rmse_mean_shape_mm(parts: Parts, folder: Path, cloud: Array) -> float | None:
     """`rmse_mm` against the mean of the shapes that were photographed; None of a target that does not yield."""
     if parts.yielding is None:
         return None
@@ -297,19 +310,19 @@ def _rmse_mean_shape_mm(parts: Parts, folder: Path) -> float | None:
     moved = np.mean([moved_m(parts, exposure) for exposure in exposures], axis=0)
     mesh = parts.target.mesh
     score = evaluate_surface(
-        read_cloud(folder / "dense.ply").points_m,
+        cloud,
         Mesh(mesh.vertices_m + moved, mesh.faces),
         crop=Crop(bed_z_m=parts.target.bed_z_m),
     )
     return score.rmse_mm
 
 
-def _size(parts: Parts, folder: Path, photos: pl.DataFrame) -> dict[str, float]:
+def _size(parts: Parts, folder: Path, photos: pl.DataFrame, cloud: Array, distance: MeshDistance) -> dict[str, float]:
     """Figures of the model's size; that they could not be computed takes no other figure away."""
     from wakewise.reconstruction.views import camera_centres
 
     true = dict(zip(photos["name"], photos.select("true_x_m", "true_y_m", "true_z_m").to_numpy(), strict=True))
-    cloud, crop = read_cloud(folder / "dense.ply").points_m, Crop(bed_z_m=parts.target.bed_z_m)
+    crop = Crop(bed_z_m=parts.target.bed_z_m)
     with suppress(StageError, InputError):
-        return size_figures(cloud, parts.target.mesh, crop, camera_centres(folder / "sparse"), true)
+        return size_figures(cloud, parts.target.mesh, crop, camera_centres(folder / "sparse"), true, distance)
     return {}
