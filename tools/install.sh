@@ -11,7 +11,8 @@ by_pip() { "$python" -m pip install --no-compile --quiet --disable-pip-version-c
 # A mirror that pip was told of; uv asks pip for none of its settings.
 index=$("$python" -m pip config get global.index-url 2>/dev/null) || index=
 index=${UV_DEFAULT_INDEX:-${PIP_INDEX_URL:-$index}}
-if by_pip "$alone" 2>/dev/null && UV_DEFAULT_INDEX=${index:-https://pypi.org/simple} "$(dirname "$python")/uv" \
-    pip install --python "$python" --quiet --require-hashes -r "$lock"; then exit 0; fi
+if [ -n "$index" ]; then export UV_DEFAULT_INDEX="$index"; fi
+if by_pip "$alone" 2>/dev/null &&
+    "$(dirname "$python")/uv" pip install --python "$python" --quiet --require-hashes -r "$lock"; then exit 0; fi
 echo "uv cannot install here: pip does, which takes half a minute longer"
 by_pip "$lock"
