@@ -38,7 +38,10 @@ def station(eye, shift=(0.0, 0.0, 0.0)):
 @pytest.mark.parametrize("wake", ["jet", "paper"])
 def test_the_same_wrench_at_less_disturbance(wake):
     """At equal wrench, from rest, the gentle one disturbs no more than its effort weight pays for; often far less."""
-    region, settings = small_region(), ControlSettings(levers={"spare": False, "meet": False, "drift": False})
+    region, settings = (
+        small_region(),
+        ControlSettings(levers={"spare": False, "meet": False, "drift": False, "doubt": False}),
+    )
     dp, gentle = (make_controller(m, VEHICLE, region, wake_model(wake), settings) for m in INSTANT)
     rng = np.random.default_rng(1)
     ratios = []
@@ -60,12 +63,14 @@ def test_the_same_wrench_at_less_disturbance(wake):
 
 
 def test_reported_disturbance_is_that_of_the_thrusts():
-    """D in the command is s' G s with the jets at the estimated pose."""
+    """D in the command is s' G s at the estimated pose, by the belief that shares are chosen by."""
     estimate, goal = station(np.array([0.05, 0.0, 0.95]), (0.0, 0.0, -0.03))
     for method in INSTANT:
         controller = make_controller(method, VEHICLE, small_region(), wake_model("jet"))
         _, command = controller.step(controller.init(), 0.02, estimate, goal)
-        expected = disturbance(controller.view.gram(estimate.X_WB), command.thrusts_N)
+        eyes, thrusts = controller.watch, command.thrusts_N
+        G = controller.view.gram(estimate.X_WB) if eyes is None else eyes.seen(estimate, thrusts).gram
+        expected = disturbance(G, thrusts)
         assert command.disturbance == pytest.approx(expected, rel=1e-9)
 
 

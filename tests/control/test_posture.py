@@ -176,7 +176,7 @@ def test_a_posture_that_the_thrusters_cannot_hold_is_not_to_be_had():
 
 def test_the_cost_is_what_the_allocator_would_pay_there():
     """Level and loaded, it is the weighed D and effort of the thrusts that `instant` finds for its own wrench."""
-    settings = ControlSettings(levers={"meet": False, "drift": False, "posture": False, "thrift": False})
+    settings = ControlSettings(levers=dict.fromkeys(("meet", "drift", "doubt", "posture", "thrift"), False))
     controller = instant(VEHICLE, region(), believed(), settings)
     goal = looking(VEHICLE, np.radians(40.0))
     R = goal.X_WB.R

@@ -6,7 +6,7 @@ import pytest
 from wakewise.allocation import least_thrusts
 from wakewise.control import ControlSettings, LeverSettings, make_controller
 from wakewise.control.spare import watching
-from wakewise.control.watch import UNSURE, WORTH
+from wakewise.control.watch import DOUBT, UNSURE, WORTH
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Goal
 from wakewise.targets import Region
@@ -28,6 +28,15 @@ def watch(wake=None, **levers):
     return watching(VEHICLE, AHEAD, wake or RoundJet(), ControlSettings(levers=LeverSettings(**levers)))
 
 
+class Foreign:
+    """A wake model from outside: a law that is not told of."""
+
+    name = "foreign"
+
+    def unit_velocity(self, points_W, origins_W, directions_W, areas_m2):
+        return RoundJet().unit_velocity(points_W, origins_W, directions_W, areas_m2)
+
+
 def estimate(*current_m_s, **of):
     """An estimate at the origin with a current, or none."""
     return BodyState(X_WB=Pose(np.zeros(3)), current_W_m_s=np.array(current_m_s) if current_m_s else None, **of)
@@ -39,6 +48,18 @@ def test_an_unknown_current_leaves_the_water_still():
     np.testing.assert_array_equal(watch().gram(estimate(), THRUSTS), still)
     np.testing.assert_array_equal(watch(drift=False).gram(estimate(0.05, 0.0, 0.0), THRUSTS), still)
     assert not np.allclose(watch().gram(estimate(0.05, 0.0, 0.0), THRUSTS), still)
+
+
+@pytest.mark.parametrize("current", [(), (0.05, 0.02, 0.0)])
+def test_what_shares_are_chosen_by_is_the_mean_of_two_beliefs(current):
+    """Jets that go as reckoned and jets gone astray, by their shares; the lever off, or a foreign model: the first."""
+    here, eyes = estimate(*current), watch()
+    astray = eyes.view.astray(here.X_WB)
+    sure = watch(doubt=False).seen(here, THRUSTS)
+    for matrix, reckoned in zip(eyes.seen(here, THRUSTS), sure, strict=True):
+        np.testing.assert_allclose(matrix, (1.0 - DOUBT) * reckoned + DOUBT * np.diag(astray), rtol=1e-12)
+    foreign = Foreign()
+    np.testing.assert_array_equal(watch(foreign).seen(here, THRUSTS).gram, watch(foreign).gram(here, THRUSTS))
 
 
 def test_a_stated_current_is_believed_against_the_estimate():
@@ -64,10 +85,9 @@ def test_shares_make_the_wrench_and_are_never_worse_than_those_of_before_by_thei
         before = least_thrusts(layout, wrench).thrusts_N
         found, seen = eyes.share_out(wrench, here, before)
         np.testing.assert_allclose(layout.B @ found.thrusts_N, wrench, atol=1e-9)
-        np.testing.assert_allclose(seen.gram, eyes.gram(here, found.thrusts_N), atol=1e-15)
-        assert eyes.cost(found.thrusts_N, seen.gram, before) <= eyes.cost(before, eyes.gram(here, before)) * (
-            1.0 + 1e-9
-        )
+        np.testing.assert_allclose(seen.gram, eyes.seen(here, found.thrusts_N).gram, atol=1e-15)
+        least = eyes.cost(before, eyes.seen(here, before).gram)
+        assert eyes.cost(found.thrusts_N, seen.gram, before) <= least * (1.0 + 1e-9)
 
 
 def test_a_jump_is_worth_it_or_not_made():
@@ -84,8 +104,8 @@ def test_a_jump_is_worth_it_or_not_made():
         found, seen = anew
         made += 1
         np.testing.assert_allclose(layout.B @ found.thrusts_N, wrench, atol=1e-9)
-        np.testing.assert_allclose(seen.gram, eyes.gram(here, found.thrusts_N), atol=1e-15)
-        assert eyes.cost(found.thrusts_N, seen.gram) < (1.0 - WORTH) * eyes.cost(present, eyes.gram(here, present))
+        np.testing.assert_allclose(seen.gram, eyes.seen(here, found.thrusts_N).gram, atol=1e-15)
+        assert eyes.cost(found.thrusts_N, seen.gram) < (1.0 - WORTH) * eyes.cost(present, eyes.seen(here, present).gram)
         assert eyes.jump(wrench, here, found.thrusts_N) is None
     assert made >= 2
 
@@ -129,7 +149,7 @@ def test_where_the_current_brings_the_wash_back_shares_are_gentler_for_knowing_i
     """
     wrench, here = np.array([-2.64, 0.93, -3.33, 0.0, -0.28, 0.0]), estimate(-0.017, -0.083, 0.0)
     floor = FloorJet(jet=RoundJet(), bed_z_m=0.6)
-    eyes, blind = watch(floor), watch(floor, drift=False)
+    eyes, blind = watch(floor, doubt=False), watch(floor, doubt=False, drift=False)
     least = least_thrusts(eyes.layout, wrench).thrusts_N
     unknowing = blind.jump(wrench, here, least)[0].thrusts_N
     thrusts = least

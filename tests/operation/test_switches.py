@@ -22,9 +22,9 @@ def test_defaults_leave_nothing_idle(method):
 def test_levers_that_need_another_are_named():
     """With spare off, what lies behind it is idle for a method that plans, and not for one that does not."""
     off = {"control.levers.spare": False}
-    assert "control.levers.meet, drift, thrift: nothing without" in said("wake-aware", **off)
+    assert "control.levers.meet, drift, doubt, thrift: nothing without" in said("wake-aware", **off)
     assert "control.levers.drift:" in said(
-        "wake-aware", **off, **{f"control.levers.{n}": False for n in ("meet", "thrift")}
+        "wake-aware", **off, **{f"control.levers.{n}": False for n in ("meet", "doubt", "thrift")}
     )
     assert said("instant", **off) == ""
 

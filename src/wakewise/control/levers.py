@@ -42,6 +42,9 @@ class LeverSettings(Settings):
     drift: bool = Field(
         default=True, description="follow the jets as the current bends, stops and brings them; needs spare"
     )
+    doubt: bool = Field(
+        default=True, description="hold that some of the jets go elsewhere than they are reckoned to; needs spare"
+    )
     thrift: bool = Field(
         default=True,
         description="gentle shares only as far as they are worth their power, and bounded by what there is to save",

@@ -116,7 +116,7 @@ class Poised:
                 goal=goal,
                 force_W_N=state.force_W_N,
                 moment_B_Nm=state.moment_B_Nm,
-                gram=lambda X_WB, thrusts_N: watch.gram(replace(now_is, X_WB=X_WB), thrusts_N),
+                gram=lambda X_WB, thrusts_N: watch.seen(replace(now_is, X_WB=X_WB), thrusts_N).gram,
                 total_weight=watch.view.total_weight,
             )
             low, high = self.scale.hinge.span(goal.tilt_rad)

@@ -5,6 +5,9 @@ it was made with. Shares are therefore judged by the matrix of their own thrusts
 are held against what the exact allocator makes of their matrix, and the next search begins at the better; every two
 seconds, on a step of its own, the least thrusts and what the allocator makes of theirs are looked at. So no share is
 flown for longer that its own matrix calls worse than the least thrusts.
+
+A belief is not the water. With a share of `DOUBT` a jet is held to have gone astray, and D is the mean of both beliefs:
+thrusts that are harmless only if all goes as reckoned are no longer free.
 """
 
 from __future__ import annotations
@@ -29,6 +32,11 @@ of a tenth to a fifth (I. Nezu and H. Nakagawa, Turbulence in Open-Channel Flows
 controller sends is pushes of a second as often as jets, and a push needs longer. Its front goes as t^(1/4) once it is
 cut off (J. M. Richards, Int. J. Mech. Sci. 7 (1965) 61), a jet's as t^(1/2), so it is on its way once to twice as long,
 half as long again in the mean, give or take half."""
+
+DOUBT = 0.3
+"""Share of belief that a jet has gone astray (see `wakewise.wake.disturbance`) rather than where it is reckoned to go.
+Of 64 single pushes the belief has the order right to .73 (docs/decisions/0048). Set before any flight of it; .6 and .9
+flew as gently for more power (docs/decisions/0070)."""
 
 WORTH = 0.05
 """Share of the cost that a jump must save: less is within what a wake model may claim to know."""
@@ -57,12 +65,21 @@ class Watch:
         return self.sharer.layout
 
     def gram(self, estimate: BodyState, thrusts_N: Array) -> Array:
-        """Matrix G of D = s' G s at an estimate, shape (2 n, 2 n), in the flow that it tells of."""
-        return self.seen(estimate, thrusts_N).gram
+        """Matrix G of D = s' G s at an estimate, shape (2 n, 2 n), in the flow that it tells of: what is reckoned."""
+        return self.view.seen(estimate.X_WB, self.flow(estimate, thrusts_N)).gram
 
     def seen(self, estimate: BodyState, thrusts_N: Array) -> Seen:
-        """Matrices of D at an estimate, in the flow that it tells of: to choose shares by, and of thrusts as sent."""
-        return self.view.seen(estimate.X_WB, self.flow(estimate, thrusts_N))
+        """Matrices of D at an estimate, in the flow that it tells of: to choose shares by, and of thrusts as sent.
+
+        Their mean over both beliefs: jets that go where they are reckoned to, and jets that have gone astray.
+        """
+        seen = self.view.seen(estimate.X_WB, self.flow(estimate, thrusts_N))
+        astray = self.view.astray(estimate.X_WB) if self.levers.doubt else None
+        if astray is None:
+            return seen
+        beside = np.diag(DOUBT * astray)
+        gram = (1.0 - DOUBT) * seen.gram + beside
+        return Seen(gram=gram, sent=gram if seen.sent is seen.gram else (1.0 - DOUBT) * seen.sent + beside)
 
     def flow(self, estimate: BodyState, thrusts_N: Array) -> Flow | None:
         """The current to reckon with and the thrusts, shape (n,), to reckon from; None where it does not count.

@@ -20,7 +20,7 @@ PLANNING = frozenset({"pseudo-inverse", "unaware", "smooth", "linear", "wake-awa
 """Our methods that plan."""
 LEVERED = frozenset({"pseudo-inverse", "linear", "instant", "wake-aware"})
 """Our methods that use levers; of these all but `instant` need `spare` for all of them but the bed."""
-_AFTER_SPARE = ("meet", "drift", "thrift")
+_AFTER_SPARE = ("meet", "drift", "doubt", "thrift")
 
 
 def idle_switches(scenario: Scenario, vehicle: Vehicle) -> tuple[str, ...]:

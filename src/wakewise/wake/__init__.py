@@ -3,13 +3,13 @@
 D is here and nowhere else: the weighted mean square of the water's speed at the target's points. The simulated tank
 never uses this room: a planner that knew the truth would prove nothing.
 
-Start reading in `disturbance.py` (D and its Gram matrix) and `models.py` (models by name). Models: `cones.py` (the
-paper's), `jets.py` (round turbulent jets), `floor.py` (their wall jets; `beds.py` tells a bed of a model),
-`carried.py` and `floor_carried.py` (both in a current), `families.py` (what can be fitted), `learned.py` with
-`network.py` (a trained rival that remembers). Sums: `sums.py` and `floor_sums.py` with `kernels.py` (compiled),
-`gradients.py` with `stage.py` (derivatives of D), `numeric.py` (the same for models that bring none), `checks.py`
-(what is refused), `table.py` and `plan_disturbance.py` (D and derivatives over a planner's stage), `view.py` (D from
-a vehicle's pose). `calibration.py`, `samples.py`, `scores.py` and `fit_file.py` fit a model to measured velocities.
+Start reading in `disturbance.py` (D, its Gram matrix, and D of jets that go astray) and `models.py` (models by name).
+Models: `cones.py` (the paper's), `jets.py` (round turbulent jets), `floor.py` (their wall jets; `beds.py` tells a bed
+of a model), `carried.py` and `floor_carried.py` (both in a current), `families.py` (what can be fitted), `learned.py`
+with `network.py` (a trained rival that remembers). Sums: `sums.py` and `floor_sums.py` with `kernels.py` (compiled),
+`gradients.py` with `stage.py` (derivatives of D), `numeric.py` (the same for models that bring none), `checks.py` (what
+is refused), `table.py` and `plan_disturbance.py` (D and derivatives over a planner's stage), `view.py` (D from a
+vehicle's pose). `calibration.py`, `samples.py`, `scores.py` and `fit_file.py` fit a model to measured velocities.
 """
 
 from __future__ import annotations

@@ -39,7 +39,7 @@ import numpy as np
 
 from wakewise.arrays import Array, freeze
 from wakewise.compiled import njit
-from wakewise.wake.kernels import PRINTED_CONE, ROUND_JET, as_tuple, own_constants, speed_and_slope
+from wakewise.wake.kernels import ROUND_JET, as_tuple, own_constants, section_of, speed_and_slope
 
 FOLLOWED_S = 40.0
 """How long a section is followed. Bent over, its speed falls as t^(-2/3) and its width grows as t^(1/3), so what a
@@ -98,26 +98,6 @@ def guesses(thrusts: Array) -> Array:
 
 
 @njit
-def _profile(kind, numbers, own, s):  # type: ignore[no-untyped-def]
-    """(U_0 per square root of newton, chi, width) of the jet in still water at a distance s from the disk."""
-    if kind != ROUND_JET:
-        speed, _, _ = speed_and_slope(kind, numbers, own[0], own[1], own[2], s, s * s)
-        # cos^m of the angle is a Gaussian of the radius with this width.
-        power = 4.0 if kind == PRINTED_CONE else max(numbers[2], 2.0)
-        return speed, 0.5, s * np.sqrt(2.0 / power)
-    # The middle of the jet's own kernel, which is asked here for nothing else: one root serves speed and core.
-    b, x = own[1] + numbers[4] * s, s + own[0]
-    if numbers[5] == 0.0:
-        return numbers[0] / x, 0.5, b
-    square = x * x
-    third = np.cbrt(square * square * square + own[2])
-    root = np.sqrt(max(numbers[1] / (numbers[0] * numbers[0]) * third + (np.pi / 8.0 - 0.5) * b * b, 0.0))
-    a = max(root - np.sqrt(np.pi / 8.0) * b, 0.0)
-    momentum = a * a + np.sqrt(0.5 * np.pi) * a * b + 0.5 * b * b
-    return numbers[0] / np.sqrt(third), momentum / (a * a + np.sqrt(np.pi) * a * b + b * b), a + b
-
-
-@njit
 def excess_speed(strength, chi, along, current2, near):  # type: ignore[no-untyped-def]
     """U of U |chi U e + c| = strength, `along` = c . e with what opposes already lessened, `current2` = c . c.
 
@@ -147,7 +127,7 @@ def excess_speed(strength, chi, along, current2, near):  # type: ignore[no-untyp
 @njit
 def _rates(kind, numbers, own, s, grown, root, e, current, along, current2, near, v):  # type: ignore[no-untyped-def]
     """(ds/dt, d grown/dt, U, U_0, width in still water) at one section, and dX/dt into `v`; `grown` / s widens it."""
-    unit, chi, width = _profile(kind, numbers, own, s)
+    unit, chi, width = section_of(kind, numbers, own, s)
     still = unit * root
     wider = max(grown / s, 1.0)
     U = excess_speed(chi * still * still / (wider * wider), chi, along, current2, near)

@@ -7,6 +7,18 @@ how hard they push.
 Incoherent: squares add up, D = sum_j w_j sum_i |v_i(p_j)|^2, which keeps only the diagonal of G. It is linear in the
 split thrusts (T+, T-) >= 0, hence convex, and no optimiser can make jets cancel that in water would only spread
 sideways.
+
+Astray: nobody knows where the jets go, only about where they were sent. A jet lives for seconds, in water that has
+gusts, a bed, a hull and other jets in it, so what it does to the target is known less surely than its law: of single
+pushes sent beside a target the belief has the order right to .73 (docs/decisions/0048). Here its direction is scattered
+about the way it was sent as by von Mises and Fisher, f(theta) = kappa exp(kappa cos theta) / (4 pi sinh kappa), and the
+speed that is met at a distance r off the disk is that of its section there, U(r) exp(-(r theta')^2 / w(r)^2) with w the
+width. Of a jet narrower than the scatter the mean square of the speed at an angle theta is then
+
+    U(r)^2 (pi / 2) (w(r) / r)^2 f(theta).
+
+Momentum stays what it is, whichever way it goes. Jets go astray each by itself, so squares add up here, too, and the
+least shares send nothing ahead that can be sent elsewhere, without a word of where a vehicle has its bow.
 """
 
 from __future__ import annotations
@@ -26,8 +38,13 @@ from wakewise.wake.floor_carried import add_carried_walls
 from wakewise.wake.floor_sums import floor_gram_sum
 from wakewise.wake.gradients import Superposition
 from wakewise.wake.jets import AxialJet
+from wakewise.wake.kernels import as_tuple, own_constants, section_of
 from wakewise.wake.sums import FAST, dot, gram_sum
 
+SCATTER_RAD = float(np.radians(45.0))
+"""Root mean square of the angle between where a jet was sent and where it goes, taken small: kappa = 2 / angle^2."""
+NEAREST_M = 0.1
+"""A jet is not scattered nearer to its disk: about a diameter, within which it has not begun to spread."""
 _ORIGIN, _LEVEL = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
 
 
@@ -155,6 +172,44 @@ def carried_velocity(
         walls = (directions_W, areas_m2, model.numbers, thrusts_N)
         add_carried_walls(points_W_m, curves, *walls, flow.current_W_m_s, flow.unsure_m_s, ends, velocity)
     return np.asarray(velocity)
+
+
+@njit
+def astray(points, weights, origins, axes, areas, kind, parameters):  # type: ignore[no-untyped-def]
+    """Mean of D per newton of each jet if it goes astray, shape (2 m,), in (m/s)^2/N.
+
+    Parameters
+    ----------
+    points, weights : ndarray, shape (n, 3) and (n,)
+        Of a region, in the world.
+    origins, axes, areas : ndarray, shape (m, 3), (m, 3) and (m,)
+        Centres of the disks, unit force axes (for T > 0) and areas.
+    kind, parameters
+        The jet's law (`AxialJet.law`).
+
+    Returns
+    -------
+    ndarray, shape (2 m,)
+        Slot i is thruster i with T > 0 (jet along -axis), slot m + i the same with T < 0. As a diagonal matrix it is G
+        of D = s' G s, as in `wakewise.wake.disturbance.gram`.
+    """
+    m, n = origins.shape[0], points.shape[0]
+    own, numbers, d = own_constants(kind, parameters, areas), as_tuple(parameters), np.zeros(2 * m)
+    kappa = 2.0 / SCATTER_RAD**2
+    even = kappa / (4.0 * np.pi * np.sinh(kappa))
+    for i in range(m):
+        for j in range(n):
+            r2, along = 0.0, 0.0
+            for x in range(3):
+                offset = points[j, x] - origins[i, x]
+                r2 += offset * offset
+                along -= offset * axes[i, x]
+            r = max(np.sqrt(r2), NEAREST_M)
+            speed, _, width = section_of(kind, numbers, own[i], r)
+            square = weights[j] * speed * speed * 0.5 * np.pi * (width / r) ** 2 * even
+            d[i] += square * np.exp(kappa * along / r)
+            d[m + i] += square * np.exp(-kappa * along / r)
+    return d
 
 
 def incoherent(gram: Array) -> Array:

@@ -13,9 +13,11 @@ from wakewise.compiled import njit
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.interfaces import WakeModel
+from wakewise.wake.beds import free_jet
 from wakewise.wake.carried import Flow
-from wakewise.wake.disturbance import gram
+from wakewise.wake.disturbance import astray, gram
 from wakewise.wake.gradients import Superposition
+from wakewise.wake.jets import AxialJet, Law
 
 if TYPE_CHECKING:
     from wakewise.targets import Region
@@ -84,6 +86,17 @@ class WakeView:
         """Matrices of D: what to choose shares by, and what thrusts do as sent."""
         G = self.gram(X_WB, flow)
         return Seen(gram=G, sent=G)
+
+    def astray(self, X_WB: Pose) -> Array | None:
+        """Mean of D per newton of each jet if it goes astray, shape (2 n,) (see `disturbance`); None without a law."""
+        if self._law is None:
+            return None
+        return cast(Array, astray(self.points_W_m, self.weights, *self.places(X_WB), self.areas_m2, *self._law))
+
+    @cached_property
+    def _law(self) -> Law | None:
+        jet = free_jet(self.wake)
+        return jet.law if isinstance(jet, AxialJet) else None
 
 
 @njit

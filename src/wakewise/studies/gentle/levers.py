@@ -15,6 +15,7 @@ LEVERS: dict[str, Settings] = {
     "drift": {"levers.drift": False},
     "jets that meet": {"levers.meet": False},
     "floor": {"wake.floor": False},
+    "doubt": {"levers.doubt": False},
     "posture": {"levers.posture": False},
     "thrift": {"levers.thrift": False},
 }
