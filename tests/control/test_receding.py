@@ -56,6 +56,26 @@ def test_a_goal_that_speeds_up_is_followed_without_lag(controller):
     assert np.sqrt(np.mean(np.square(behind))) < 0.06 * 0.1
 
 
+def test_a_trembling_turn_is_not_planned_as_one_that_goes_on(controller):
+    """A heading whose rate changes back and forth by what a person's stick may change it costs next to no moment."""
+    rng = np.random.default_rng(7)
+    state, rate, yaw = controller.init(), 0.0, np.pi
+    body, p, q, nu, thrusts = compile_body(VEHICLE), PLACE.p_m, PLACE.q, np.zeros(6), np.zeros(8)
+    moments = []
+    for _ in range(100):
+        # Up to 1 rad/s2, the hardest that a turn by hand may change.
+        rate = float(np.clip(rate + 0.02 * rng.choice([-1.0, 1.0]), -0.04, 0.04))
+        yaw += 0.02 * rate
+        turn = np.array([0.0, 0.0, 0.0, 0.0, 0.0, rate])
+        goal = Goal(X_WB=Pose(PLACE.p_m, quat_from_euler(0.0, 0.0, yaw)), nu_B=turn)
+        state, command = controller.step(state, 0.02, BodyState(X_WB=Pose(p, q), nu_B=nu), goal)
+        thrusts = thruster_lag(thrusts, command.thrusts_N, VEHICLE.time_constants_s, 0.02)
+        p, q, nu = step_rk4(body, p, q, nu, VEHICLE.allocation_matrix @ thrusts, np.zeros(3), 0.02)
+        moments.append(command.wrench_B[5])
+    moment_Nm = float(np.sqrt(np.mean(np.square(moments))))
+    assert moment_Nm < 0.6  # 1.5 where it is carried on
+
+
 @pytest.mark.parametrize("method", PLANNING)
 def test_a_goal_out_of_reach_saturates_within_limits(method):
     """Ten metres off and pushed hard: limits hold, thrusts are finite and push the right way, the integral is bounded,

@@ -168,12 +168,18 @@ class PlanningController:
         return None
 
     def _change(self, state: PlanState, dt_s: float, goal: Goal) -> Array:
-        """How fast the goal's twist changes, shape (6,); a goal that jumps has no acceleration worth following."""
+        """How fast the goal's velocity changes, shape (6,), zero for its turn.
+
+        A turn that keeps something in view trembles with the hand and its rate within a step; carried on for half a
+        second that is a yaw moment four times the one needed (docs/decisions/0073). A goal that jumps has no
+        acceleration worth following.
+        """
         if state.goal_nu is None or not dt_s > 0.0:
             return np.zeros(6)
         change = (goal.nu_B - state.goal_nu) / dt_s
         push = self.tracker.body.mass_matrix @ change
-        return change if (np.abs(push) <= self.tracker.integral_limit).all() else np.zeros(6)
+        jumps = (np.abs(push) > self.tracker.integral_limit).any()
+        return np.zeros(6) if jumps else np.concatenate([change[:3], np.zeros(3)])
 
     def _replan(self, state: PlanState, estimate: BodyState, goal: Goal, change_B: Array) -> PlanState:
         settings = self.model.settings
