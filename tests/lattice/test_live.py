@@ -108,6 +108,21 @@ def test_a_current_goes_round_a_body_and_stays_what_it_was_beside():
     assert speeds["body"] == pytest.approx(0.0, abs=1e-6) and speeds["lee"] < 0.03
 
 
+def test_a_copy_goes_its_own_way_as_the_water_would_have():
+    """Of three boxes with one past the one that is pushed parts from the others, which stay alike to the last bit."""
+    water = box((12, 12, 10), current=(0.1, 0.0, 0.0), fastest_m_s=0.5)
+    for _ in range(30):
+        water.advance(NOTHING, NOTHING)
+    alone, other = water.copy(), water.copy()
+    middle = water.low_W_m + 0.5 * water.cell_m * np.array(water.cells)
+    for _ in range(10):
+        water.advance(middle[None], np.array([[0.0, 1.0, 0.0]]))
+        alone.advance(NOTHING, NOTHING)
+        other.advance(NOTHING, NOTHING)
+    assert np.array_equal(alone.field_m_s(), other.field_m_s()) and alone.time_s == water.time_s
+    assert np.abs(water.field_m_s()[1] - alone.field_m_s()[1]).max() > 0.01
+
+
 def test_what_it_cannot_compute_is_refused_or_told():
     """A current that sinks, one faster than it is made for, a box of few cells; and forces far beyond its speed."""
     with pytest.raises(InputError, match="needs a level one"):

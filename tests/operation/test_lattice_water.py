@@ -33,6 +33,19 @@ def test_what_holds_the_vehicle_up_goes_down_in_the_water(flown):
     assert water.water().target_speed_mean_m_s >= 0.0 and water.observe().power_W > 0.0
 
 
+def test_in_a_current_only_what_the_vehicle_adds_is_excess():
+    """Before anything is pushed there is none in a current that has not settled, and the current is the ambient one."""
+    told = {**STILL, "tank.current.velocity_m_s": [0.1, 0.0, 0.0]}
+    parts = ww.Scenario.preset("quick", **told).parts()
+    water = LatticeWater(
+        parts.world.vehicle, parts.target, parts.scenario.tank, parts.start, np.random.default_rng(0), 1.3, 0.1
+    )
+    first = water.water()
+    water.step(np.full(8, 2.0), 0.3)
+    assert first.target_speed_mean_m_s == 0.0 < water.water().target_speed_mean_m_s
+    assert water.water().target_speed_mean_m_s < 0.1
+
+
 def test_the_target_is_solid_where_it_stands(flown):
     """Cells on its surface are, far ones are not, and the count is that of its size."""
     parts, _ = flown

@@ -8,6 +8,7 @@ here knows a law of jets.
 
 from __future__ import annotations
 
+import copy
 import math
 
 import numpy as np
@@ -119,6 +120,10 @@ class LiveBox:
         self._fresh = False
         self._pushed = np.zeros((nx, ny, nz, 3))
         self.time_s = 0.0
+
+    def copy(self) -> LiveBox:
+        """The same water now, which goes its own way from here."""
+        return copy.deepcopy(self)
 
     def advance(self, points_W_m: Array, forces_N: Array) -> None:
         """One step under forces on the water, both shape (k, 3); what lies outside the box is left out.

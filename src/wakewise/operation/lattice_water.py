@@ -8,8 +8,9 @@ those of the tank.
 What it has not: silt, waves, a pump, turbulence of the water's own; the hull lets jets through. Cells of 2.5 cm are
 three to a thruster's diameter: a jet's speed times distance is then 20 % low at 0.4 m and 20 % high at 0.9 m (cells of
 2 cm come nearer, at 2.4 times the work), and sheets on the bed and the thin water at the target's surface are coarser
-still. The target's excess speed is held against the same water just before the thrusters start, once the current has
-gone round the target for a while.
+still. The target's excess speed is what the tank's is: this water less the same water without a vehicle, which goes on
+beside it where there is a current (a current that goes round a target takes longer to settle than a hover lasts, and
+sheds eddies then).
 """
 
 from __future__ import annotations
@@ -47,18 +48,17 @@ _MARGIN_M = 0.15
 
 
 class _Water:
-    """The box as `TargetProbes` looks at it: what is more than before the thrusters started."""
+    """The box as `TargetProbes` looks at it: what is more than in the same box without a vehicle, None if at rest."""
 
-    steady = True
-
-    def __init__(self, water: LiveBox) -> None:
-        self._water, self._before = water, water.field_m_s().copy()
+    def __init__(self, water: LiveBox, alone: LiveBox | None) -> None:
+        self._water, self._alone = water, alone
+        self.steady = alone is None
 
     def velocity(self, points_W_m: Array) -> Array:
         return self._water.velocity(points_W_m)
 
     def ambient_velocity(self, points_W_m: Array) -> Array:
-        return self._water.velocity(points_W_m, self._before)
+        return np.zeros(np.shape(points_W_m)) if self._alone is None else self._alone.velocity(points_W_m)
 
     def excess_velocity(self, points_W_m: Array) -> Array:
         return self.velocity(points_W_m) - self.ambient_velocity(points_W_m)
@@ -146,7 +146,8 @@ class LatticeWater:
         for _ in range(round(spin_up_s / self._box.step_s)):
             self._box.advance(nothing, nothing)
         self._began_s = self._box.time_s
-        self._water = _Water(self._box)
+        self._alone = self._box.copy() if speed > 0.0 else None
+        self._water = _Water(self._box, self._alone)
 
     @property
     def state(self) -> BodyState:
@@ -167,8 +168,11 @@ class LatticeWater:
             self._time = max(stop, self._time)
             if self._sensors.next_due_s() - self._time < _TOLERANCE_S:
                 self._sensors.sample(self._time, self._plant.vector, self._plant.force_B_m_s2)
+        nothing = np.zeros((0, 3))
         while self._box.time_s - self._began_s < self._time - 0.5 * self._box.step_s:
             self._box.advance(*self._pushes())
+            if self._alone is not None:
+                self._alone.advance(nothing, nothing)
         return self._sensors.collect(self._time) + self._joint.turn(self._time, dt_s)
 
     def aim(self, tilt_rad: float) -> None:
