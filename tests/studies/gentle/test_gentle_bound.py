@@ -9,10 +9,22 @@ from pools import Here
 
 from wakewise.allocation import compile_layout
 from wakewise.cli.bench_gentle import show_gentle
+from wakewise.control.bow_rule import bow_layout
 from wakewise.control.loop import vehicle_layout
 from wakewise.errors import InputError
 from wakewise.studies.gentle import bench as gentle
-from wakewise.studies.gentle.bound import ENERGIES, FRESH_GUSTS, Judge, attained, smoothed
+from wakewise.studies.gentle import bound
+from wakewise.studies.gentle.bound import (
+    ENERGIES,
+    FRESH_GUSTS,
+    BoundTrial,
+    Judge,
+    attained,
+    candidates,
+    fly_bound,
+    fly_dp,
+    smoothed,
+)
 from wakewise.studies.gentle.bound_figures import NAMED, bound_figures, reductions
 from wakewise.studies.gentle.choosing import chosen, sum_of
 from wakewise.studies.gentle.flight import FIGURES
@@ -127,6 +139,25 @@ def test_where_no_jet_reaches_the_target_nothing_is_to_be_gained():
         assert found[f"bound_{name}_m_s"] == pytest.approx(judge.wash_m_s(0))
         assert found[f"attained_{name}_m_s"] == pytest.approx(0.0055)
     assert judge.energy(0) == 1.0
+
+
+def test_a_flight_of_dp_is_judged_with_the_rule_and_the_belief_among_the_choices(monkeypatch):
+    """Its first seconds: all choices make its wrench, the rule's bow thrusters never blow ahead, and all keys are told;
+    the belief spares the target by what it knows, for power.
+    """
+    trial = BoundTrial(scenario="orbit/paper", seed=1, duration_s=13.0)
+    flown = fly_dp(trial)
+    monkeypatch.setattr(bound, "sharings", lambda layout, least_N: sharings(layout, least_N)[:3])
+    grid, named = candidates(flown)
+    assert np.abs((grid - grid[0]) @ flown.layout.B.T).max() < 1e-6
+    rule = bow_layout(flown.vehicle)
+    assert (grid[named["rule"]] >= rule.lower_N - 1e-6).all() and (grid[named["rule"]] <= rule.upper_N + 1e-6).all()
+    assert not (grid[0] >= rule.lower_N - 1e-6).all() or not (grid[0] <= rule.upper_N + 1e-6).all()
+    monkeypatch.setattr(bound, "fly_dp", lambda _: flown)
+    row = fly_bound(trial)
+    assert None not in row.values() and row["sharings"] == 6.0
+    assert row["belief_any_m_s"] < 0.8 * row["least_m_s"] and row["belief_any_energy"] > 1.05
+    assert row["bound_any_m_s"] <= row["bound_1.05_m_s"] <= 1.5 * row["least_m_s"]
 
 
 def test_power_goes_to_the_flight_in_which_it_buys_more():

@@ -66,10 +66,14 @@ Led = Callable[[IntArray], tuple[float, float]]
 
 @dataclass(frozen=True, kw_only=True)
 class BoundTrial:
-    """One flight whose sharings are judged; hashable, so that it can be handed to a worker."""
+    """One flight whose sharings are judged; hashable, so that it can be handed to a worker.
+
+    `duration_s` is as in `Trial`.
+    """
 
     scenario: str
     seed: int
+    duration_s: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -141,7 +145,7 @@ def fly_dp(trial: BoundTrial) -> Flown:
             estimates.append(step.estimate)
         seen.append(1)
 
-    steps = fly(parts, checked=False, water_every_s=0.25, watch=heard).steps
+    steps = fly(parts, checked=False, water_every_s=0.25, duration_s=trial.duration_s, watch=heard).steps
     times = steps["time_s"].to_numpy()
     state = [steps.select(f"true_{name}" for name in names).to_numpy() for names in _STATE]
     way = Way(times_s=times, p_WB_m=state[0], q_WB=state[1], nu_B=state[2])

@@ -41,13 +41,12 @@ def chosen(wash: Array, energy: Array, most: float) -> IntArray:
             pick[shift:][better] = j
         best = after
         taken.append((pick, steps))
-    left: int = _LEVELS
-    picks: list[int] = []
-    for pick, steps in reversed(taken):
-        j = int(pick[left])
-        picks.append(j)
-        left -= int(steps[j])
-    return np.array(picks[::-1], dtype=np.int64)
+    picks, left = np.zeros(len(taken), dtype=np.int64), _LEVELS
+    for b in reversed(range(len(taken))):
+        pick, steps = taken[b]
+        picks[b] = pick[left]
+        left -= round(float(steps[picks[b]]))
+    return picks
 
 
 def sum_of(values: Array, picks: IntArray) -> float:
