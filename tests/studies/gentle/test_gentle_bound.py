@@ -145,7 +145,7 @@ def test_a_flight_of_dp_is_judged_with_the_rule_and_the_belief_among_the_choices
     """Its first seconds: all choices make its wrench, the rule's bow thrusters never blow ahead, and all keys are told;
     the belief spares the target by what it knows, for power.
     """
-    trial = BoundTrial(scenario="orbit/paper", seed=1, duration_s=13.0)
+    trial = BoundTrial(scenario="orbit/paper", seed=1, duration_s=12.0)
     flown = fly_dp(trial)
     monkeypatch.setattr(bound, "sharings", lambda layout, least_N: sharings(layout, least_N)[:3])
     grid, named = candidates(flown)
@@ -154,6 +154,7 @@ def test_a_flight_of_dp_is_judged_with_the_rule_and_the_belief_among_the_choices
     assert (grid[named["rule"]] >= rule.lower_N - 1e-6).all() and (grid[named["rule"]] <= rule.upper_N + 1e-6).all()
     assert not (grid[0] >= rule.lower_N - 1e-6).all() or not (grid[0] <= rule.upper_N + 1e-6).all()
     monkeypatch.setattr(bound, "fly_dp", lambda _: flown)
+    monkeypatch.setattr(bound, "candidates", lambda _: (grid, named))
     row = fly_bound(trial)
     assert None not in row.values() and row["sharings"] == 6.0
     assert row["belief_any_m_s"] < 0.8 * row["least_m_s"] and row["belief_any_energy"] > 1.05
