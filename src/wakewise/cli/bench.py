@@ -61,6 +61,15 @@ Judge = Annotated[
     int,
     typer.Option(help="worlds: seeds flown in the lattice as well, minutes of a core each.", min=0, max=1000),
 ]
+Bound = Annotated[
+    int,
+    typer.Option(
+        help="gentle: seeds for which the most is worked out that sharing thrusts out could gain, two minutes of a "
+        "core each; the whole is --methods dp,bow-rule,wake-aware --bound 3.",
+        min=0,
+        max=1000,
+    ),
+]
 Fresh = Annotated[
     bool, typer.Option("--fresh", help="gentle, operator, worlds: fly anew what an earlier run has flown.")
 ]
@@ -91,6 +100,7 @@ def bench(
     w_tracks: WTracks = "",
     models: Models = 1,
     judge: Judge = 0,
+    bound: Bound = 0,
     fresh: Fresh = False,
     workers: Workers = 2,
     store: Store = None,
@@ -128,6 +138,7 @@ def bench(
                 w_tracks=_numbers("--w-tracks", w_tracks),
                 models=models,
                 judge=judge,
+                bound=bound,
                 fresh=fresh,
                 workers=workers,
                 store=store,

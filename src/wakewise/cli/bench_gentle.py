@@ -63,6 +63,8 @@ def show_gentle(result: dict[str, Any]) -> None:
     levers = sorted({lever for scenario in result["scenarios"].values() for lever in scenario["levers"]})
     if levers:
         _show_levers(result["scenarios"], levers)
+    if result["bound"]:
+        _show_bound(result["bound"])
     for flow, figures in result["flows"].items():
         less = ", ".join(
             f"{reduction(*(figures[f'reduction_vs_{rival}_{what}pct'] for what in ('', 'interval_')))} than {rival}"
@@ -113,6 +115,31 @@ def _show_levers(scenarios: dict[str, Any], levers: list[str]) -> None:
     for name, scenario in scenarios.items():
         cells = [scenario["levers"].get(lever, {}) for lever in levers]
         table.add_row(name, *(f"{reduction(c.get('left_out_pct'))} / {reduction(c.get('alone_pct'))}" for c in cells))
+    print_table(table)
+
+
+def _show_bound(bound: dict[str, Any]) -> None:
+    """The most that sharing thrusts out could gain: less wash than `dp` as flown, energy over the least thrusts'."""
+    from rich.table import Table
+
+    from wakewise.studies.gentle.bound import ENERGIES
+
+    table = Table(title="the most that sharing thrusts out could gain: less than dp as flown", title_justify="left")
+    table.add_column("flight", no_wrap=True)
+    for title in ("dp mm/s", *(f"{name} x energy" for name in ENERGIES), "rule", "belief", "belief, any"):
+        table.add_column(title, justify="right")
+    rows = {**bound["flights"], **({} if bound["trouble"] is None else {"all in trouble": bound["trouble"]})}
+    for flight, row in rows.items():
+        speed = row.get("dp_m_s")
+        most = [
+            f"{reduction(row[f'attained_{name}_less_pct'])} to {reduction(row[f'bound_{name}_less_pct'])}"
+            for name in ENERGIES
+        ]
+        named = [
+            f"{reduction(row[f'{name}_less_pct'])}, {shown(row[f'{name}_energy'])}"
+            for name in ("rule", "belief", "belief_any")
+        ]
+        table.add_row(flight, shown(None if speed is None else 1e3 * speed), *most, *named)
     print_table(table)
 
 

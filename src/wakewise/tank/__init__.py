@@ -9,7 +9,7 @@ world is) and `world.py` (how a flight begins in it; `ambient.py` is its current
 joint of its camera; `sediment*.py`, `grains.py` and `swell.py` silt and its laws, `beds.py` beds by name; `swaying.py`
 moves a soft or loose target, `flakes.py` what drifts before the camera; `measuring.py` and `probes.py` are what a
 flight is judged by, `preflight.py` what is refused beforehand, `limits.py` what the water gets wrong; `probe.py` and
-`probe_tables.py` the truth for outsiders (`wakewise tank probe`).
+`probe_tables.py` the truth for outsiders (`wakewise tank probe`), `led.py` the water of a vehicle led along a way.
 """
 
 from wakewise.tank.ambient import build_ambient

@@ -17,12 +17,13 @@ from wakewise.tank.camera_joint import CameraJoint
 from wakewise.tank.flakes import Flakes
 from wakewise.tank.grains import STRESS_INTENSITY, speed_at_stress_m_s
 from wakewise.tank.lane import Lane
+from wakewise.tank.led import tank_water
 from wakewise.tank.measuring import TargetProbes
 from wakewise.tank.plant import VehiclePlant
 from wakewise.tank.probes import surface_points
 from wakewise.tank.sediment import SHEAR_HEIGHT_M, Silt, SiltLaws
 from wakewise.tank.sensors import Sensors
-from wakewise.tank.settings import MAX_PARCELS, MAX_SILT_PARTICLES, TankSettings
+from wakewise.tank.settings import MAX_SILT_PARTICLES, TankSettings
 from wakewise.tank.swaying import Swaying, Yielding
 from wakewise.tank.swell import Swell
 from wakewise.tank.tether import Tether
@@ -30,8 +31,6 @@ from wakewise.targets import Target
 from wakewise.thrusters import electrical_power_W
 from wakewise.vehicles import Vehicle
 from wakewise.water import AiryWave, AmbientSum
-from wakewise.water.blockage import Blockage
-from wakewise.water.closure import SWIRLING, Spreading
 from wakewise.water.hullwake import HullPush
 from wakewise.water.induction import impulse_velocity
 from wakewise.water.instant import Instant
@@ -90,7 +89,7 @@ class Tank:
         yielding: Yielding | None = None,
         beside: bool = True,
     ) -> None:
-        length, width, depth = settings.size_m
+        depth = settings.size_m[2]
         if abs(target.bed_z_m - depth) > 1e-6:
             raise InputError(
                 f"target {target.name}: stands on a bed at {target.bed_z_m:g} m, tank.size_m has {depth:g}"
@@ -110,19 +109,7 @@ class Tank:
             failures=settings.failures,
             tether=Tether.of(settings),
         )
-        self._water = Water(
-            vehicle.disk_areas_m2,
-            density_kg_m3=settings.density_kg_m3,
-            bed_z_m=depth,
-            rng=water_rng,
-            ambient=self.ambient,
-            half_size_m=(length / 2, width / 2),
-            turbulence=settings.jets.turbulence,
-            max_parcels=MAX_PARCELS,
-            spreading=SWIRLING if settings.jets.swirl else Spreading.of_width(settings.jets.half_width_growth),
-            body=Blockage.of(target),
-            wake_life=settings.jets.wake_life,
-        )
+        self._water = tank_water(vehicle, target, settings, self.ambient, water_rng)
         silt = settings.silt
         laws = SiltLaws.of(
             silt.grain_m,
@@ -367,6 +354,11 @@ class Tank:
 def tank_ambient(settings: TankSettings, rng: np.random.Generator) -> AmbientSum:
     """The water's own motion in a tank that is made with a generator like this one; the same draws."""
     return build_ambient(settings, _streams(rng)[-1])
+
+
+def tank_points(target: Target, rng: np.random.Generator) -> Array:
+    """Points on the target at which a tank that is made with a generator like this one is judged, shape (n, 3)."""
+    return TargetProbes(target, _streams(rng)[3]).surface_W_m
 
 
 def _streams(rng: np.random.Generator) -> list[np.random.Generator]:

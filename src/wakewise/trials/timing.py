@@ -37,6 +37,8 @@ class BenchOptions:
         Seeds, from 1, for which a bench of worlds also scans and makes a model.
     judge : int
         Seeds, from 1, that such a bench also flies in the lattice.
+    bound : int
+        Seeds, from 1, of whose flights such a bench works out the most that sharing thrusts out could gain.
     fresh : bool
         Fly anew what an earlier run has flown.
     workers : int
@@ -55,6 +57,7 @@ class BenchOptions:
     w_tracks: tuple[float, ...] | None = None
     models: int = 1
     judge: int = 0
+    bound: int = 0
     fresh: bool = False
     workers: int = 2
     store: Path | None = None
@@ -63,7 +66,7 @@ class BenchOptions:
         for name, value, most in (("seeds", self.seeds, 1000), ("workers", self.workers, 64)):
             if not 1 <= value <= most:
                 raise InputError(f"{name}: {value}, allowed 1 to {most}")
-        for name, value in (("models", self.models), ("judge", self.judge)):
+        for name, value in (("models", self.models), ("judge", self.judge), ("bound", self.bound)):
             if not 0 <= value <= 1000:
                 raise InputError(f"{name}: {value}, allowed 0 to 1000")
 

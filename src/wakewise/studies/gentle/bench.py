@@ -3,7 +3,7 @@
 Scenarios are files (`scenarios/`), stratified over trim and the side of the current (`strata.py`); the library's
 worlds count as scenarios, too. Seed k of a scenario is one world for all methods, so flights are compared in pairs;
 the headline was chosen beforehand (`headline.py`, docs/decisions/0033). The paper's own world is circular and says so
-(`paper.py`).
+(`paper.py`). What no controller could pass by sharing thrusts out is worked out where that is wished (`bound.py`).
 
 Flights are kept (`flight_store`): a run that was stopped goes on, and a second one only flies what is new.
 """
@@ -19,6 +19,8 @@ import numpy as np
 from wakewise.campaigns import Processes
 from wakewise.studies import side_by_side
 from wakewise.studies.flight_store import FlightStore, store_folder
+from wakewise.studies.gentle.bound import BoundTrial
+from wakewise.studies.gentle.bound_figures import bound_figures
 from wakewise.studies.gentle.figures import SPEED, Row, log_reduction_pct, means, pairs_of, reduction_pct
 from wakewise.studies.gentle.flight import FIGURES
 from wakewise.studies.gentle.headline import PLACE, RIVALS, WRONG, headline
@@ -37,6 +39,7 @@ PAPER = "paper"
 
 _engine = Processes
 _FLY, _FLY_PAPER = "wakewise.studies.gentle.flight:fly_trial", "wakewise.studies.gentle.paper:fly_paper"
+_BOUND = "wakewise.studies.gentle.bound:fly_bound"
 
 
 def run(options: BenchOptions) -> dict[str, Any]:
@@ -67,19 +70,35 @@ def run(options: BenchOptions) -> dict[str, Any]:
         papers, lost, known = side_by_side.fly_all(
             paper_trials(methods, options.seeds), _FLY_PAPER, store, options, _engine
         )
+    bounds: dict[Key, Row] = {}
+    unbound: list[Failure] = []
+    if options.bound:
+        bounds, unbound, _ = side_by_side.fly_all(
+            bound_trials(scenarios, options.bound), _BOUND, store, options, _engine
+        )
     failed = {(failure.name, (failure.flow, failure.seed)) for failure in failures}
     trims = {(scenario, seed): trim_of(scenario, seed) for scenario, _, seed in trials}
     return {
         "scenarios": {name: scenario_figures(name, methods, levers, rows, failures) for name in scenarios},
         "headline": headline(by_method(rows), trims, failed),
+        "bound": bound_figures(bounds) if options.bound else None,
         "flows": {PAPER: paper_figures(papers, methods)} if with_paper else {},
         "flights": len(trials) + len(papers) + len(lost),
         "flown": len(rows) + len(papers) - kept - known,
-        "failed": len(failures) + len(lost),
-        "failures": [vars(failure) for failure in (*failures, *lost)],
+        "failed": len(failures) + len(lost) + len(unbound),
+        "failures": [vars(failure) for failure in (*failures, *lost, *unbound)],
         "flight_cpu_s": _cpu_s(rows),
         "wall_s": time.monotonic() - began,
         "why": reasons | why(levers, with_paper),
+    }
+
+
+def bound_trials(scenarios: tuple[str, ...], seeds: int) -> dict[Key, BoundTrial]:
+    """Flights whose sharings are judged."""
+    return {
+        (scenario, "bound", seed): BoundTrial(scenario=scenario, seed=seed)
+        for seed in range(1, seeds + 1)
+        for scenario in scenarios
     }
 
 
