@@ -199,15 +199,16 @@ def _crossing_at(angle_deg: float, back_D: float, half_D: tuple[float, float]) -
     )
 
 
-def _past_box(name: str, gap_D: float) -> Case:
-    """A jet along x whose axis runs so far above the top of a solid cube of 4 D, which begins 3 D from the disk."""
+def _past_box(name: str, gap_D: float, side_D: float) -> Case:
+    """A jet along x whose axis runs so far above the top of a solid cube, z down, which begins 3 D from the disk."""
+    half = 0.5 * side_D
     return Case(
         name=name,
         jets=(DiskJet(),),
         low_D=(-3.0, -5.0, -5.0),
         high_D=(13.0, 5.0, 7.0),
         cells_per_D=8,
-        boxes_D=(((3.0, -2.0, gap_D), (7.0, 2.0, gap_D + 4.0)),),
+        boxes_D=(((3.0, -half, gap_D), (3.0 + side_D, half, gap_D + side_D)),),
     )
 
 
@@ -269,8 +270,9 @@ def _cases() -> dict[str, Case]:
             ),
             _crossing_at(40.0, 9.0, (6.0, 5.0)),
             _crossing_at(110.0, 8.0, (8.0, 6.0)),
-            _past_box("past-box", 1.0),
-            _past_box("grazing-box", 0.5),
+            _past_box("past-box", 1.0, 4.0),
+            _past_box("grazing-box", 0.5, 4.0),
+            _past_box("grazing-target", 0.5, 2.5),
             Case(
                 name="four",
                 jets=(replace(plain, strength=4.0),),
@@ -284,8 +286,8 @@ def _cases() -> dict[str, Case]:
 
 CASES = _cases()
 """Cases by name. `twin`: 8 cm apart for D = 60 mm; `head-on`: 0.6 m apart; `crossing`: at right angles, 0.36 m
-from both disks, and at 40 and 110 degrees; `past-box`, `grazing-box`: one diameter and half of one above a box of
-0.24 m, z down; `four`: four times the thrust."""
+from both disks, and at 40 and 110 degrees; `past-box`, `grazing-box`, `grazing-target`: one diameter and half of one
+beside a cube of 0.24 m, and half of one beside one of 0.15 m; `four`: four times the thrust."""
 
 
 def find_case(name: str) -> Case:

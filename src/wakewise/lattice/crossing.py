@@ -50,7 +50,7 @@ def crossing_figures(run: LatticeRun) -> dict[str, Any]:
     InputError
         If the run's case is not such a pair.
     """
-    centre, means = _crossing_of(run.case), run.means()[1:4]
+    centre, means = crossing_place(run.case), run.means()[1:4]
     along, across = _bisector(run.case)
     out = np.arange(0.0, _REACH_D, _STEP_D)
     found: dict[str, list[float | None]] = {"speed": [], "half_height_D": [], "half_width_D": []}
@@ -111,7 +111,7 @@ class CrossingField:
 
 def crossing_field(run: LatticeRun) -> CrossingField:
     """Mean flow behind the crossing of a run, which is as `crossing_figures` needs it."""
-    centre, means = _crossing_of(run.case), run.means()[1:4]
+    centre, means = crossing_place(run.case), run.means()[1:4]
     along, across = _bisector(run.case)
     away, out = np.arange(0.5, 7.01, 0.5), np.arange(0.0, _REACH_D + 0.01, 0.25)
     shape = len(away), len(out)
@@ -181,7 +181,7 @@ def is_crossing(case: Case) -> bool:
     return level and abs(one[0] * two[1] - one[1] * two[0]) > 1e-6
 
 
-def _crossing_of(case: Case) -> Array:
+def crossing_place(case: Case) -> Array:
     """Where the axes of a case's two jets cross, shape (3,)."""
     if not is_crossing(case):
         raise InputError(f"lattice case {case.name!r}: not two jets that cross in a plane, as the figures need")

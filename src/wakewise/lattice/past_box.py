@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.arrays import Array, freeze
+from wakewise.arrays import Array, BoolArray, freeze
 from wakewise.errors import InputError
 from wakewise.files import whole_file
 from wakewise.lattice.cases import Case, case_hash, find_case
@@ -66,6 +66,11 @@ class PastField:
         """Where the flux is summed, a quarter of a diameter apart, shape (n, 2 k - 1, m, 3)."""
         return _planes(self.x_D, self.y_D, self.z_D)
 
+    def wet(self, points_D: Array) -> BoolArray:
+        """Which of the points, shape (..., 3), are in the water and not in the box."""
+        low, high = (np.array(corner) for corner in find_case(self.case).boxes_D[0])
+        return np.asarray(np.any((points_D <= low) | (points_D >= high), axis=-1))
+
 
 def past_field(run: LatticeRun) -> PastField:
     """Mean flow of a run of one jet along x past one box below it.
@@ -113,7 +118,7 @@ def past_figures(field: PastField, along: Array | None = None) -> dict[str, Any]
     ----------
     field : PastField
     along : ndarray, shape (n, m), or None
-        Speeds of another water at the field's places; None for the field's own.
+        Speeds of another water at the field's places; None for the field's own. What it has in the box is left out.
 
     Returns
     -------
@@ -121,7 +126,7 @@ def past_figures(field: PastField, along: Array | None = None) -> dict[str, Any]
         x_D; fastest: over U0; drawn_D: how far below the jet's own axis it is; middle_D: how far below it the middle
         of the momentum in that plane is.
     """
-    u = np.maximum(field.along if along is None else along, 0.0)
+    u = np.where(field.wet(field.points_D()[0]), np.maximum(field.along if along is None else along, 0.0), 0.0)
     whole = np.flatnonzero(np.abs(field.x_D - np.round(field.x_D)) < 1e-9)
     top = np.argmax(u, axis=1)[whole]
     # The vertex of the parabola through the fastest three: places are finer than the table.

@@ -90,9 +90,11 @@ class Disk:
         self.cells: IntArray = np.ascontiguousarray((where + start + 1)[:, self._back])  # with halo
         gaps = where + start + 0.5 - centre
         across = (gaps @ self._frame.T if jet.turn_deg else gaps)[:, 1:]
-        lever = np.sum(self.share * np.sum(across**2, axis=1))
+        # On a slant the cells' middle is not quite the disk's, and a twist about another place would push.
+        about = across - self.share @ across if jet.turn_deg else across
+        lever = np.sum(self.share * np.sum(about**2, axis=1))
         # Solid-body swirl: the force across grows with the radius and its moment is the torque.
-        self.twist = jet.torque * n * across[:, ::-1] * (-1.0, 1.0) / lever * self.share[:, None]
+        self.twist = jet.torque * n * about[:, ::-1] * (-1.0, 1.0) / lever * self.share[:, None]
         # Patches on a sunflower, so that they cover the disk evenly on every grid alike.
         k = np.arange(_PATCHES) + 0.5
         spots = (
