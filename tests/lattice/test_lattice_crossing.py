@@ -41,7 +41,7 @@ def test_the_fields_at_other_angles_are_fans_too(name):
 
 
 def test_the_more_the_jets_oppose_each_other_the_less_runs_on():
-    """On the bisector, 1 to 6 D behind the crossing: 40, 90, 110 degrees, each slower than the one before, within 3 %."""
+    """On the bisector, 1 to 6 D behind the crossing: 40, 90, 110 degrees, each slower than the last, within 3 %."""
     speeds = []
     for name in ("crossing-40", "crossing", "crossing-110"):
         field = load_crossing(DATA / f"{name}.npz")

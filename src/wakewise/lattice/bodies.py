@@ -19,7 +19,8 @@ def solid_cells(case: Case) -> BoolArray:
     solid = np.zeros(case.cells, np.bool_)
     for low, high in case.boxes_D:
         inside = [
-            (start + (np.arange(n) + 0.5) / case.cells_per_D > a) & (start + (np.arange(n) + 0.5) / case.cells_per_D < b)
+            (start + (np.arange(n) + 0.5) / case.cells_per_D > a)
+            & (start + (np.arange(n) + 0.5) / case.cells_per_D < b)
             for start, n, a, b in zip(case.low_D, case.cells, low, high, strict=True)
         ]
         solid |= inside[0][:, None, None] & inside[1][:, None] & inside[2]

@@ -1,4 +1,4 @@
-"""What a jet becomes that passes a solid box: how fast it is above and behind it, and how far it is drawn towards it."""
+"""What a jet becomes that passes a solid box: how fast it is beside and behind it, and how far it is drawn to it."""
 
 from __future__ import annotations
 
