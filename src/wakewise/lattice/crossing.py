@@ -160,9 +160,9 @@ def load_crossing(path: Path = DATA / "crossing.npz") -> CrossingField:
         If it was computed for another case or by another solver.
     """
     with np.load(path, allow_pickle=False) as data:
-        plain = {"case": "crossing"} | {name: str(data[name]) for name in ("hash", "case") if name in data.files}
-        arrays = {name: data[name] for name in data.files if name not in (*plain, "cells_per_D")}
-        field = CrossingField(**plain, cells_per_D=int(data["cells_per_D"]), **arrays)
+        arrays = {name: data[name] for name in data.files if name not in ("case", "hash", "cells_per_D")}
+        case = str(data["case"]) if "case" in data.files else "crossing"  # which says no name
+        field = CrossingField(case=case, hash=str(data["hash"]), cells_per_D=int(data["cells_per_D"]), **arrays)
     now = case_hash(find_case(field.case).resolved(field.cells_per_D))
     if field.hash != now:
         raise InputError(

@@ -173,8 +173,9 @@ def load_past_box(name: str = "past-box", folder: Path = DATA) -> PastField:
     path = folder / f"{name}.npz"
     with np.load(path, allow_pickle=False) as data:
         arrays = {key: data[key] for key in data.files if key not in ("case", "hash", "cells_per_D")}
-        words = {"case": str(data["case"]), "hash": str(data["hash"])}
-        field = PastField(**words, cells_per_D=int(data["cells_per_D"]), **arrays)
+        field = PastField(
+            case=str(data["case"]), hash=str(data["hash"]), cells_per_D=int(data["cells_per_D"]), **arrays
+        )
     now = case_hash(find_case(name).resolved(field.cells_per_D))
     if field.hash != now:
         raise InputError(
