@@ -18,7 +18,7 @@ from typing import Any
 from wakewise.cli.console import Bars
 from wakewise.errors import WakewiseError
 from wakewise.lattice import CASES, LatticeRun, compute_run, find_case
-from wakewise.lattice.crossing import crossing_figures
+from wakewise.lattice.crossing import crossing_figures, is_crossing
 from wakewise.lattice.engines import DEVICES
 from wakewise.lattice.laws import figures
 from wakewise.lattice.meanfield import mean_field
@@ -26,7 +26,7 @@ from wakewise.lattice.meanfield import mean_field
 
 def measured(run: LatticeRun) -> dict[str, Any]:
     """Figures of a run: those of a crossing, or those of the laws of jets."""
-    return figures(mean_field(run)) if {jet.axis for jet in run.case.jets} == {"x"} else crossing_figures(run)
+    return crossing_figures(run) if is_crossing(run.case) else figures(mean_field(run))
 
 
 def change_pct(fine: Any, coarse: Any) -> Any:

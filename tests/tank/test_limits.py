@@ -2,15 +2,20 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
-from wakewise.lattice.crossing import load_crossing
+from wakewise.lattice import find_case
+from wakewise.lattice.crossing import crossing_place, load_crossing
+from wakewise.lattice.meanfield import DATA
+from wakewise.lattice.past_box import load_past_box, momentum, past_figures
 from wakewise.tank.grains import friction_velocity_m_s
 from wakewise.tank.limits import ABSENT, LIMITS, limits_table
 from wakewise.tank.sediment import SHEAR_HEIGHT_M
-from wakewise.targets import Mesh, coral, place_on_bed
+from wakewise.targets import Mesh, Target, coral, place_on_bed
 from wakewise.water.blockage import Blockage, _surface
 from wakewise.water.closure import Spreading
 from wakewise.water.hullwake import HullPush, first_wake
@@ -139,34 +144,140 @@ def _head_on():
     return _span(np.mean(speeds, axis=0) / [0.20, 0.17, 0.13, 0.05])
 
 
-def _crossing():
-    """Speeds behind the crossing and above it over U0, the lattice's, and which heights are 1 to 2 D."""
-    field = load_crossing()
+@cache
+def _crossing(name="crossing"):
+    """Speeds behind a crossing and above it over U0, the lattice's, and which heights are 1 to 2 D."""
+    field, case = load_crossing(DATA / f"{name}.npz"), find_case(name)
     behind = (field.away_D >= 1.0) & (field.away_D <= 6.0)
-    points = np.array([6.0, 0.0, 0.0]) + field.points_D()[0][behind]
+    points = crossing_place(case) + field.points_D()[0][behind]
     water = _water(2, turbulence=0.25, spreading=Spreading.of_width(0.13))
-    at, jets = np.array([[0.0, 0.0, 0.0], [6.0, -6.0, 0.0]]) * D_M, [[1.0, 0, 0], [0, 1.0, 0]]
+    at, jets = np.array([jet.position_D for jet in case.jets]) * D_M, [jet.direction for jet in case.jets]
     _push(water, 40 * UNIT_S, [1.0, 1.0], at, jets)
     steps = round(80 * UNIT_S / 0.05)
     flat = points.reshape(-1, 3) * D_M
     u = sum(_push(water, 0.05, [1.0, 1.0], at, jets).velocity(flat) for _ in range(steps)) / steps / EXIT_M_S
     u = u.reshape(points.shape)
-    along = u @ np.array([1.0, 1.0, 0.0]) / math.sqrt(2)
+    bisector = np.sum(jets, axis=0)
+    along = u @ (bisector / np.linalg.norm(bisector))
     up = (field.out_D >= 1.0) & (field.out_D <= 2.0)
     return along, np.hypot(along, u[..., 2]), field, behind, up
 
 
+def _axis_over_lattice(name):
+    along, _, field, behind, _ = _crossing(name)
+    return along[:, 0] / field.along_above[behind, 0]
+
+
+def _fan_over_lattice(name):
+    _, speed, field, behind, up = _crossing(name)
+    theirs = np.hypot(field.along_above, field.out_above)[behind]
+    return speed[:, up].mean(axis=1) / theirs[:, up].mean(axis=1)
+
+
 @_measures("jets that cross: on the axis")
 def _crossing_axis():
-    along, _, field, behind, _ = _crossing()
-    return _span(along[:, 0] / field.along_above[behind, 0])
+    return _span(_axis_over_lattice("crossing"))
 
 
 @_measures("jets that cross: the fan")
 def _crossing_fan():
-    _, speed, field, behind, up = _crossing()
-    theirs = np.hypot(field.along_above, field.out_above)[behind]
-    return _span(speed[:, up].mean(axis=1) / theirs[:, up].mean(axis=1))
+    return _span(_fan_over_lattice("crossing"))
+
+
+@_measures("jets that cross at 40 and 110 degrees: on the axis")
+def _other_axes():
+    return _span([_axis_over_lattice(name) for name in ("crossing-40", "crossing-110")])
+
+
+@_measures("jets that cross at 40 degrees: the fan")
+def _narrow_fan():
+    return _span(_fan_over_lattice("crossing-40"))
+
+
+@_measures("jets that cross at 110 degrees: the fan")
+def _wide_fan():
+    return _span(_fan_over_lattice("crossing-110"))
+
+
+def _cube(case):
+    """A case's box as a target far from every face, its jet 25 m deep."""
+    low, high = (np.array(corner) * D_M + [0, 0, 25] for corner in case.boxes_D[0])
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * (high - low) + low
+    sides = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+    faces = np.array([t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))])
+    half = 0.5 * float(np.linalg.norm(high - low))
+    return Target(name="box", mesh=Mesh(corners, faces), centre_W_m=0.5 * (low + high), radius_m=half, bed_z_m=50.0)
+
+
+@cache
+def _past(name, solid):
+    """Fastest water 4 to 10 D down a jet past a box, and momentum 8 to 10 D down it, over the lattice's."""
+    field, case = load_past_box(name), find_case(name)
+    body = Blockage.of(_cube(case)) if solid else None
+    water = _water(bed_z_m=50.0, turbulence=0.25, spreading=Spreading.of_width(0.13), body=body)
+    at, behind, steps = [[0.0, 0.0, 25.0]], (field.x_D >= 8.0) & (field.x_D <= 10.0), round(80 * UNIT_S / 0.05)
+    upright, planes = field.points_D()[0], field.planes_D()[behind]
+    places = [points.reshape(-1, 3) * D_M + at for points in (upright, planes)]
+    _push(water, 40 * UNIT_S, [1.0], at)
+    u, through = np.zeros(upright.shape[:-1]), np.zeros(planes.shape[:-1])
+    for k in range(steps):
+        _push(water, 0.05, [1.0], at)
+        u += water.velocity(places[0])[:, 0].reshape(u.shape) / steps / EXIT_M_S
+        if k % 8 == 0:
+            through += water.velocity(places[1])[:, 0].reshape(through.shape) / EXIT_M_S
+    through = np.where(field.wet(planes), through / len(range(0, steps, 8)), 0.0)
+    ours, theirs = past_figures(field, u), past_figures(field)
+    fastest = (np.array(ours["fastest"]) / theirs["fastest"])[3:10]
+    return fastest, momentum(through, field.y_D, field.z_D) / field.flux[behind], np.array(ours["drawn_D"])
+
+
+@_measures("a jet past a target")
+def _target():
+    return _span(_past("grazing-target", solid=True)[0])
+
+
+@_measures("a jet past a target: its momentum")
+def _target_momentum():
+    return _span(_past("grazing-target", solid=True)[1])
+
+
+def _cut(target, times, first):
+    """The same box in triangles of half the size, so many times over, told from another of them on."""
+    corners = target.mesh.vertices_m[target.mesh.faces]
+    for _ in range(times):
+        a, b, c = (corners[:, k] for k in range(3))
+        ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+        corners = (
+            np.stack([(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]).transpose(2, 0, 1, 3).reshape(-1, 3, 3)
+        )
+    corners = np.roll(corners, first, axis=0)
+    return replace(target, mesh=Mesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)))
+
+
+def _fastest_of_cuttings():
+    """Fastest water beside a box over U0, of ten cuttings that differ in where points and sources fall only."""
+    case, field, found = find_case("grazing-target"), load_past_box("grazing-target"), []
+    upright = field.points_D()[0]
+    places = upright[field.wet(upright)] * D_M + [0.0, 0.0, 25.0]
+    for k in range(10):
+        water = _water(bed_z_m=50.0, spreading=Spreading.of_width(0.13), body=Blockage.of(_cut(_cube(case), 3, 77 * k)))
+        _push(water, 4.0, [1.0], [[0.0, 0.0, 25.0]])
+        speeds = [
+            np.linalg.norm(_push(water, 0.5, [1.0], [[0.0, 0.0, 25.0]]).velocity(places), axis=1).max()
+            for _ in range(16)
+        ]
+        found.append(max(speeds) / EXIT_M_S)
+    return np.array(found)
+
+
+@_measures("a jet past a target: no runaway")
+def _no_runaway():
+    return _span([np.mean(_fastest_of_cuttings() < 1.6)])
+
+
+@_measures("a jet past the hull")
+def _along_hull():
+    return _span(_past("grazing-box", solid=False)[1])
 
 
 def _stress(thrust_N, H):

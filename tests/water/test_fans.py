@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from wakewise.lattice import load_mean_field
-from wakewise.lattice.crossing import load_crossing
+from wakewise.lattice import find_case, load_mean_field
+from wakewise.lattice.crossing import crossing_place, load_crossing
+from wakewise.lattice.meanfield import DATA
 from wakewise.water.closure import Spreading
 from wakewise.water.fans import RAYS, fan_out, ray_azimuths
 from wakewise.water.parcels import Parcels
@@ -95,8 +96,8 @@ def test_without_room_a_crossing_waits():
     assert fan_out(jets, 2, STREAMS, 0) == (2, 0)
 
 
-def _crossing(width, points_D):
-    """Mean flow of the lattice's case by parcels, over U0, at points from the crossing, in D; and the water."""
+def _crossing(width, points_D, name="crossing"):
+    """Mean flow of a lattice's case by parcels, over U0, at points from the crossing, in D; and the water."""
     water = Water(
         np.full(2, AREA_M2),
         density_kg_m3=1000.0,
@@ -106,9 +107,10 @@ def _crossing(width, points_D):
         spreading=Spreading.of_width(width),
         rest_speed_m_s=0.0,
     )
-    disks = np.array([[0.0, 0.0, 0.0], [6.0, -6.0, 0.0]]) * D_M
-    axes, impulses, dt_s = -np.array([[1.0, 0, 0], [0, 1.0, 0]]), np.array([[0.05, 0.0], [0.05, 0.0]]), 0.05
-    points, u, steps = (np.array([6.0, 0.0, 0.0]) + points_D) * D_M, np.zeros(points_D.shape), 0
+    case = find_case(name)
+    disks = np.array([jet.position_D for jet in case.jets]) * D_M
+    axes, impulses, dt_s = -np.array([jet.direction for jet in case.jets]), np.array([[0.05, 0.0], [0.05, 0.0]]), 0.05
+    points, u, steps = (crossing_place(case) + points_D) * D_M, np.zeros(points_D.shape), 0
     while water.time_s < 120 * D_M / EXIT_M_S:  # as the lattice: 40 D/U0 to develop, 80 to average
         water.step(dt_s, disks, disks, axes, impulses)
         if water.time_s > 40 * D_M / EXIT_M_S:
@@ -150,3 +152,20 @@ def test_crossing_jets_fan_out_as_in_the_lattice():
     single = load_mean_field("free").at(np.array([6.0]), np.zeros(1), ("axial",))[0, 0]
     own = (round_ @ along)[:, 0] / (field.along_above[behind, 0] / single)
     assert np.all((own > 0.8) & (own < 1.3))
+
+
+@pytest.mark.parametrize(("name", "fan"), [("crossing-40", (0.4, 1.1)), ("crossing-110", (0.9, 1.9))])
+def test_regression_of_fans_at_other_angles(name, fan):
+    """Not as in the lattice: the axis 1.1 to 1.7 times as fast; the fan half as fast at 40 deg, up to twice at 110.
+
+    With fans nothing is as wrong as without: at 40 degrees two jets that merge by momentum have no fan at all.
+    """
+    field = load_crossing(DATA / f"{name}.npz")
+    behind, up = (field.away_D >= 1.0) & (field.away_D <= 6.0), (field.out_D >= 1.0) & (field.out_D <= 2.0)
+    above, _ = field.points_D()
+    u = _crossing(0.13, above[behind].reshape(-1, 3), name)[0].reshape(above[behind].shape)
+    axis = u[:, 0, 0] / field.along_above[behind, 0]
+    assert np.all((axis > 1.1) & (axis < 1.7))
+    theirs = np.hypot(field.along_above, field.out_above)[behind]
+    ratio = np.hypot(u[..., 0], u[..., 2])[:, up].mean(axis=1) / theirs[:, up].mean(axis=1)
+    assert np.all((ratio > fan[0]) & (ratio < fan[1])), ratio

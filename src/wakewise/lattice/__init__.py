@@ -6,8 +6,8 @@ law of jets: it solves for the flow of a pushing disk, and laws, parcels and wak
 Start reading in `cases.py` (what was computed) and `flow.py` (its velocity at points). `kernel.py` is the solver with
 its parts `stencil.py`, `collision.py`, `faces.py` and `memory.py`, and `twin.py` its readable twin; `engines.py` picks
 that or a graphics card (`cuda_engine.py`, `cuda_kernel.py`). `run.py` and `compute.py` are a computation, `live.py`
-with `live_kernel.py` water for a flight, `averages.py` and `meanfield.py` what is kept of it, `laws.py` what it says
-of the laws of round jets and `crossing.py` of jets that cross.
+with `live_kernel.py` water for a flight, `bodies.py` solid boxes, `averages.py` and `meanfield.py` what is kept of it,
+`laws.py` what it says of the laws of round jets, `crossing.py` of jets that cross and `past_box.py` past a box.
 """
 
 from wakewise.lattice.cases import CASES, Case, DiskJet, case_hash, find_case

@@ -15,9 +15,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from dataclasses import asdict, dataclass, replace
 
 from wakewise.errors import InputError
+
+_Corner = tuple[float, float, float]
 
 SOLVER = "d3q19-regularised-2"
 """Version of solver and disk; part of every hash, so raise it when a change of the code changes the flow."""
@@ -52,6 +55,8 @@ class DiskJet:
         x, y or z.
     start, stop : float
         When it pushes, in D / U0.
+    turn_deg : float
+        How far its axis, x, is turned about z, towards y.
     """
 
     position_D: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -61,11 +66,21 @@ class DiskJet:
     axis: str = "x"
     start: float = 0.0
     stop: float = float("inf")
+    turn_deg: float = 0.0
+
+    @property
+    def direction(self) -> tuple[float, float, float]:
+        """Unit vector along which it blows."""
+        turn = math.radians(self.turn_deg)
+        way = [math.cos(turn), math.sin(turn), 0.0]
+        shift = AXES.index(self.axis)
+        x, y, z = (self.along * way[(k - shift) % 3] for k in range(3))
+        return x, y, z
 
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """Jets in a box of still water with open faces, and perhaps a floor that the first jet strikes.
+    """Jets in a box of still water with open faces, perhaps a floor that the first jet strikes, and solid boxes.
 
     Parameters
     ----------
@@ -91,6 +106,8 @@ class Case:
         Rms of the disk's load over its mean, in patches of about D / 4 that live D / (2 U0): blades do not push
         evenly, and a disk that did would send a laminar core.
     seed : int
+    boxes_D : tuple of pairs of corners
+        Solid boxes in the water, low and high corner of each: cells whose middles they hold (half-way bounce-back).
     """
 
     name: str
@@ -107,6 +124,7 @@ class Case:
     lattice_speed: float = 0.15
     unsteadiness: float = 0.15
     seed: int = 0
+    boxes_D: tuple[tuple[_Corner, _Corner], ...] = ()
 
     def __post_init__(self) -> None:
         if self.cells_per_D < 4:
@@ -118,6 +136,8 @@ class Case:
                 raise InputError(f"lattice case {self.name!r}: jet along {jet.along}, allowed +1 or -1")
             if jet.axis not in AXES:
                 raise InputError(f"lattice case {self.name!r}: axis {jet.axis!r} of a jet, allowed {', '.join(AXES)}")
+            if jet.turn_deg and jet.axis != "x":
+                raise InputError(f"lattice case {self.name!r}: a turned jet along {jet.axis}, allowed x")
         if self.jets[0].axis != "x":
             raise InputError(f"lattice case {self.name!r}: axis {self.jets[0].axis!r} of the first jet, allowed x")
         for low, high in zip(self.low_D, self.high_D, strict=True):
@@ -126,6 +146,13 @@ class Case:
                 raise InputError(
                     f"lattice case {self.name!r}: a side of {cells:g} cells, allowed whole numbers from 12"
                 )
+        for corners in self.boxes_D:
+            for a, b, low, high in zip(*corners, self.low_D, self.high_D, strict=True):
+                if not low + 1.0 <= a < b <= high - 1.0:
+                    raise InputError(
+                        f"lattice case {self.name!r}: a solid box from {a:g} to {b:g} D, "
+                        f"allowed from {low + 1:g} to {high - 1:g}"
+                    )
 
     @property
     def cells(self) -> tuple[int, int, int]:
@@ -142,14 +169,47 @@ def case_hash(case: Case) -> str:
     """Digest of everything that decides the flow: the case and the version of the solver."""
     stated = asdict(case)
     for jet in stated["jets"]:
-        if jet["axis"] == "x":  # as it was before there were others
+        # What is as it was before there was anything else is not told.
+        if jet["axis"] == "x":
             del jet["axis"]
+        if not jet["turn_deg"]:
+            del jet["turn_deg"]
+    if not case.boxes_D:
+        del stated["boxes_D"]
     text = json.dumps({"solver": SOLVER, **stated}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-_Corner = tuple[float, float, float]
 _FREE_BOX: tuple[_Corner, _Corner] = ((-3.0, -5.5, -5.5), (11.0, 5.5, 5.5))
+
+
+def _crossing_at(angle_deg: float, back_D: float, half_D: tuple[float, float]) -> Case:
+    """Jets that cross at an angle 6 D from both disks, the bisector along x, 9 D of it behind the crossing.
+
+    `back_D` of the box lie before the crossing, and `half_D` on either side of it along y and z.
+    """
+    turn_deg = 0.5 * angle_deg
+    x, y = (round(6.0 * f(math.radians(turn_deg)), 4) for f in (math.cos, math.sin))
+    return Case(
+        name=f"crossing-{angle_deg:g}",
+        jets=(DiskJet(turn_deg=turn_deg), DiskJet(turn_deg=-turn_deg, position_D=(0.0, 2 * y, 0.0))),
+        low_D=(x - back_D, y - half_D[0], -half_D[1]),
+        high_D=(x + 9.0, y + half_D[0], half_D[1]),
+        cells_per_D=8,
+    )
+
+
+def _past_box(name: str, gap_D: float, side_D: float) -> Case:
+    """A jet along x whose axis runs so far above the top of a solid cube, z down, which begins 3 D from the disk."""
+    half = 0.5 * side_D
+    return Case(
+        name=name,
+        jets=(DiskJet(),),
+        low_D=(-3.0, -5.0, -5.0),
+        high_D=(13.0, 5.0, 7.0),
+        cells_per_D=8,
+        boxes_D=(((3.0, -half, gap_D), (3.0 + side_D, half, gap_D + side_D)),),
+    )
 
 
 def _cases() -> dict[str, Case]:
@@ -208,6 +268,11 @@ def _cases() -> dict[str, Case]:
                 high_D=(15.0, 9.0, 5.0),
                 cells_per_D=8,
             ),
+            _crossing_at(40.0, 9.0, (6.0, 5.0)),
+            _crossing_at(110.0, 8.0, (8.0, 6.0)),
+            _past_box("past-box", 1.0, 4.0),
+            _past_box("grazing-box", 0.5, 4.0),
+            _past_box("grazing-target", 0.5, 2.5),
             Case(
                 name="four",
                 jets=(replace(plain, strength=4.0),),
@@ -221,7 +286,8 @@ def _cases() -> dict[str, Case]:
 
 CASES = _cases()
 """Cases by name. `twin`: 8 cm apart for D = 60 mm; `head-on`: 0.6 m apart; `crossing`: at right angles, 0.36 m
-from both disks; `four`: four times the thrust."""
+from both disks, and at 40 and 110 degrees; `past-box`, `grazing-box`, `grazing-target`: one diameter and half of one
+beside a cube of 0.24 m, and half of one beside one of 0.15 m; `four`: four times the thrust."""
 
 
 def find_case(name: str) -> Case:

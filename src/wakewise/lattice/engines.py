@@ -6,10 +6,11 @@ from typing import Protocol
 
 import numpy as np
 
-from wakewise.arrays import Array, IntArray
+from wakewise.arrays import Array, BoolArray, IntArray
 from wakewise.errors import InputError
 from wakewise.extras import has, how_to_install
 from wakewise.lattice.averages import MOMENTS, accumulate
+from wakewise.lattice.bodies import Bodies
 from wakewise.lattice.kernel import push, step, velocity
 from wakewise.lattice.stencil import Lattice, box, plane_row, still_water
 
@@ -54,22 +55,31 @@ class ProcessorEngine:
         `smagorinsky_factor`.
     faces : ndarray of int, shape (6,)
         OPEN or WALL.
+    solid : ndarray of bool, shape (nx, ny, nz), or None
+        Cells of bodies, none beside a face.
     """
 
-    def __init__(self, tau_x: Array, tau_yz: Array, eddies: float, faces: IntArray) -> None:
+    def __init__(
+        self, tau_x: Array, tau_yz: Array, eddies: float, faces: IntArray, solid: BoolArray | None = None
+    ) -> None:
         self._cells = (len(tau_x) - 2, tau_yz.shape[0] - 2, tau_yz.shape[1] - 2)
         self._now, self._next = still_water(self._cells), still_water(self._cells)
         self._tau_x, self._tau_yz = tau_x.astype(np.float32), plane_row(tau_yz)
         self._eddies, self._faces = eddies, faces
+        self._bodies = Bodies(solid) if solid is not None and solid.any() else None
         self._field = np.zeros((4, *self._cells), np.float32)
         self._sums = np.zeros((MOMENTS, *self._cells))
 
     def advance(self, pushes: list[tuple[IntArray, Array]]) -> None:
         """As `Engine`."""
         _, ny, nz = self._cells
+        if self._bodies:
+            self._bodies.turn_back(self._now)
         step(self._now, self._next, ny, nz, self._tau_x, self._tau_yz, self._eddies, self._faces)
         for cells, forces in pushes:
             push(self._now, self._next, nz, self._tau_x, self._tau_yz, self._eddies, cells, forces)
+        if self._bodies:
+            self._bodies.empty(self._next)
         self._now, self._next = self._next, self._now
 
     def field(self) -> Lattice:
@@ -101,21 +111,26 @@ class ProcessorEngine:
         self._sums[:] = sums
 
 
-def make_engine(device: str, tau_x: Array, tau_yz: Array, eddies: float, faces: IntArray) -> Engine:
+def make_engine(
+    device: str, tau_x: Array, tau_yz: Array, eddies: float, faces: IntArray, solid: BoolArray | None = None
+) -> Engine:
     """The engine for a device by name; "auto" is a graphics card if there is one. Other arguments: `ProcessorEngine`.
+
+    Bodies are for processors only.
 
     Raises
     ------
     InputError
-        If there is no such device, or "cuda" is asked for and CUDA finds no graphics card.
+        If there is no such device, or "cuda" is asked for and CUDA finds no graphics card, or for bodies.
     """
     if device not in DEVICES:
         raise InputError(f"lattice device {device!r}: no such device, allowed {', '.join(DEVICES)}")
-    why_not = None if device == "cpu" else why_no_gpu()
+    bodies = solid is not None and bool(solid.any())
+    why_not = None if device == "cpu" else "solid boxes run on processors only" if bodies else why_no_gpu()
     if device == "cuda" and why_not:
         raise InputError(f"lattice device 'cuda': {why_not}; allowed here: cpu, auto")
     if device == "cpu" or why_not:
-        return ProcessorEngine(tau_x, tau_yz, eddies, faces)
+        return ProcessorEngine(tau_x, tau_yz, eddies, faces, solid)
     from wakewise.lattice.cuda_engine import CudaEngine
 
     return CudaEngine(tau_x, tau_yz, eddies, faces)

@@ -13,6 +13,7 @@ from scipy.ndimage import map_coordinates
 from wakewise.arrays import Array, IntArray, frozen
 from wakewise.errors import InputError, StageError
 from wakewise.files import whole_file
+from wakewise.lattice.bodies import solid_cells
 from wakewise.lattice.cases import AXES, Case, DiskJet, case_hash
 from wakewise.lattice.engines import make_engine
 from wakewise.lattice.stencil import OPEN, WALL, smagorinsky_factor
@@ -39,6 +40,28 @@ _PATCH_LIFE = 0.5  # D / U0
 _RATIO = math.sqrt(2.0)  # disk over exit diameter
 
 
+def _turned_frame(turn_deg: float) -> Array:
+    """Rows: a disk's own axes, its jet's first, in the box's."""
+    c, s = math.cos(math.radians(turn_deg)), math.sin(math.radians(turn_deg))
+    return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _shares(lines: list[Array], half: float, radius: float, frame: Array | None) -> Array:
+    """Share of each cell that lies in a disk, from 8 x 8 x 8 points in it.
+
+    `lines` are the points' places from the disk's middle along each axis of the box, `half` its half thickness.
+    """
+    if frame is None:
+        inside_x = (np.abs(lines[0]) < half).reshape(-1, 8).mean(1)
+        round_ = (lines[1][:, None] ** 2 + lines[2] ** 2 < radius**2).astype(float)
+        face = round_.reshape(len(lines[1]) // 8, 8, len(lines[2]) // 8, 8).mean((1, 3))
+        return np.asarray(inside_x[:, None, None] * face)
+    along, one, two = np.einsum("ij,jxyz->ixyz", frame, np.stack(np.meshgrid(*lines, indexing="ij")))
+    inside = (np.abs(along) < half) & (one**2 + two**2 < radius**2)
+    shape = [k for line in lines for k in (len(line) // 8, 8)]
+    return np.asarray(inside.reshape(shape).mean((1, 3, 5)))
+
+
 class Disk:
     """The cells of one disk, their share of its force, and the slowly changing patches of its load."""
 
@@ -47,31 +70,31 @@ class Disk:
         # The jet's own axes, its own first; a turn of the box's, so that what is right-handed stays so.
         turn = np.roll(np.arange(3), -AXES.index(jet.axis))
         self._back = np.argsort(turn)
+        self._frame = _turned_frame(jet.turn_deg)
         centre = ((np.array(jet.position_D) - case.low_D) * n)[turn]  # in cells from the low corner
         cells = np.array(case.cells)[turn]
         half = 0.5 * DISK_THICKNESS_D * n
         radius = 0.5 * _RATIO * n
         fine = (np.arange(8) + 0.5) / 8
         lines = []
-        for axis, reach in enumerate((half, radius, radius)):
+        for axis, reach in enumerate(np.abs(self._frame.T) @ (half, radius, radius)):
             first, last = math.floor(centre[axis] - reach), math.ceil(centre[axis] + reach)
             if first < 1 or last > cells[axis] - 1:
                 raise InputError(f"lattice case {case.name!r}: a disk reaches the box's edge, allowed inside only")
             lines.append((np.arange(first, last)[:, None] + fine).ravel() - centre[axis])
-        # Share of each cell that lies in the disk, from 8 x 8 x 8 points in it.
-        inside_x = (np.abs(lines[0]) < half).reshape(-1, 8).mean(1)
-        round_ = (lines[1][:, None] ** 2 + lines[2] ** 2 < radius**2).astype(float)
-        face = round_.reshape(len(lines[1]) // 8, 8, len(lines[2]) // 8, 8).mean((1, 3))
-        share = inside_x[:, None, None] * face
+        share = _shares(lines, half, radius, self._frame if jet.turn_deg else None)
         where = np.argwhere(share > 0)
         self.jet = jet
         self.share = share[share > 0] / share.sum()
         start = np.array([round(line[0] + c - fine[0]) for line, c in zip(lines, centre, strict=True)])
         self.cells: IntArray = np.ascontiguousarray((where + start + 1)[:, self._back])  # with halo
-        across = (where + start + 0.5 - centre)[:, 1:]
-        lever = np.sum(self.share * np.sum(across**2, axis=1))
+        gaps = where + start + 0.5 - centre
+        across = (gaps @ self._frame.T if jet.turn_deg else gaps)[:, 1:]
+        # On a slant the cells' middle is not quite the disk's, and a twist about another place would push.
+        about = across - self.share @ across if jet.turn_deg else across
+        lever = np.sum(self.share * np.sum(about**2, axis=1))
         # Solid-body swirl: the force across grows with the radius and its moment is the torque.
-        self.twist = jet.torque * n * across[:, ::-1] * (-1.0, 1.0) / lever * self.share[:, None]
+        self.twist = jet.torque * n * about[:, ::-1] * (-1.0, 1.0) / lever * self.share[:, None]
         # Patches on a sunflower, so that they cover the disk evenly on every grid alike.
         k = np.arange(_PATCHES) + 0.5
         spots = (
@@ -92,7 +115,8 @@ class Disk:
         out = unsteadiness * (self.patches @ self.load) * self.share[:, None]
         out[:, 0] += self.jet.along * self.share
         out[:, 1:] += self.twist
-        return np.ascontiguousarray(total * self.jet.strength * out[:, self._back])
+        pushed = total * self.jet.strength * out
+        return np.ascontiguousarray(pushed @ self._frame if self.jet.turn_deg else pushed[:, self._back])
 
 
 class LatticeRun:
@@ -120,9 +144,12 @@ class LatticeRun:
         unit = 3 * _SPONGE_VISCOSITY * s * n
         tau_x = 0.5 + 3 * s * n / case.reynolds + unit * along
         faces = np.array([OPEN, WALL if case.floor else OPEN, OPEN, OPEN, OPEN, OPEN])
-        self._water = make_engine(device, tau_x, unit * across, smagorinsky_factor(case.smagorinsky), faces)
+        solid = solid_cells(case)
+        self._water = make_engine(device, tau_x, unit * across, smagorinsky_factor(case.smagorinsky), faces, solid)
         self._rng = np.random.default_rng(case.seed)
         self._disks = [Disk(case, jet, self._rng) for jet in case.jets]
+        if any(solid[tuple((disk.cells - 1).T)].any() for disk in self._disks):
+            raise InputError(f"lattice case {case.name!r}: a disk inside a solid box, allowed outside only")
         self.axis_times: list[float] = []
         self.axis_speeds: list[Array] = []
 
