@@ -36,7 +36,10 @@ REYNOLDS = 1.0e4
 """Of the fastest jet, as in the cases: beyond it round jets no longer depend on it."""
 FASTEST = 0.2
 """Speed in cells per step of the fastest jet that is planned for; small against that of sound, 0.577."""
-_SPONGE_VISCOSITY = 0.05  # at an open face, over the fastest speed and a jet's diameter (see `run`)
+_SPONGE_VISCOSITY, _SPONGE_D = 0.4, 2.6
+"""At an open face, over the fastest speed and a jet's diameter, and how many diameters it fades over. Jets leave here at
+half a metre a second, not as what is left of them far from a disk: with .05 over one diameter (`run`) the face sent back
+twice the jet's speed after eight seconds."""
 _MIRROR = np.array(
     [next(j for j in range(19) if np.array_equal(VELOCITIES[j], VELOCITIES[i] * (1, 1, -1))) for i in range(19)]
 )
@@ -100,7 +103,7 @@ class LiveBox:
         self._speed_m_s = cell_m / self.step_s
         self._force_N = density_kg_m3 * cell_m**4 / self.step_s**2  # of one lattice unit
         n = jet_m / cell_m
-        across = round(n)
+        across = math.ceil(_SPONGE_D * n)
         unit = 3 * _SPONGE_VISCOSITY * FASTEST * n
         nx, ny, nz = cells
         tau_x = 0.5 + 3 * FASTEST * n / REYNOLDS + unit * _side_ramp(nx, across)

@@ -44,7 +44,7 @@ _DISK_POINTS, _HULL_SPACING = 32, 0.04
 _UNSTEADINESS = 0.15  # rms of a disk's load over its mean, as in the cases (see `lattice.cases.Case`)
 _LOAD_LIFE = 0.5  # exit diameters over exit speed
 _TOLERANCE_S = 1e-9
-_MARGIN_M = 0.15
+_MARGIN_M = 0.25  # the side takes the water's motion out over 0.2 m
 
 
 class _Water:
