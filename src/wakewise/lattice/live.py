@@ -37,9 +37,9 @@ REYNOLDS = 1.0e4
 FASTEST = 0.2
 """Speed in cells per step of the fastest jet that is planned for; small against that of sound, 0.577."""
 _SPONGE_VISCOSITY, _SPONGE_D = 0.4, 2.6
-"""At an open face, over the fastest speed and a jet's diameter, and how many diameters it fades over. Jets leave here at
-half a metre a second, not as what is left of them far from a disk: with .05 over one diameter (`run`) the face sent back
-twice the jet's speed after eight seconds."""
+"""At an open face, over the fastest speed and a jet's diameter, and how many diameters it fades over. Jets leave here
+at half a metre a second, not as what is left of them far from a disk: with .05 over one diameter (`run`) the face sent
+back twice the jet's speed after eight seconds."""
 _MIRROR = np.array(
     [next(j for j in range(19) if np.array_equal(VELOCITIES[j], VELOCITIES[i] * (1, 1, -1))) for i in range(19)]
 )
