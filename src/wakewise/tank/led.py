@@ -15,35 +15,13 @@ import numpy as np
 
 from wakewise.arrays import Array, freeze
 from wakewise.geometry import matrix_from_quat
+from wakewise.tank.fill import tank_water
 from wakewise.tank.measuring import lengths
-from wakewise.tank.settings import MAX_PARCELS, TankSettings
+from wakewise.tank.settings import TankSettings
 from wakewise.targets import Target
 from wakewise.vehicles import Vehicle, compile_body
 from wakewise.water import AmbientSum
-from wakewise.water.blockage import Blockage
-from wakewise.water.closure import SWIRLING, Spreading
 from wakewise.water.hullwake import HullPush
-from wakewise.water.water import Water
-
-
-def tank_water(
-    vehicle: Vehicle, target: Target, settings: TankSettings, ambient: AmbientSum, rng: np.random.Generator
-) -> Water:
-    """Water of a tank before anything has moved in it; `rng` is the source of its jets' turbulence."""
-    length, width, depth = settings.size_m
-    return Water(
-        vehicle.disk_areas_m2,
-        density_kg_m3=settings.density_kg_m3,
-        bed_z_m=depth,
-        rng=rng,
-        ambient=ambient,
-        half_size_m=(length / 2, width / 2),
-        turbulence=settings.jets.turbulence,
-        max_parcels=MAX_PARCELS,
-        spreading=SWIRLING if settings.jets.swirl else Spreading.of_width(settings.jets.half_width_growth),
-        body=Blockage.of(target),
-        wake_life=settings.jets.wake_life,
-    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

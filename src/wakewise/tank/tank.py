@@ -14,10 +14,10 @@ from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, FlakeCloud, Measurement, Posture, ScalarGrid, WaterTruth
 from wakewise.tank.ambient import build_ambient
 from wakewise.tank.camera_joint import CameraJoint
+from wakewise.tank.fill import tank_water
 from wakewise.tank.flakes import Flakes
 from wakewise.tank.grains import STRESS_INTENSITY, speed_at_stress_m_s
 from wakewise.tank.lane import Lane
-from wakewise.tank.led import tank_water
 from wakewise.tank.measuring import TargetProbes
 from wakewise.tank.plant import VehiclePlant
 from wakewise.tank.probes import surface_points
