@@ -273,6 +273,7 @@ def _cases() -> dict[str, Case]:
             _past_box("past-box", 1.0, 4.0),
             _past_box("grazing-box", 0.5, 4.0),
             _past_box("grazing-target", 0.5, 2.5),
+            _past_box("struck-target", -1.25, 2.5),
             Case(
                 name="four",
                 jets=(replace(plain, strength=4.0),),

@@ -7,7 +7,8 @@ and run out along it.
 Start reading in `water.py` (what callers see), `stepping.py` (one compiled step of all of it) and `instant.py` (the
 velocity at any points, now). `parcels.py`, `closure.py` and `drift.py` are a free jet, `fans.py` and `meeting.py` jets
 that cross and meet, `hullwake.py` what a hull leaves, `walljets.py` and `bedjets*.py` jets on the bed, `blockage.py`
-and `faces.py` target and walls, `clusters.py`, `induction.py`, `space_order.py` and `chunks.py` fast sums,
+and `bodyjets.py` the target and jets that come up to it, `faces.py` walls, `clusters.py`, `induction.py`,
+`space_order.py` and `chunks.py` fast sums,
 `currents.py` (its turbulence summed by `modes.py`) and `current_series.py` what moves without thrusters.
 Laws and their sources stand beside the equations.
 """

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from wakewise.arrays import Array, IntArray, freeze
 from wakewise.compiled import assign, njit
@@ -24,6 +25,9 @@ from wakewise.water.space_order import in_space
 
 _POINTS = 480
 _SOURCES = 160
+# Of the sources' spacing: wide enough that what they make is even along the surface, and so deep that little water is
+# made outside. Half ball flow is then right to 5 %; half as wide and deep they let twice as much through corals.
+_SIGMA, _DEPTH = 0.8, 1.4
 _DAMPING = 1e-4  # of the mean square singular value: strengths stay of the order of the flow
 
 
@@ -32,7 +36,8 @@ class BodyRows(NamedTuple):
 
     `points` and `normals`, shape (k, 3), are as in `Blockage`, and `answers`, shape (k, s), its response the other way
     round; `sources`, shape (4, 2 s), are the sources' places and one over their sizes, images after originals, and
-    `per_area`, shape (s,), is one over their sizes squared. `ball`, shape (4,), is the middle and how far it is felt.
+    `per_area`, shape (s,), is one over their sizes squared. `ball`, shape (4,), is the middle and how far it is felt,
+    `radius` how far the points reach from there, and `piece`, in m2, the area that each stands for.
     """
 
     points: Array
@@ -42,12 +47,14 @@ class BodyRows(NamedTuple):
     per_area: Array
     ball: Array
     constants: np.ndarray
+    radius: float
+    piece: float
 
     @classmethod
     def none(cls) -> BodyRows:
         """No body."""
         v = np.zeros((0, 3))
-        return cls(v, v, np.zeros((0, 0)), np.zeros((4, 0), np.float32), np.zeros(0), np.zeros(4), SINGLE)
+        return cls(v, v, np.zeros((0, 0)), np.zeros((4, 0), np.float32), np.zeros(0), np.zeros(4), SINGLE, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +71,8 @@ class Blockage:
         Strengths in m3/s for a unit velocity across the surface at each point.
     bed_z_m : float
         The sources are mirrored there.
+    piece_m2 : float
+        Area of the convex hull, or of the surface if that is less, over the number of points.
     """
 
     points_m: Array
@@ -72,6 +81,7 @@ class Blockage:
     sigmas_m: Array
     response: Array
     bed_z_m: float
+    piece_m2: float
     rows: BodyRows = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -80,15 +90,17 @@ class Blockage:
         images[:, 2] = 2 * self.bed_z_m - images[:, 2]
         both = FixedSources(np.concatenate([self.sources_m, images]), np.tile(self.sigmas_m, 2))
         middle = np.mean(self.points_m, axis=0)
-        reach = 4.0 * float(np.linalg.norm(self.points_m - middle, axis=1).max())
+        radius = float(np.linalg.norm(self.points_m - middle, axis=1).max())
         rows = BodyRows(
             np.ascontiguousarray(self.points_m, dtype=np.float64),
             np.ascontiguousarray(self.normals, dtype=np.float64),
             np.ascontiguousarray(self.response.T, dtype=np.float64),
             both.columns,
             1.0 / self.sigmas_m**2,
-            np.array([*middle, reach]),
+            np.array([*middle, 4.0 * radius]),
             SINGLE,
+            radius,
+            self.piece_m2,
         )
         object.__setattr__(self, "rows", rows)
         freeze(self, points_m=(k, 3), normals=(k, 3), sources_m=(s, 3), sigmas_m=(s,), response=(s, k))
@@ -100,13 +112,13 @@ class Blockage:
         order = in_space(points)  # which suits the sums over jets there
         points, normals = points[order], normals[order]
         inner, inward, _ = _surface(target, _SOURCES, np.random.default_rng(1))
-        # Deep enough to lie inside the body, where they may make water: half ball flow is then right to 6 %.
         size = math.sqrt(area / _SOURCES)
-        sigmas = np.full(_SOURCES, 0.5 * size)
-        sources = inner - 0.8 * size * inward
+        sigmas = np.full(_SOURCES, _SIGMA * size)
+        sources = inner - _DEPTH * size * inward
         across = _across(points, normals, sources, sigmas, target.bed_z_m)
         response = _least_squares(across, _DAMPING)
-        return cls(points, normals, sources, sigmas, response, target.bed_z_m)
+        piece = min(area, _hull_area(target)) / _POINTS
+        return cls(points, normals, sources, sigmas, response, target.bed_z_m, piece)
 
     def strengths_m3_s(self, undisturbed_m_s: Array) -> Array:
         """Source strengths, shape (s,), for the velocity that there would be at `points_m` without the body."""
@@ -233,6 +245,14 @@ def _least_squares(across: Array, damping: float) -> Array:
             x[i] /= L[i, i]
         assign(out[:, p], x - x.mean())
     return out
+
+
+def _hull_area(target: Target) -> float:
+    """Of the convex hull, above the bed, in m2."""
+    hull = ConvexHull(target.mesh.vertices_m)
+    corners = hull.points[hull.simplices]
+    twice = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return float(0.5 * twice[corners.mean(axis=1)[:, 2] < target.bed_z_m - 1e-4].sum())
 
 
 def _across(points: Array, normals: Array, sources: Array, sigmas: Array, bed_z_m: float) -> Array:

@@ -16,6 +16,7 @@ from wakewise.compiled import assign, assign_rows, njit
 from wakewise.water.bedjets import STRIKE_HEIGHT, Layers
 from wakewise.water.bedjets_sums import sum_planes
 from wakewise.water.blockage import BodyRows, add_body, answer
+from wakewise.water.bodyjets import lead_round, strike_body
 from wakewise.water.clusters import clustered, sum_field
 from wakewise.water.drift import drift, due, fade_gusts, send, slugs
 from wakewise.water.faces import mirrored
@@ -215,7 +216,7 @@ def _drift(
         for q in range(look.shape[0]):
             for k in range(3):
                 jets.flow[look[q], k] = u[q, k]
-    speed, before = np.empty(n), sigma.copy()
+    speed, before, place = np.empty(n), sigma.copy(), jets.position[:n].copy()
     drift(
         jets.position[:n],
         sigma,
@@ -230,6 +231,9 @@ def _drift(
         laws.drift,
         planes.walls,
     )
+    if body.points.shape[0]:
+        for i in range(n):
+            tally.gone[1] += strike_body(body, place[i], jets.position[i], jets.flow[i], sigma[i], impulse[i])
     if laws.gusty:
         fade_gusts(jets.gust[:n], before, speed, noise, dt_s)
     keep, resting = np.ones(n, np.bool_), False
@@ -253,7 +257,7 @@ def _carrying(
     laws: Laws,
     tally: Tally,
 ) -> Array:
-    """Velocity of the jets' water at some of the parcels, with the body's answer, shape (k, 3)."""
+    """Velocity of the jets' water at some of the parcels, led round the body, shape (k, 3)."""
     rows, starts = clustered(*mirrored(X, impulse, sigma, planes.walls))
     frames, ring_starts, rings = wall_rows(layers, r, planes)
     points = X[look]
@@ -265,7 +269,12 @@ def _carrying(
             flow_at(body.points, every, rows, starts, frames, ring_starts, rings, laws.bed_z, laws.constants, at_body)
             assign(tally.held, answer(body, at_body))
             tally.steps[1] = tally.steps[0]
-        add_body(body, points, tally.held, u)
+        answered = np.zeros(u.shape)
+        add_body(body, points, tally.held, answered)
+        for q in range(look.shape[0]):
+            # Beyond the body's reach there is none.
+            if answered[q, 0] != 0.0 or answered[q, 1] != 0.0 or answered[q, 2] != 0.0:
+                lead_round(body, points[q], u[q], answered[q])
     return u
 
 
