@@ -2,31 +2,35 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+from bodies_in_jets import (
+    AREA_M2,
+    D_M,
+    DENSITY,
+    EXIT_M_S,
+    UNIT_S,
+    beside_box,
+    fastest_at_corals,
+    fastest_of_cuttings,
+    new_water,
+    past_box,
+    push,
+)
 
 from wakewise.lattice import find_case
 from wakewise.lattice.crossing import crossing_place, load_crossing
 from wakewise.lattice.meanfield import DATA
-from wakewise.lattice.past_box import load_past_box, momentum, past_figures
 from wakewise.tank.grains import friction_velocity_m_s
 from wakewise.tank.limits import ABSENT, LIMITS, limits_table
 from wakewise.tank.sediment import SHEAR_HEIGHT_M
-from wakewise.targets import Mesh, Target, coral, place_on_bed
+from wakewise.targets import Mesh, coral, place_on_bed
 from wakewise.water.blockage import Blockage, _surface
 from wakewise.water.closure import Spreading
 from wakewise.water.hullwake import HullPush, first_wake
-from wakewise.water.water import Water
 
-D_M = 0.06
-AREA_M2 = math.pi * D_M**2 / 4
-DENSITY = 998.0
-EXIT_M_S = math.sqrt(1.0 / (DENSITY * AREA_M2))
-UNIT_S = D_M / EXIT_M_S
-AHEAD = ((1.0, 0.0, 0.0),)
 Span = tuple[float, float]
 MEASURES: dict[str, Callable[[], Span]] = {}
 
@@ -37,19 +41,6 @@ def _measures(name):
         return work
 
     return keep
-
-
-def _water(n=1, **options):
-    options = {"bed_z_m": math.inf} | options
-    return Water(np.full(n, AREA_M2), density_kg_m3=DENSITY, rng=np.random.default_rng(0), **options)
-
-
-def _push(water, seconds, thrusts_N, at=((0.0, 0.0, 0.0),), jets=AHEAD, dt_s=0.05):
-    at, axes = np.array(at, dtype=float), -np.array(jets, dtype=float)
-    impulses = np.column_stack([np.array(thrusts_N, dtype=float), np.zeros(len(at))]) * dt_s
-    for _ in range(round(seconds / dt_s)):
-        water.step(dt_s, at, at, axes, impulses)
-    return water
 
 
 def _span(values) -> Span:
@@ -65,17 +56,17 @@ def _axis():
     x = np.array([0.6, 0.7, 0.8, 1.0])
     found = []
     for T in (0.1, 1.0, 5.0):
-        u = _push(_water(), 12.0 / math.sqrt(T), [T]).velocity(_on_axis(x))[:, 0]
+        u = push(new_water(), 12.0 / math.sqrt(T), [T]).velocity(_on_axis(x))[:, 0]
         found.append(u * x / math.sqrt(T / DENSITY))
     return _span(found)
 
 
 def _momentum(width, places):
-    water, found = _push(_water(spreading=Spreading.of_width(width)), 12.0, [1.0]), []
+    water, found = push(new_water(spreading=Spreading.of_width(width)), 12.0, [1.0]), []
     for x in places:
         r, flux = np.linspace(0, 0.7 * x, 300), []
         for _ in range(20):
-            u = _push(water, 0.1, [1.0]).velocity(np.column_stack([np.full(300, x), r, 0 * r]))[:, 0]
+            u = push(water, 0.1, [1.0]).velocity(np.column_stack([np.full(300, x), r, 0 * r]))[:, 0]
             flux.append(np.trapezoid(DENSITY * u**2 * 2 * np.pi * r, r))
         found.append(np.mean(flux))
     return _span(found)
@@ -95,7 +86,7 @@ def _widest():
 def _front():
     M, x, found = 1.0 / DENSITY, np.linspace(0.02, 3.0, 400), []
     for t in (2.0, 4.0, 8.0):
-        share = _push(_water(), t, [1.0]).velocity(_on_axis(x))[:, 0] * x / (7.05 * math.sqrt(M))
+        share = push(new_water(), t, [1.0]).velocity(_on_axis(x))[:, 0] * x / (7.05 * math.sqrt(M))
         share = np.where(x < 0.36, 1.0, share)
         found.append(x[np.nonzero(share > 0.5)[0][-1]] / (2.57 * M**0.25 * math.sqrt(t)))
     return _span(found)
@@ -112,9 +103,9 @@ def _stop():
     def look(water):
         return water.velocity(points)[:, 0].reshape(3, -1).mean(axis=1)
 
-    water = _push(_water(), 32 * UNIT_S, [1.0])
-    fed = np.mean([look(_push(water, UNIT_S, [1.0], dt_s=UNIT_S / 2)) for _ in range(8)], axis=0)
-    left = np.sum([look(_push(water, UNIT_S, [0.0], dt_s=UNIT_S / 2)) for _ in range(65)], axis=0)
+    water = push(new_water(), 32 * UNIT_S, [1.0])
+    fed = np.mean([look(push(water, UNIT_S, [1.0], dt_s=UNIT_S / 2)) for _ in range(8)], axis=0)
+    left = np.sum([look(push(water, UNIT_S, [0.0], dt_s=UNIT_S / 2)) for _ in range(65)], axis=0)
     return _span(left / fed / [13.1, 18.7, 26.2])
 
 
@@ -123,7 +114,7 @@ def _bent():
     found = []
     for speed in (0.06, 0.1, 0.15):
         length = math.sqrt(1.0 / DENSITY) / speed
-        water = _push(_water(current_W_m_s=np.array([speed, 0, 0])), 5 * length / speed, [1.0], jets=[[0, 0, 1.0]])
+        water = push(new_water(current_W_m_s=np.array([speed, 0, 0])), 5 * length / speed, [1.0], jets=[[0, 0, 1.0]])
         z = np.linspace(0, 4, 400) * length
         for x in (2.0, 3.0, 4.0):
             u = water.excess_velocity(np.column_stack([np.full(400, x * length), 0 * z, z]))
@@ -134,12 +125,12 @@ def _bent():
 @_measures("jets head-on")
 def _head_on():
     at, jets = [[0, 0, 0], [0.6, 0, 0]], [[1, 0, 0], [-1, 0, 0]]
-    water = _push(_water(2, turbulence=0.25), 6.0, [1.0, 1.0], at, jets)
+    water = push(new_water(2, turbulence=0.25), 6.0, [1.0, 1.0], at, jets)
     r, turn = np.array([0.052, 0.098, 0.128, 0.2]), np.linspace(0, 2 * np.pi, 8, endpoint=False)
     out = np.stack([0 * turn, np.cos(turn), np.sin(turn)], axis=1)
     points, speeds = (np.array([0.3, 0.0, 0.0]) + r[:, None, None] * out).reshape(-1, 3), []
     for _ in range(20):
-        u = _push(water, 0.1, [1.0, 1.0], at, jets).velocity(points).reshape(4, 8, 3)
+        u = push(water, 0.1, [1.0, 1.0], at, jets).velocity(points).reshape(4, 8, 3)
         speeds.append(np.einsum("rti,ti->r", u, out) / 8)
     return _span(np.mean(speeds, axis=0) / [0.20, 0.17, 0.13, 0.05])
 
@@ -150,12 +141,12 @@ def _crossing(name="crossing"):
     field, case = load_crossing(DATA / f"{name}.npz"), find_case(name)
     behind = (field.away_D >= 1.0) & (field.away_D <= 6.0)
     points = crossing_place(case) + field.points_D()[0][behind]
-    water = _water(2, turbulence=0.25, spreading=Spreading.of_width(0.13))
+    water = new_water(2, turbulence=0.25, spreading=Spreading.of_width(0.13))
     at, jets = np.array([jet.position_D for jet in case.jets]) * D_M, [jet.direction for jet in case.jets]
-    _push(water, 40 * UNIT_S, [1.0, 1.0], at, jets)
+    push(water, 40 * UNIT_S, [1.0, 1.0], at, jets)
     steps = round(80 * UNIT_S / 0.05)
     flat = points.reshape(-1, 3) * D_M
-    u = sum(_push(water, 0.05, [1.0, 1.0], at, jets).velocity(flat) for _ in range(steps)) / steps / EXIT_M_S
+    u = sum(push(water, 0.05, [1.0, 1.0], at, jets).velocity(flat) for _ in range(steps)) / steps / EXIT_M_S
     u = u.reshape(points.shape)
     bisector = np.sum(jets, axis=0)
     along = u @ (bisector / np.linalg.norm(bisector))
@@ -199,93 +190,47 @@ def _wide_fan():
     return _span(_fan_over_lattice("crossing-110"))
 
 
-def _cube(case):
-    """A case's box as a target far from every face, its jet 25 m deep."""
-    low, high = (np.array(corner) * D_M + [0, 0, 25] for corner in case.boxes_D[0])
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * (high - low) + low
-    sides = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-    faces = np.array([t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))])
-    half = 0.5 * float(np.linalg.norm(high - low))
-    return Target(name="box", mesh=Mesh(corners, faces), centre_W_m=0.5 * (low + high), radius_m=half, bed_z_m=50.0)
-
-
-@cache
-def _past(name, solid):
-    """Fastest water 4 to 10 D down a jet past a box, and momentum 8 to 10 D down it, over the lattice's."""
-    field, case = load_past_box(name), find_case(name)
-    body = Blockage.of(_cube(case)) if solid else None
-    water = _water(bed_z_m=50.0, turbulence=0.25, spreading=Spreading.of_width(0.13), body=body)
-    at, behind, steps = [[0.0, 0.0, 25.0]], (field.x_D >= 8.0) & (field.x_D <= 10.0), round(80 * UNIT_S / 0.05)
-    upright, planes = field.points_D()[0], field.planes_D()[behind]
-    places = [points.reshape(-1, 3) * D_M + at for points in (upright, planes)]
-    _push(water, 40 * UNIT_S, [1.0], at)
-    u, through = np.zeros(upright.shape[:-1]), np.zeros(planes.shape[:-1])
-    for k in range(steps):
-        _push(water, 0.05, [1.0], at)
-        u += water.velocity(places[0])[:, 0].reshape(u.shape) / steps / EXIT_M_S
-        if k % 8 == 0:
-            through += water.velocity(places[1])[:, 0].reshape(through.shape) / EXIT_M_S
-    through = np.where(field.wet(planes), through / len(range(0, steps, 8)), 0.0)
-    ours, theirs = past_figures(field, u), past_figures(field)
-    fastest = (np.array(ours["fastest"]) / theirs["fastest"])[3:10]
-    return fastest, momentum(through, field.y_D, field.z_D) / field.flux[behind], np.array(ours["drawn_D"])
-
-
 @_measures("a jet past a target")
 def _target():
-    return _span(_past("grazing-target", solid=True)[0])
+    return _span(past_box("grazing-target", solid=True)[0])
 
 
 @_measures("a jet past a target: its momentum")
 def _target_momentum():
-    return _span(_past("grazing-target", solid=True)[1])
-
-
-def _cut(target, times, first):
-    """The same box in triangles of half the size, so many times over, told from another of them on."""
-    corners = target.mesh.vertices_m[target.mesh.faces]
-    for _ in range(times):
-        a, b, c = (corners[:, k] for k in range(3))
-        ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
-        corners = (
-            np.stack([(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]).transpose(2, 0, 1, 3).reshape(-1, 3, 3)
-        )
-    corners = np.roll(corners, first, axis=0)
-    return replace(target, mesh=Mesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)))
-
-
-def _fastest_of_cuttings():
-    """Fastest water beside a box over U0, of ten cuttings that differ in where points and sources fall only."""
-    case, field, found = find_case("grazing-target"), load_past_box("grazing-target"), []
-    upright = field.points_D()[0]
-    places = upright[field.wet(upright)] * D_M + [0.0, 0.0, 25.0]
-    for k in range(10):
-        water = _water(bed_z_m=50.0, spreading=Spreading.of_width(0.13), body=Blockage.of(_cut(_cube(case), 3, 77 * k)))
-        _push(water, 4.0, [1.0], [[0.0, 0.0, 25.0]])
-        speeds = [
-            np.linalg.norm(_push(water, 0.5, [1.0], [[0.0, 0.0, 25.0]]).velocity(places), axis=1).max()
-            for _ in range(16)
-        ]
-        found.append(max(speeds) / EXIT_M_S)
-    return np.array(found)
+    return _span(past_box("grazing-target", solid=True)[1])
 
 
 @_measures("a jet past a target: no runaway")
 def _no_runaway():
-    return _span([np.mean(_fastest_of_cuttings() < 1.6)])
+    return _span([np.mean(fastest_of_cuttings() < 1.6)])
+
+
+@_measures("a jet past a target: at its sides")
+def _beside_grazed():
+    return _span(beside_box("grazing-target", 3))
+
+
+@_measures("a jet that strikes a target: at its sides")
+def _beside_struck():
+    return _span(beside_box("struck-target", 6))
+
+
+@_measures("jets at corals: no runaway")
+def _at_corals():
+    return _span(fastest_at_corals())
 
 
 @_measures("a jet past the hull")
 def _along_hull():
-    return _span(_past("grazing-box", solid=False)[1])
+    return _span(past_box("grazing-box", solid=False)[1])
 
 
 def _stress(thrust_N, H):
     r, stress = np.linspace(0.02, 0.6 * H, 57), []
     at, jets, wait_s = [[0, 0, 1.5 - H]], [[0, 0, 1]], 8.0 / math.sqrt(thrust_N) * H / 0.5
-    water = _push(_water(bed_z_m=1.5), wait_s, [thrust_N], at, jets)
+    water = push(new_water(bed_z_m=1.5), wait_s, [thrust_N], at, jets)
     for _ in range(100):
-        _push(water, 0.1, [thrust_N], at, jets)
+        push(water, 0.1, [thrust_N], at, jets)
         speed = np.linalg.norm(water.velocity(np.column_stack([r, 0 * r, 0 * r + 1.5])), axis=1)
         stress.append(DENSITY * friction_velocity_m_s(speed, SHEAR_HEIGHT_M, 20e-6) ** 2)
     return np.mean(stress, axis=0).max() / (0.16 * (thrust_N / AREA_M2) * (D_M / H) ** 2)
@@ -304,7 +249,7 @@ def _weak():
 @_measures("the hull's wake")
 def _hull():
     speed, size, dt_s = 0.2, np.array([0.45, 0.35, 0.28]), 0.05
-    area, velocity, water = 0.35 * 0.28, np.array([0.2, 0, 0]), _water(rest_speed_m_s=0.0)
+    area, velocity, water = 0.35 * 0.28, np.array([0.2, 0, 0]), new_water(rest_speed_m_s=0.0)
     drag_N = 0.5 * DENSITY * speed**2 * area
     none, zero = np.zeros((1, 2)), np.zeros((1, 3))
     for k in range(1200):
