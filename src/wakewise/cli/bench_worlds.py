@@ -53,14 +53,18 @@ def _show_judge(judge: dict[str, Any]) -> None:
     """The same flights in the tank and in the lattice."""
     from rich.table import Table
 
-    table = Table(title="the second judge: hovers in tank and lattice, target held still", title_justify="left")
-    for title in ("world", "method", "tank mm/s", "lattice mm/s", "tank: less than dp", "lattice: less than dp"):
-        table.add_column(title, justify="left" if title in ("world", "method") else "right")
+    title = "the second judge: hovers in tank and lattice, target held still; mm/s, and less than dp"
+    table = Table(title=title, title_justify="left")
+    for name in ("world", "method", "tank: on the target", "8 cm off", "lattice: on the target", "8 cm off"):
+        table.add_column(name, justify="left" if name in ("world", "method") else "right")
     for world, methods in judge.items():
         for method, row in methods.items():
-            speeds = [shown(None if row[flow] is None else 1e3 * row[flow]) for flow in ("tank_m_s", "lattice_m_s")]
-            less = ["—" if row[key] is None else f"{row[key]:.0f} %" for key in ("tank_less_pct", "lattice_less_pct")]
-            table.add_row(world, method, *speeds, *less)
+            cells = []
+            for place in ("tank_", "tank_clear_", "lattice_", "lattice_clear_"):
+                speed, less = row[f"{place}m_s"], row[f"{place}less_pct"]
+                part = "" if less is None or method == "dp" else f" ({less:.0f} %)"
+                cells.append(shown(None if speed is None else 1e3 * speed) + part)
+            table.add_row(world, method, *cells)
     print_table(table)
 
 

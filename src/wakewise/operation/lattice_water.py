@@ -220,6 +220,10 @@ class LatticeWater:
         camera = (self._plant.state.X_WB @ self._plant.vehicle.X_BC_at(self._joint.tilt_rad)).p_m
         return self._probes.measure(self._water, self._laws, None, camera, self.settings.density_kg_m3)
 
+    def excess_velocity(self, points_W_m: Array) -> Array:
+        """Velocity less that of the same water without a vehicle, both shape (n, 3), now."""
+        return self._water.excess_velocity(points_W_m)
+
     def silt(self) -> ScalarGrid:
         """None: the water is clear."""
         return ScalarGrid(origin_W_m=np.zeros(3), spacing_m=1.0, values=np.zeros((1, 1, 1)))

@@ -9,7 +9,7 @@ from wakewise.errors import InputError, StageError
 from wakewise.studies.worlds import bench
 from wakewise.studies.worlds.figures import method_figures, ratios
 from wakewise.studies.worlds.flight import FLIGHT_FIGURES, MODEL_FIGURES, WorldTrial, fly_trial, short_flight
-from wakewise.studies.worlds.judge import judge_table, judge_trials
+from wakewise.studies.worlds.judge import CLEAR, CLEAR_M, clear_points, judge_table, judge_trials, judged_trial
 from wakewise.trials import BenchOptions
 
 SPEED = "target_speed_mean_m_s"
@@ -36,6 +36,7 @@ def made_up(monkeypatch, tmp_path):
     monkeypatch.setattr(bench, "_engine", lambda _: Here())
     monkeypatch.setattr("wakewise.studies.worlds.flight.fly_trial", flight)
     monkeypatch.setattr("wakewise.studies.worlds.flight.scan_trial", scan)
+    monkeypatch.setattr("wakewise.studies.worlds.judge.judged_trial", lambda trial: flight(trial) | {CLEAR: 2.0})
     monkeypatch.setattr("wakewise.studies.side_by_side.warm", lambda **_: None)
     return tmp_path
 
@@ -96,10 +97,30 @@ def test_the_second_judge_flies_the_same_hovers_in_both_waters(made_up, capsys):
     table = found["judge"]["close"]
     assert table["wake-aware"]["tank_less_pct"] == pytest.approx(75.0) == table["wake-aware"]["lattice_less_pct"]
     assert table["dp"]["seeds"] == 1
+    assert table["wake-aware"]["lattice_clear_m_s"] == 2.0 and table["wake-aware"]["lattice_clear_less_pct"] == 0.0
     show_worlds(found)
     assert "the second judge" in capsys.readouterr().out
     lost = judge_table({("tank: close", "dp", 1): {SPEED: 1.0}})
     assert lost["close"]["dp"]["tank_m_s"] is None and lost["close"]["dp"]["tank_less_pct"] is None
+
+
+def test_a_judged_flight_is_the_flight_looked_at_off_its_target_as_well():
+    """All figures are those of the same flight; 8 cm off the water is looked at once the vehicle has settled."""
+    trial = WorldTrial(world="payload", method="dp", seed=2, flow="tank", duration_s=10.0)
+    judged, plain = judged_trial(trial), fly_trial(trial)
+    same = [key for key in FLIGHT_FIGURES if plain[key] is not None]
+    assert [judged[key] for key in same] == [plain[key] for key in same]
+    assert 0.001 < judged[CLEAR] < 0.5
+    assert judged_trial(WorldTrial(world="payload", method="dp", seed=2, flow="tank", duration_s=2.0))[CLEAR] is None
+
+
+def test_clear_points_are_off_the_whole_target_and_off_the_bed():
+    """No corner of the mesh is nearer than that, and no point as near to the bed as half of it; most are kept."""
+    target = short_flight(WorldTrial(world="payload", method="dp", seed=1)).target
+    points = clear_points(target)
+    gaps = np.linalg.norm(points[:, None] - target.mesh.vertices_m, axis=2).min(axis=1)
+    assert 150 < len(points) <= 300 and gaps.min() > 0.999 * CLEAR_M
+    assert np.all(points[:, 2] < target.bed_z_m - 0.5 * CLEAR_M)
 
 
 def test_worlds_and_methods_that_are_not_known_are_refused():

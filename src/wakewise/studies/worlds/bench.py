@@ -38,6 +38,7 @@ TYPED_IN = "constants of the laws and numbers of the worlds, each with its sourc
 
 _engine = Processes
 _FLY, _SCAN = (f"wakewise.studies.worlds.flight:{name}_trial" for name in ("fly", "scan"))
+_JUDGE = "wakewise.studies.worlds.judge:judged_trial"
 
 
 def run(options: BenchOptions) -> dict[str, Any]:
@@ -60,7 +61,7 @@ def run(options: BenchOptions) -> dict[str, Any]:
     )
     judged, unjudged, seen = side_by_side.fly_all(
         judge_trials(options.judge, tuple(name for name in JUDGED if name in worlds)),
-        _FLY,
+        _JUDGE,
         FlightStore(folder, options.fresh),
         options,
         _engine,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import polars as pl
 from wakewise.evaluation import flight_figures
 from wakewise.missions import SETTLING
 from wakewise.operation import Parts, Scenario, fly
+from wakewise.operation.loop import Step
 from wakewise.studies.gentle.courses import gentle_route
 from wakewise.studies.gentle.paper import WATER_EVERY_S
 
@@ -85,9 +87,16 @@ def short_flight(trial: WorldTrial) -> Parts:
 
 def fly_trial(trial: WorldTrial) -> dict[str, float | None]:
     """Figures of one short flight."""
+    return flown_figures(short_flight(trial), trial.duration_s)
+
+
+def flown_figures(
+    parts: Parts, duration_s: float | None, watch: Callable[[Step, Any], None] | None = None
+) -> dict[str, float | None]:
+    """Figures of a flight of these parts, or of its first part, looked at by `watch` as in `wakewise.fly`."""
     began = time.process_time()
     # The mission's own check has seen the orbits that this hovers on and flies along.
-    flown = fly(short_flight(trial), checked=False, water_every_s=WATER_EVERY_S, duration_s=trial.duration_s).steps
+    flown = fly(parts, checked=False, water_every_s=WATER_EVERY_S, duration_s=duration_s, watch=watch).steps
     frame = flown.filter(pl.col("leg") != SETTLING)
     figures: dict[str, Any] = flight_figures(frame if frame.height else flown)
     return {key: figures.get(key) for key in FLIGHT_FIGURES} | {"cpu_s": time.process_time() - began}
