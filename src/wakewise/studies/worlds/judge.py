@@ -4,9 +4,9 @@ Do the order of the methods and the size of the gain hold there? The worlds are 
 target and of a current. The target is held still in both, and what the lattice has not (silt, turbulence of the water's
 own) is in the tank alone.
 
-Water is looked at on the target's surface, as in every flight, and 8 cm off its hull. Cells of 2.5 cm hold the water
-fast that is at a wall, three of them deep, where the tank's water slips: so sizes can be held against each other off
-the surface only.
+Water is looked at on the target's surface, as in every flight, and 8 cm off its hull. The lattice's water comes to rest
+on a target and is slow for some centimetres, where the tank's slips along it: sizes can be held against each other off
+the surface only (docs/decisions/0075).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ FLOWS = ("tank", "lattice")
 DURATION_S = 23.0
 """Settling and hover: the lattice takes minutes of a core for it."""
 CLEAR_M, _LOOK_S, _SETTLED_S, _POINTS = 0.08, 0.5, 8.0, 300
-"""How far off the surface the water is clear of what the lattice's cells hold fast."""
+"""How far off the target's hull the water is clear of what the lattice's target slows down."""
 CLEAR = "clear_speed_mean_m_s"
 _PLACES = {"": "target_speed_mean_m_s", "clear_": CLEAR}
 
