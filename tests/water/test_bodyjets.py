@@ -31,9 +31,11 @@ def wall():
     rows = Blockage.of(_box([0.0, -SIDE, 10.0 - SIDE], [0.2, SIDE, 10.0 + SIDE])).rows
     at = np.arange(-SIDE + 0.005, SIDE, 0.01)
     y, z = (side.ravel() for side in np.meshgrid(at, 10.0 + at))
-    return rows._replace(
+    face = rows._replace(
         points=np.column_stack([0 * y, y, z]), normals=np.tile([-1.0, 0.0, 0.0], (len(y), 1)), piece=1e-4
     )
+    lead_round(face, np.array([-0.03, 0.0, 10.0]), np.ones(3), np.ones(3))  # compiled here, not within an example
+    return face
 
 
 def _struck(body, y, sigma, steps=200, start=-0.5, end=0.0):

@@ -38,6 +38,13 @@ class MissionSettings(Settings):
     settle_s: float = Field(
         12.0, ge=0.0, le=120.0, description="hover before the first leg, until the integral knows trim and current"
     )
+    stray: float | None = Field(
+        0.02,
+        gt=0.0,
+        le=1.0,
+        description="largest share of the next half second's way that a method which plans may leave undone for the "
+        "water's sake; null: as much as control.plan.w_track lets it",
+    )
     clearance_m: float = Field(0.05, ge=0.0, le=1.0, description="least distance of the hull to anything solid")
 
     @model_validator(mode="after")

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def route_pilot(parts: Parts) -> RoutePilot:
     """`route`: follows the mission's route by the clock."""
-    return RoutePilot(route=parts.route, aim=parts.aim)
+    return RoutePilot(route=parts.route, aim=parts.aim, stray=parts.scenario.mission.stray)
 
 
 def human_pilot(parts: Parts) -> HumanPilot:

@@ -46,7 +46,7 @@ def lead_round(body: BodyRows, x: Array, u: Array, answer: Array) -> None:
     for k in range(3):
         before += u[k] ** 2
         after += answer[k] ** 2
-    if after <= _SLIGHT**2 * before:
+    if before == 0.0 or after <= _SLIGHT**2 * before:
         return
     _draw_none(body, x, answer)
     after = 0.0

@@ -1,0 +1,28 @@
+"""Who wishes: the mission's pilot carries what the mission promises of its places."""
+
+import pytest
+
+from wakewise.errors import InputError
+from wakewise.operation import Scenario
+from wakewise.studies.gentle.flight import Trial, fly_trial
+
+
+@pytest.mark.parametrize("stray", [0.02, 0.1, None])
+def test_a_mission_s_goals_promise_what_the_mission_says(stray):
+    """The setting reaches every goal; null promises nothing, and 2 % is what nobody has to ask for."""
+    settings = {} if stray == 0.02 else {"mission.stray": stray}
+    parts = Scenario.preset("quick", **settings).parts()
+    assert parts.pilot.goal(3.0, parts.start).stray == stray
+
+
+def test_a_promise_of_nothing_or_of_all_is_refused():
+    """0 could not be kept by any plan."""
+    with pytest.raises(InputError, match="stray"):
+        Scenario.preset("quick", **{"mission.stray": 0.0})
+
+
+@pytest.mark.slow
+def test_a_plan_keeps_the_mission_s_places_above_a_target():
+    """A heavy vehicle straight above its target is where `dp` would be; by weights alone it is 5 cm off."""
+    dp, ours = (fly_trial(Trial(scenario="nadir/paper", method=m, seed=1)) for m in ("dp", "wake-aware"))
+    assert ours["camera_rmse_mm"] < 1.05 * dp["camera_rmse_mm"] + 0.2
