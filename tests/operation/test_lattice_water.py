@@ -43,7 +43,7 @@ def test_in_a_current_only_what_the_vehicle_adds_is_excess():
     first = water.water()
     water.step(np.full(8, 2.0), 0.3)
     assert first.target_speed_mean_m_s == 0.0 < water.water().target_speed_mean_m_s
-    far = np.array([parts.start.X_WB.p_m, parts.start.X_WB.p_m + [0.0, 0.0, 0.3]])
+    far = parts.start.X_WB.p_m + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.3]])
     added = np.linalg.norm(water.excess_velocity(far), axis=1)
     assert np.all((added > 0.0) & (added < 1.0)) and np.all(np.linalg.norm(water.box.velocity(far), axis=1) > 0.05)
     assert water.water().target_speed_mean_m_s < 0.1
