@@ -44,6 +44,17 @@ def test_a_jet_half_a_diameter_beside_a_box_loses_momentum_and_turns_away():
     assert np.all(np.array(past_figures(field)["drawn_D"])[4:] < -0.1)
 
 
+def test_nothing_passes_a_box_that_is_struck_square():
+    """Its momentum stays on the box, and what runs off at its sides is up to three quarters as fast as at the disk."""
+    field = load_past_box("struck-target")
+    assert np.abs(field.flux[field.x_D >= 5.0]).max() < 0.02 and field.flux[0] > 0.9
+    low, high = (np.array(corner) for corner in find_case("struck-target").boxes_D[0])
+    upright = field.points_D()[0]
+    gap = np.linalg.norm(np.maximum(np.maximum(low - upright, upright - high), 0.0), axis=-1)
+    beside = (gap > 0.2) & (gap < 1.0) & (np.abs(upright[..., 2]) > high[2])
+    assert 0.2 < np.hypot(field.along, field.down)[beside].max() < 0.75
+
+
 def test_a_field_is_read_as_it_was_written_and_no_other(tmp_path):
     """What is saved comes back within its steps; of another case or solver it is refused with a way out."""
     field = load_past_box()

@@ -288,7 +288,8 @@ def _cases() -> dict[str, Case]:
 CASES = _cases()
 """Cases by name. `twin`: 8 cm apart for D = 60 mm; `head-on`: 0.6 m apart; `crossing`: at right angles, 0.36 m
 from both disks, and at 40 and 110 degrees; `past-box`, `grazing-box`, `grazing-target`: one diameter and half of one
-beside a cube of 0.24 m, and half of one beside one of 0.15 m; `four`: four times the thrust."""
+beside a cube of 0.24 m, and half of one beside one of 0.15 m; `struck-target`: square on that one; `four`: four times
+the thrust."""
 
 
 def find_case(name: str) -> Case:
