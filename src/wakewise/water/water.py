@@ -4,7 +4,8 @@ Every thruster sends parcels of impulse (thrust x time / density) along its jet,
 says how they grow and travel. Travel time, merging of neighbouring jets, bending in a current and wakes that
 linger follow from the parcels' motion; nothing is prescribed for them. Bed, surface and walls mirror the jets
 (`faces`), turn what strikes them into wall jets (`bedjets`), jets that cross fan out (`fans`), jets that meet head-on
-turn aside (`meeting`), the target turns water (`blockage`) and jets (`bodyjets`) aside, a hull leaves a wake (`hullwake`).
+turn aside (`meeting`), the target turns water (`blockage`) and jets (`bodyjets`) aside, and a hull leaves a wake
+(`hullwake`).
 
 What it does not hold: swirl shows in the width of a jet only; wall jets carry no turbulence of their own and do not
 collide (those on the same ground add their momentum); there is no boundary layer of hull and target, nor a wake of the
