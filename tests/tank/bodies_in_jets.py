@@ -35,14 +35,19 @@ def push(water, seconds, thrusts_N, at=((0.0, 0.0, 0.0),), jets=AHEAD, dt_s=0.05
     return water
 
 
-def cube(case) -> Target:
-    """A case's box as a target far from every face, its jet 25 m deep."""
-    low, high = (np.array(corner) * D_M + [0, 0, 25] for corner in case.boxes_D[0])
+def box(low, high, bed_z_m=50.0) -> Target:
+    """A solid box between two corners as a target far from every face."""
+    low, high = np.array(low, dtype=float), np.array(high, dtype=float)
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * (high - low) + low
     sides = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
     faces = np.array([t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))])
     half = 0.5 * float(np.linalg.norm(high - low))
-    return Target(name="box", mesh=Mesh(corners, faces), centre_W_m=0.5 * (low + high), radius_m=half, bed_z_m=50.0)
+    return Target(name="box", mesh=Mesh(corners, faces), centre_W_m=0.5 * (low + high), radius_m=half, bed_z_m=bed_z_m)
+
+
+def cube(case) -> Target:
+    """A case's box as a target, its jet 25 m deep."""
+    return box(*(np.array(corner) * D_M + [0, 0, 25] for corner in case.boxes_D[0]))
 
 
 @cache

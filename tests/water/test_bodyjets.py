@@ -5,10 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from bodies_in_jets import box
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wakewise.targets import Mesh, Target
 from wakewise.water.blockage import Blockage
 from wakewise.water.bodyjets import lead_round, strike_body
 from wakewise.water.water import Water
@@ -16,19 +16,10 @@ from wakewise.water.water import Water
 SIDE = 0.3
 
 
-def _box(low, high, bed_z_m=50.0):
-    low, high = np.array(low, dtype=float), np.array(high, dtype=float)
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * (high - low) + low
-    sides = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-    faces = np.array([t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))])
-    half = 0.5 * float(np.linalg.norm(high - low))
-    return Target(name="box", mesh=Mesh(corners, faces), centre_W_m=0.5 * (low + high), radius_m=half, bed_z_m=bed_z_m)
-
-
 @pytest.fixture(scope="module")
 def wall():
     """A face at x = 0, wide beside the jets here, in pieces of a square centimetre; the box has no other."""
-    rows = Blockage.of(_box([0.0, -SIDE, 10.0 - SIDE], [0.2, SIDE, 10.0 + SIDE])).rows
+    rows = Blockage.of(box([0.0, -SIDE, 10.0 - SIDE], [0.2, SIDE, 10.0 + SIDE])).rows
     at = np.arange(-SIDE + 0.005, SIDE, 0.01)
     y, z = (side.ravel() for side in np.meshgrid(at, 10.0 + at))
     face = rows._replace(
@@ -103,7 +94,7 @@ def test_a_parcel_to_which_the_body_answers_nothing_goes_straight_on(wall):
 
 def test_a_jet_that_strikes_for_long_does_not_pile_up():
     """After a minute there are no more parcels, nor faster water, than after the first; what is missing is told."""
-    body = Blockage.of(_box([0.18, -0.075, 9.925], [0.33, 0.075, 10.075]))
+    body = Blockage.of(box([0.18, -0.075, 9.925], [0.33, 0.075, 10.075]))
     area, density, thrust = math.pi * 0.03**2, 998.0, 1.0
     water = Water(np.array([area]), density_kg_m3=density, bed_z_m=50.0, rng=np.random.default_rng(0), body=body)
     at, axes = np.array([[0.0, 0.0, 10.0]]), np.array([[-1.0, 0.0, 0.0]])
