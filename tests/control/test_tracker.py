@@ -142,3 +142,16 @@ def test_a_ramp_needs_no_integral():
     assert np.all(state.force_W_N == 0.0)
     assert lag > 0.005
     assert worst < 0.1 * lag
+
+
+def test_a_load_is_held_against_up_to_what_the_thrusters_can_do():
+    """Twice the integral's bound is met in full, a load that no thruster could make is not."""
+    here = Goal(X_WB=Pose(np.zeros(3), np.array([1.0, 0, 0, 0])), nu_B=np.zeros(6))
+    most = TRACKER.load_limit
+    reach = np.abs(VEHICLE.allocation_matrix) @ np.minimum(-VEHICLE.thrust_lower_N, VEHICLE.thrust_upper_N)
+    assert (most <= reach + 1e-9).all() and most[4] == pytest.approx(reach[4])
+    for load, met in ((2.0 * TRACKER.integral_limit, 2.0 * TRACKER.integral_limit), (10.0 * reach, most)):
+        calm = BodyState(X_WB=Pose(np.zeros(3), np.array([1.0, 0, 0, 0])), nu_B=np.zeros(6))
+        pulled = replace(calm, load_B=load)
+        wrench = [TRACKER.wrench(TRACKER.init(), 0.02, estimate, here)[1] for estimate in (calm, pulled)]
+        assert wrench[0] - wrench[1] == pytest.approx(met)

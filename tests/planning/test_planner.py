@@ -174,3 +174,16 @@ def test_an_obedience_that_means_nothing_is_refused_before_it_is_planned(bad):
     """Zero, negative, not finite; the planner's guard then falls back and says so."""
     with pytest.raises(InputError, match="obedience"):
         replace(problem(), obedience=bad)
+
+
+def test_a_start_that_tumbles_is_not_where_a_plan_ends():
+    """Thrusts that pitch the vehicle faster than a stage can follow give way to those that hold it."""
+    planner, case = Planner(model()), problem()
+    pitch = VEHICLE.allocation_matrix[4]
+    tumbling = np.tile(np.where(pitch > 0.0, VEHICLE.thrust_upper_N, VEHICLE.thrust_lower_N) * (pitch != 0.0), (20, 1))
+    planner.load(case)
+    with np.errstate(all="ignore"):
+        assert not np.isfinite(planner.cost(tumbling))
+    plan = planner.plan(case, tumbling)
+    assert np.isfinite(plan.cost) and np.isfinite(plan.states).all()
+    assert plan.cost < 2.0 * planner.plan(case, START).cost

@@ -255,6 +255,10 @@ class Planner:
         settings = self.model.settings
         U = np.clip(start_N, self.model.table.lower, self.model.table.upper)
         U, J, done, converged, solver = self._descend(U, settings.iterations)
+        if not np.isfinite(J):
+            # Thrusts that were planned from elsewhere can make the vehicle tumble, faster than stages can follow.
+            U = np.tile(holding_thrusts(self.model, problem), (settings.stages, 1))
+            U, J, done, converged, solver = self._descend(U, settings.iterations)
         self._since_second += 1
         for other, iterations in self._other_starts(problem, U, J, done):
             V, J_other, more, other_converged, other_solver = self._descend(other, iterations, J)

@@ -22,6 +22,7 @@ LOOKS = {
     "instant": ("#5b8fb0", "D"),
     "wake-aware": ("#1f7a78", "o"),
     "wake-aware+trim": ("#7d4f9e", "P"),
+    "bow-rule+trim": ("#d9b98a", "X"),
 }
 """Methods that are drawn, with colour and mark."""
 TROUBLE_MM_S = 10.0

@@ -23,7 +23,7 @@ from wakewise.studies.gentle.bound import BoundTrial
 from wakewise.studies.gentle.bound_figures import bound_figures
 from wakewise.studies.gentle.figures import SPEED, Row, log_reduction_pct, means, pairs_of, reduction_pct
 from wakewise.studies.gentle.flight import FIGURES
-from wakewise.studies.gentle.headline import PLACE, RIVALS, WRONG, headline
+from wakewise.studies.gentle.headline import PLACE, RIVALS, WRONG, headline, tag_of
 from wakewise.studies.gentle.levers import LEVERS, NONE, alone, left_out, wished_levers
 from wakewise.studies.gentle.library import names_of, title_of, trim_of
 from wakewise.studies.gentle.paper import FIGURES as PAPER_FIGURES
@@ -150,7 +150,7 @@ def scenario_figures(
 
 def against(base: Mapping[int, Row], ours: Mapping[int, Row], rival: str, strata: Mapping[int, str]) -> dict[str, Any]:
     """Reduction of the target's speed against a rival: by logarithms, its worst seed, and by sums."""
-    tag = rival.replace("-", "_")
+    tag = tag_of(rival)
     value, interval, worst = log_reduction_pct(pairs_of(base, ours, SPEED, strata))
     return {
         f"reduction_vs_{tag}_pct": value,

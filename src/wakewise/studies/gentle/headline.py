@@ -20,7 +20,9 @@ SILT, SWAY, PLACE, ENERGY = "ray_optical_depth", "sway_rms_mm", "camera_rmse_mm"
 SWAY_WASH = "sway_wash_mm"
 """What the vehicle adds to the sway of the same water without it: all that a controller can take away (0038)."""
 BODY = "position_rmse_mm"
-RIVALS = ("dp", "unaware", "bow-rule")
+RIVALS = ("dp", "unaware", "bow-rule", "bow-rule+trim")
+BESIDE = ("instant", "wake-aware+trim", "dp+trim", "bow-rule", "bow-rule+trim")
+"""What the table is made for as well."""
 WRONG = "wake-aware, wrong current"
 
 Known = tuple[str, int]
@@ -43,7 +45,7 @@ def headline(flights: Flights, trims: Mapping[Known, str], failed: set[tuple[str
             "calm": calm(method, {k for k in by if by[k] < CALM_M_S}, flights, trims),
         }
 
-    beside = [name for name in ("instant", "wake-aware+trim", "dp+trim", "bow-rule") if flights.get(name)]
+    beside = [name for name in BESIDE if flights.get(name)]
     return {
         "method": "wake-aware",
         **table("wake-aware", speeds),
@@ -51,6 +53,11 @@ def headline(flights: Flights, trims: Mapping[Known, str], failed: set[tuple[str
         "everywhere": harm(flights.get("dp", {}), flights.get("wake-aware", {})),
         "beside": {name: table(name, speeds) for name in beside},
     }
+
+
+def tag_of(rival: str) -> str:
+    """A method's name within the name of a figure."""
+    return rival.replace("-", "_").replace("+", "_")
 
 
 def trouble(
@@ -62,7 +69,7 @@ def trouble(
     lost = {k for name, k in failed if name == method and k in where}
     answer: dict[str, Any] = {"flights": len(where), "scenarios": sorted({k[0] for k in where})}
     for rival in RIVALS:
-        tag, base = rival.replace("-", "_"), rows.get(rival, {})
+        tag, base = tag_of(rival), rows.get(rival, {})
         if rival == method:
             continue
         found = log_reduction_pct(pairs_of(base, ours, SPEED, trims), len(lost & set(base)))

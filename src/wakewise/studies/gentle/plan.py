@@ -23,6 +23,7 @@ METHODS = (
     "wake-aware",
     "wake-aware+trim",
     "dp+trim",
+    "bow-rule+trim",
 )
 """The first is what the others are held against."""
 
