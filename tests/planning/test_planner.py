@@ -12,7 +12,7 @@ from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_from_euler
 from wakewise.interfaces import Goal
 from wakewise.planning.guard import check_start
-from wakewise.planning.planner import Planner, compile_plan, shifted
+from wakewise.planning.planner import Planner, compile_plan
 from wakewise.planning.problem import PlanSettings
 from wakewise.planning.reference import reference_of
 from wakewise.planning.surroundings import Surroundings
@@ -92,14 +92,6 @@ def test_the_barrier_keeps_the_hull_off_the_floor():
     for _ in range(6):
         plan = planner.plan(replace(case, reference=deep), START if plan is None else plan.commands_N)
     assert plan.states[:, 2].max() + 0.5 * VEHICLE.size_m[2] < 1.5
-
-
-def test_shifting_drops_stages_and_holds_the_last():
-    """Two stages on, the third command comes first and the last is repeated."""
-    plan = Planner(model(iterations=1)).plan(problem(), START)
-    moved = shifted(plan, 2)
-    np.testing.assert_array_equal(moved[:18], plan.commands_N[2:])
-    np.testing.assert_array_equal(moved[18:], plan.commands_N[[-1, -1]])
 
 
 def test_the_reference_of_a_turning_goal_is_an_arc():

@@ -18,8 +18,9 @@ from wakewise.benches.cases import VEHICLE
 from wakewise.benches.planner import SCENARIOS, WARM_UP, DraggedPlant, plan_model, restart_spread
 from wakewise.geometry import Pose
 from wakewise.interfaces import Progress
-from wakewise.planning.planner import PlanModel, Planner, shifted
+from wakewise.planning.planner import PlanModel, Planner
 from wakewise.planning.problem import Horizon
+from wakewise.planning.starts import shifted
 from wakewise.trials.timing import timed_us
 from wakewise.wake import WakeSettings, WakeView, disturbance, wake_model
 

@@ -15,8 +15,9 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError, WakewiseError
-from wakewise.planning.planner import Planner, holding_thrusts, shifted
+from wakewise.planning.planner import Planner
 from wakewise.planning.problem import CLEARANCE_M, Horizon, PlanProblem
+from wakewise.planning.starts import shifted
 from wakewise.planning.surroundings import Surroundings
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
@@ -100,10 +101,9 @@ class Guard:
         return Guarded(None, 0.0, f"{words}: PID and allocator")
 
     def _start(self, problem: PlanProblem, previous: Horizon | None, age_s: float) -> Array:
-        model = self.planner.model
         if previous is not None:
-            return shifted(previous, round(age_s / model.settings.stage_s))
-        return np.tile(holding_thrusts(model, problem), (model.settings.stages, 1))
+            return shifted(previous, round(age_s / self.planner.model.settings.stage_s))
+        return self.planner.holding(problem)
 
     def _judge(self, plan: Horizon) -> tuple[str, str] | None:
         table = self.planner.model.table

@@ -36,6 +36,7 @@ from wakewise.planning.problem import (
     PlanTerms,
 )
 from wakewise.planning.qp import BoxQP
+from wakewise.planning.starts import holding_commands
 from wakewise.planning.surroundings import Surroundings
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle, compile_body
@@ -257,8 +258,7 @@ class Planner:
         U, J, done, converged, solver = self._descend(U, settings.iterations)
         if not np.isfinite(J):
             # Thrusts that were planned from elsewhere can make the vehicle tumble, faster than stages can follow.
-            U = np.tile(holding_thrusts(self.model, problem), (settings.stages, 1))
-            U, J, done, converged, solver = self._descend(U, settings.iterations)
+            U, J, done, converged, solver = self._descend(self.holding(problem), settings.iterations)
         self._since_second += 1
         for other, iterations in self._other_starts(problem, U, J, done):
             V, J_other, more, other_converged, other_solver = self._descend(other, iterations, J)
@@ -266,6 +266,10 @@ class Planner:
             if J_other < J:
                 U, J, converged, solver = V, J_other, other_converged, other_solver
         return self._answer(U, J, done, converged, solver)
+
+    def holding(self, problem: PlanProblem) -> Array:
+        """Commands that carry the load where the vehicle is, shape (N, n): a first guess."""
+        return holding_commands(self.model.layout, self.model.table, problem, self.model.settings.stages)
 
     def _other_starts(self, problem: PlanProblem, U: Array, J: float, done: int) -> Iterator[tuple[Array, int]]:
         """Starts that may lead to a better minimum than U, and how many iterations each may take.
@@ -280,7 +284,7 @@ class Planner:
         if self._predicted is not U:
             self.cost(U)
         if self._work.parts[CLOSEST] < 0.0:
-            yield np.tile(holding_thrusts(self.model, problem), (settings.stages, 1)), max(settings.iterations, 3)
+            yield self.holding(problem), max(settings.iterations, 3)
         elif self._since_second >= every and done + 2 <= settings.iterations:
             self._since_second = 0
             other = self._other_pattern(U)
@@ -387,18 +391,3 @@ class Planner:
             solver=solver,
             curvature=self._work.R[0].copy(),
         )
-
-
-def shifted(plan: Horizon, stages: int) -> Array:
-    """Commands of a plan, moved on by whole stages; the last one is held."""
-    by = min(max(stages, 0), len(plan.commands_N))
-    return np.vstack([plan.commands_N[by:], np.repeat(plan.commands_N[-1:], by, axis=0)])
-
-
-def holding_thrusts(model: PlanModel, problem: PlanProblem) -> Array:
-    """Least thrusts, shape (n,), that carry the load where the vehicle is: a first guess for every stage."""
-    q = problem.state[3:7]
-    t = 2.0 * np.cross(-q[1:], problem.force_W_N)
-    force_B = problem.force_W_N + q[0] * t + np.cross(-q[1:], t)
-    wanted = -np.concatenate([force_B, problem.moment_B_Nm])
-    return np.asarray(np.clip(model.layout.inverse @ wanted, model.table.lower, model.table.upper))
