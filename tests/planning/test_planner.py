@@ -9,11 +9,11 @@ from pydantic import ValidationError
 
 from wakewise.control.intent import obeying
 from wakewise.errors import InputError
-from wakewise.geometry import Pose, quat_from_euler
+from wakewise.geometry import Pose, matrix_from_quat, quat_from_euler
 from wakewise.interfaces import Goal
 from wakewise.planning.guard import check_start
 from wakewise.planning.planner import Planner, compile_plan
-from wakewise.planning.problem import PlanSettings
+from wakewise.planning.problem import PlanSettings, shifted
 from wakewise.planning.reference import reference_of
 from wakewise.planning.surroundings import Surroundings
 from wakewise.targets import Region
@@ -179,3 +179,21 @@ def test_a_start_that_tumbles_is_not_where_a_plan_ends():
     plan = planner.plan(case, tumbling)
     assert np.isfinite(plan.cost) and np.isfinite(plan.states).all()
     assert plan.cost < 2.0 * planner.plan(case, START).cost
+
+
+def test_shifting_drops_stages_and_holds_the_last():
+    """Two stages on, the third command comes first and the last is repeated."""
+    plan = Planner(model(iterations=1)).plan(problem(), START)
+    moved = shifted(plan, 2)
+    np.testing.assert_array_equal(moved[:18], plan.commands_N[2:])
+    np.testing.assert_array_equal(moved[18:], plan.commands_N[[-1, -1]])
+
+
+def test_thrusts_that_hold_carry_the_load():
+    """3 N heavy: the same in every stage, and their wrench is the load's, turned into the body, with the other sign."""
+    case = problem(weight_N=3.0)
+    held = Planner(model()).holding(case)
+    assert held.shape == START.shape and (held == held[0]).all()
+    force_B = matrix_from_quat(case.state[3:7]).T @ case.force_W_N
+    wanted = -np.concatenate([force_B, case.moment_B_Nm])
+    np.testing.assert_allclose(VEHICLE.allocation_matrix @ held[0], wanted, atol=1e-9)

@@ -24,9 +24,8 @@ from wakewise.benches.planner_reference import IpoptReference
 from wakewise.geometry import Pose, quat_from_euler
 from wakewise.interfaces import Goal
 from wakewise.planning.planner import PlanModel, Planner, compile_plan
-from wakewise.planning.problem import Horizon, PlanProblem, PlanSettings, PlanTerms
+from wakewise.planning.problem import Horizon, PlanProblem, PlanSettings, PlanTerms, shifted
 from wakewise.planning.reference import reference_of
-from wakewise.planning.starts import shifted
 from wakewise.planning.surroundings import Surroundings
 from wakewise.thrusters import thruster_lag
 from wakewise.trials.timing import BenchOptions

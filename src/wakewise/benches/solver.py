@@ -19,8 +19,7 @@ from wakewise.benches.planner import SCENARIOS, WARM_UP, DraggedPlant, plan_mode
 from wakewise.geometry import Pose
 from wakewise.interfaces import Progress
 from wakewise.planning.planner import PlanModel, Planner
-from wakewise.planning.problem import Horizon
-from wakewise.planning.starts import shifted
+from wakewise.planning.problem import Horizon, shifted
 from wakewise.trials.timing import timed_us
 from wakewise.wake import WakeSettings, WakeView, disturbance, wake_model
 

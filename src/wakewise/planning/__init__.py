@@ -6,9 +6,9 @@ bad plan is counted and replaced.
 
 Start reading in `problem.py` (the cost in symbols), then `planner.py` (the iterations). `kernels.py` rolls the horizon
 out with derivatives, `condensing.py` makes the quadratic program, `qp.py` solves it, `barrier.py` and `surroundings.py`
-keep it clear of floor, walls and target, `reference.py` says what is wished along the way, `starts.py` where a plan
-begins, `guard.py` what is flown when. What the thrusts do to the water is asked of `wakewise.wake`; `numeric.py` adds
-it for models that the kernels do not know. Nothing here knows how a plan is flown: see `wakewise.control`.
+keep it clear of floor, walls and target, `reference.py` says what is wished along the way, `guard.py` what is flown
+when. What the thrusts do to the water is asked of `wakewise.wake`; `numeric.py` adds it for models that the kernels do
+not know. Nothing here knows how a plan is flown: see `wakewise.control`.
 """
 
 from wakewise.planning.guard import check_start

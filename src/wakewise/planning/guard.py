@@ -16,8 +16,7 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.errors import InputError, WakewiseError
 from wakewise.planning.planner import Planner
-from wakewise.planning.problem import CLEARANCE_M, Horizon, PlanProblem
-from wakewise.planning.starts import shifted
+from wakewise.planning.problem import CLEARANCE_M, Horizon, PlanProblem, shifted
 from wakewise.planning.surroundings import Surroundings
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle

@@ -36,7 +36,6 @@ from wakewise.planning.problem import (
     PlanTerms,
 )
 from wakewise.planning.qp import BoxQP
-from wakewise.planning.starts import holding_commands
 from wakewise.planning.surroundings import Surroundings
 from wakewise.targets import Region
 from wakewise.vehicles import Vehicle, compile_body
@@ -268,8 +267,13 @@ class Planner:
         return self._answer(U, J, done, converged, solver)
 
     def holding(self, problem: PlanProblem) -> Array:
-        """Commands that carry the load where the vehicle is, shape (N, n): a first guess."""
-        return holding_commands(self.model.layout, self.model.table, problem, self.model.settings.stages)
+        """Least thrusts that carry the load where the vehicle is, in every stage, shape (N, n): a first guess."""
+        q, table = problem.state[3:7], self.model.table
+        t = 2.0 * np.cross(-q[1:], problem.force_W_N)
+        force_B = problem.force_W_N + q[0] * t + np.cross(-q[1:], t)
+        wanted = -np.concatenate([force_B, problem.moment_B_Nm])
+        least = np.clip(self.model.layout.inverse @ wanted, table.lower, table.upper)
+        return np.tile(least, (self.model.settings.stages, 1))
 
     def _other_starts(self, problem: PlanProblem, U: Array, J: float, done: int) -> Iterator[tuple[Array, int]]:
         """Starts that may lead to a better minimum than U, and how many iterations each may take.

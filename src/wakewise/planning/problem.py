@@ -166,3 +166,9 @@ class Horizon:
 def state_of(body: BodyState) -> Array:
     """Position, quaternion and twist in one array, shape (13,)."""
     return np.concatenate([body.X_WB.p_m, body.X_WB.q, body.nu_B])
+
+
+def shifted(plan: Horizon, stages: int) -> Array:
+    """Commands of a plan, moved on by whole stages; the last one is held."""
+    by = min(max(stages, 0), len(plan.commands_N))
+    return np.vstack([plan.commands_N[by:], np.repeat(plan.commands_N[-1:], by, axis=0)])
