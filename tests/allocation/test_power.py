@@ -1,5 +1,6 @@
 """What shares are worth their power: the same wrench, within limits, within a bound, and never a bad deal."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -73,6 +74,20 @@ def test_the_best_deal_is_that_of_all_combinations_of_the_parts():
         assert best.disturbance == pytest.approx(
             worthiest(LAYOUT, best, best.thrusts_N, LAW, 0.0, 1e-4, G, WEIGHTS).disturbance
         )
+
+
+def test_what_stands_beside_makes_power_cheap():
+    """The more a vehicle draws anyway, the less wash is left; a bound is one for the thrusters alone."""
+    for _ in range(10):
+        _, G, least, found = problem()
+        most_W = 1.3 * float(LAW.power_W(least.thrusts_N))
+        left = []
+        for standing_W in (0.0, 20.0, 1e6):
+            law = replace(LAW, standing_W=standing_W)
+            best = worthiest(LAYOUT, found, least.thrusts_N, law, most_W, 1e-4, G, WEIGHTS)
+            assert float(LAW.power_W(best.thrusts_N)) <= most_W * (1.0 + 1e-9)
+            left.append(cost(G, best.thrusts_N, np.zeros(8), WEIGHTS.packed))
+        assert left[0] >= left[1] >= left[2]
 
 
 def test_nobody_pays_for_water_stiller_than_calm():

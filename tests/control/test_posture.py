@@ -18,6 +18,7 @@ from wakewise.control.posture import (
     chosen,
     eased,
 )
+from wakewise.control.thrift import STANDING_W
 from wakewise.geometry import Pose, matrix_from_quat, quat_from_euler, quat_from_rotvec
 from wakewise.interfaces import BodyState, Goal
 from wakewise.planning import Surroundings
@@ -126,7 +127,7 @@ def test_a_neutral_vehicle_in_still_water_stays_level():
     leans, found = prices(scale(), held(looking(VEHICLE, np.radians(40.0))))
     level = leans.index(0.0)
     assert chosen(found, level, level) == level and found[level].cost < 1e-12
-    assert min(price.power for price in found[:level] + found[level + 1 :]) > 0.01
+    assert min(price.power_W for price in found[:level] + found[level + 1 :]) > 0.01
 
 
 @pytest.mark.parametrize("vehicle", [VEHICLE, HEAVY], ids=["paper", "bluerov2"])
@@ -138,20 +139,28 @@ def test_a_heavy_vehicle_saves_by_a_lean(vehicle):
 
 
 def test_among_postures_that_cost_about_the_least_the_one_of_least_power_is_taken():
-    """A lean four times as dear is as good, a dearer one is not; the present one stays for a tenth."""
-    least, cheap = Price(cost=1.0, power=2.9), Price(cost=3.9, power=2.0)
-    assert chosen([Price(cost=5.0, power=2.0), least, cheap], 0, 0) == 2
-    for own, stays in (((4.2, 2.1), True), ((4.5, 2.1), False), ((1.0, 2.2), True), ((1.0, 2.3), False)):
-        prices = [Price(cost=own[0], power=own[1]), least, cheap]
+    """A lean four times as dear is as good, a dearer one is not; the present one stays for a tenth and two watts."""
+    least, cheap = Price(cost=1.0, power_W=290.0), Price(cost=3.9, power_W=200.0)
+    assert chosen([Price(cost=5.0, power_W=200.0), least, cheap], 0, 0) == 2
+    for own, stays in (((4.2, 210.0), True), ((4.5, 210.0), False), ((1.0, 224.0), True), ((1.0, 225.0), False)):
+        prices = [Price(cost=own[0], power_W=own[1]), least, cheap]
         assert chosen(prices, 0, 0) == (0 if stays else 2)
+
+
+def test_nobody_leans_for_a_watt():
+    """In nearly perfect trim a lean of half the power is not gone for, nor is a wash four times as strong kept."""
+    lean = Price(cost=1.0, power_W=0.9)
+    assert chosen([Price(cost=1.0, power_W=1.8), lean], 0, 0) == 0
+    assert chosen([Price(cost=4.5, power_W=1.8), lean], 0, 0) == 1
+    assert chosen([Price(cost=1.0, power_W=0.9 + 2.0 * STANDING_W), lean], 0, 0) == 1
 
 
 def test_a_lean_may_take_twice_the_power_and_no_more():
     """However gentle it seems to be; without any that can be had, the mission's own stays."""
-    own = Price(cost=100.0, power=1.5)
-    assert chosen([own, Price(cost=1.0, power=2.9)], 0, 0) == 1
-    assert chosen([own, Price(cost=1.0, power=3.1)], 0, 0) == 0
-    assert chosen([own, Price(cost=1.0, power=3.5)], 0, 1) == 0
+    own = Price(cost=100.0, power_W=1.5)
+    assert chosen([own, Price(cost=1.0, power_W=2.9)], 0, 0) == 1
+    assert chosen([own, Price(cost=1.0, power_W=3.1)], 0, 0) == 0
+    assert chosen([own, Price(cost=1.0, power_W=3.5)], 0, 1) == 0
     assert chosen([NOT_TO_BE_HAD, NOT_TO_BE_HAD], 0, 1) == 0
 
 

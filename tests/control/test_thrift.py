@@ -1,5 +1,7 @@
 """How much power gentle shares may cost: next to nothing in calm water, what it is worth where there is wash."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from wakewise.control.thrift import (
     CALM_M_S,
     MOST,
     MOST_M_S,
+    STANDING_W,
     TOO_FAST,
     TROUBLE,
     TROUBLE_M_S,
@@ -59,11 +62,16 @@ WEIGHTS = Weights(disturbance=50.0, effort=1e-3)
 
 
 def shared(scale, law=LAW):
-    """Thrusts by a share of the wake's own matrix, and their power over that of the least thrusts."""
+    """Thrusts by a share of the wake's own matrix, and what is drawn for them over that for the least thrusts."""
     G = scale * VIEW.gram(Pose(np.zeros(3)))
     found = Sharer(layout=LAYOUT, law=law).shares(WRENCH, Seen(gram=G, sent=G), WEIGHTS, 3.0)
     least = least_thrusts(LAYOUT, WRENCH, G)
-    return found, least, float(LAW.power_W(found.thrusts_N) / LAW.power_W(least.thrusts_N))
+    return found, least, drawn_W(found.thrusts_N) / drawn_W(least.thrusts_N)
+
+
+def drawn_W(thrusts_N):
+    """Power of thrusters and of what stands beside them."""
+    return float(LAW.power_W(thrusts_N)) + STANDING_W
 
 
 def speed_m_s(scale):
@@ -96,9 +104,10 @@ def test_two_shares_are_compared_by_cost_and_power():
     """Two percent of power must save a percent of speed, over what counts as calm; without a law the cost decides."""
     sharer, calm = Sharer(layout=LAYOUT, law=LAW), WEIGHTS.disturbance * 3.0 * (TOO_FAST * CALM_M_S) ** 2
     T = np.ones(8)
+    more = (2.0 + STANDING_W / float(LAW.power_W(T))) ** (2.0 / 3.0)
     worth = sharer.worth(9.0 * calm, T, WEIGHTS, 3.0)
-    assert sharer.worth(9.0 * calm, 2.0 ** (2.0 / 3.0) * T, WEIGHTS, 3.0) == pytest.approx(2.0 * worth)
-    assert sharer.worth(4.0 * calm, 2.0 ** (2.0 / 3.0) * T, WEIGHTS, 3.0) == pytest.approx(worth)
+    assert sharer.worth(9.0 * calm, more * T, WEIGHTS, 3.0) == pytest.approx(2.0 * worth)
+    assert sharer.worth(4.0 * calm, more * T, WEIGHTS, 3.0) == pytest.approx(worth)
     assert Sharer(layout=LAYOUT).worth(7.0, T, WEIGHTS, 3.0) == 7.0
 
 
@@ -109,5 +118,17 @@ def test_what_may_join_a_jet_opens_no_bound():
     found = Sharer(layout=LAYOUT, law=LAW).shares(
         wrench, Seen(gram=G, sent=1e-5 * G), Weights(disturbance=50.0, effort=1e-3), 3.0
     )
-    least = LAW.power_W(least_thrusts(LAYOUT, wrench).thrusts_N)
-    assert 1.0 < float(LAW.power_W(found.thrusts_N) / least) <= CALM + 1e-9
+    assert 1.0 < drawn_W(found.thrusts_N) / drawn_W(least_thrusts(LAYOUT, wrench).thrusts_N) <= CALM + 1e-9
+
+
+def test_a_vehicle_that_hovers_on_a_watt_may_spend_another():
+    """Jets of a light load that stir the target are taken away whole, where a share of its own power would not do."""
+    G, wrench = VIEW.gram(Pose(np.zeros(3))), 0.3 * WRENCH
+    G = G * 3.0 * (TOO_FAST * TROUBLE_M_S) ** 2 / least_thrusts(LAYOUT, wrench, G).disturbance
+    seen, least = Seen(gram=G, sent=G), least_thrusts(LAYOUT, wrench, G)
+    assert float(LAW.power_W(least.thrusts_N)) < 3.0
+    with_it, without = (
+        Sharer(layout=LAYOUT, law=law).shares(wrench, seen, WEIGHTS, 3.0).disturbance
+        for law in (LAW, replace(LAW, standing_W=0.0))
+    )
+    assert with_it < 0.05 * least.disturbance and 0.2 * least.disturbance < without < least.disturbance

@@ -52,12 +52,13 @@ def test_an_unknown_current_leaves_the_water_still():
 
 @pytest.mark.parametrize("current", [(), (0.05, 0.02, 0.0)])
 def test_what_shares_are_chosen_by_is_the_mean_of_two_beliefs(current):
-    """Jets that go as reckoned and jets gone astray, by their shares; the lever off, or a foreign model: the first."""
+    """Shares are chosen by both, priced by the reckoned one; the lever off, or a foreign model: that alone."""
     here, eyes = estimate(*current), watch()
     astray = eyes.view.astray(here.X_WB)
     sure = watch(doubt=False).seen(here, THRUSTS)
-    for matrix, reckoned in zip(eyes.seen(here, THRUSTS), sure, strict=True):
-        np.testing.assert_allclose(matrix, (1.0 - DOUBT) * reckoned + DOUBT * np.diag(astray), rtol=1e-12)
+    seen = eyes.seen(here, THRUSTS)
+    np.testing.assert_allclose(seen.gram, (1.0 - DOUBT) * sure.gram + DOUBT * np.diag(astray), rtol=1e-12)
+    np.testing.assert_array_equal(seen.sent, sure.sent)
     foreign = Foreign()
     np.testing.assert_array_equal(watch(foreign).seen(here, THRUSTS).gram, watch(foreign).gram(here, THRUSTS))
 

@@ -14,7 +14,7 @@ What is worth its power. Some of a way saves nearly all of the wash and some nex
 parts of the null space that share no thruster (the horizontal ones, the vertical ones) are each gone along by
 themselves, and of all such points within the bound that of the least product of cost and power is taken: D goes as the
 square of a speed, so two percent of power must save a percent of it. The cost of what may count as calm is added to
-all, as nobody gains by water stiller than that.
+all, as nobody gains by water stiller than that; so is, to the power, what a vehicle draws whatever it thrusts with.
 """
 
 from __future__ import annotations
@@ -39,19 +39,21 @@ _STEPS = {0: 1, 1: 32, 2: 16, 3: 8}
 class PowerLaw:
     """Electrical power of thrusters: `forward`, `reverse`, shape (n,), in W/N^1.5, and their least thrusts in N.
 
-    Below a least thrust a thruster is run at it for a part of the time, so there power goes with |T|.
+    Below a least thrust a thruster is run at it for a part of the time, so there power goes with |T|. `standing_W` is
+    reckoned beside that of the thrusters where shares are held against each other.
     """
 
     forward: Array
     reverse: Array
     least_forward_N: float = 0.0
     least_reverse_N: float = 0.0
+    standing_W: float = 0.0
 
     def __post_init__(self) -> None:
         freeze(self, forward=(None,), reverse=(None,))
 
     def power_W(self, thrusts_N: Array) -> Array:
-        """Sum over thrusters, shape (...), for thrusts of shape (..., n)."""
+        """Sum over thrusters, shape (...), for thrusts of shape (..., n); nothing of what stands beside."""
         T = np.array(thrusts_N, dtype=np.float64)
         rows = T.reshape(-1, T.shape[-1])
         power = _power_of(rows, self.forward, self.reverse, self.least_forward_N, self.least_reverse_N)
@@ -79,7 +81,7 @@ def _power_of(rows, forward, reverse, least_forward, least_reverse):  # type: ig
 
 @njit
 def _worthiest(  # type: ignore[no-untyped-def]
-    least, ways, steps, forward, reverse, least_forward, least_reverse, most_W, calm, G, previous, weights
+    least, ways, steps, forward, reverse, least_forward, least_reverse, standing, most_W, calm, G, previous, weights
 ):
     """Thrusts of the least `worth` on the grid of `steps` along each of `ways`, shape (k, n), within `most_W`.
 
@@ -95,7 +97,7 @@ def _worthiest(  # type: ignore[no-untyped-def]
             rest //= steps + 1
         power = _power(thrusts, forward, reverse, least_forward, least_reverse)
         if power <= most_W or point == 0:
-            own = (cost(G, thrusts, previous, weights) + calm) * power
+            own = (cost(G, thrusts, previous, weights) + calm) * (power + standing)
             if own < value:
                 value = own
                 best[:] = thrusts
@@ -103,7 +105,7 @@ def _worthiest(  # type: ignore[no-untyped-def]
 
 
 def worth(cost_: float, power_W: float, calm: float) -> float:
-    """What shares are compared by: the product of power and of cost over what is calm; less is better."""
+    """What shares are compared by: cost over what is calm times power with what stands beside; less is better."""
     return (cost_ + calm) * power_W
 
 
@@ -128,7 +130,7 @@ def worthiest(
         Thrusts of the same wrench; where they alone need more than `most_W`, they are the answer.
     law : PowerLaw
     most_W : float
-        Bound on power.
+        Bound on the thrusters' power.
     calm : float
         Cost of what counts as calm, in the units of the weights.
     gram : ndarray, shape (2 n, 2 n)
@@ -148,7 +150,7 @@ def worthiest(
         parts.append(layout.owners[_PARTS - 1 :].any(axis=0))
     ways = np.array([np.where(own, found.thrusts_N - base, 0.0) for own in parts]).reshape(-1, len(base))
     best = _worthiest(
-        base, ways, _STEPS[len(parts)], law.forward, law.reverse, law.least_forward_N, law.least_reverse_N, most_W,
-        calm, G, previous, weights.packed,
+        base, ways, _STEPS[len(parts)], law.forward, law.reverse, law.least_forward_N, law.least_reverse_N,
+        law.standing_W, most_W, calm, G, previous, weights.packed,
     )  # fmt: skip
     return replace(found, thrusts_N=best, wrench_B=layout.B @ best, disturbance=disturbance_of(G, best))

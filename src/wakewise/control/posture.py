@@ -20,9 +20,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wakewise.allocation import Layout, Weights, compile_layout, gentle_allocation
+from wakewise.allocation import Layout, PowerLaw, Weights, compile_layout, gentle_allocation
 from wakewise.arrays import Array, freeze
 from wakewise.control import easing
+from wakewise.control.thrift import STANDING_W, power_law
 from wakewise.control.watch import FULL
 from wakewise.geometry import Pose, quat_from_rotvec
 from wakewise.interfaces import Goal
@@ -112,16 +113,16 @@ class Hold:
 
 @dataclass(frozen=True, kw_only=True)
 class Price:
-    """What holding a posture costs: the allocators' own cost, and the power that it takes but for a factor, N^1.5.
+    """What holding a posture costs: the allocators' own cost, and the power that the thrusters take for it.
 
-    An ideal propeller's power is T^1.5 / sqrt(2 rho A) (momentum theory). Both are infinite where it is not to be had.
+    Both are infinite where it is not to be had.
     """
 
     cost: float
-    power: float
+    power_W: float
 
 
-NOT_TO_BE_HAD = Price(cost=np.inf, power=np.inf)
+NOT_TO_BE_HAD = Price(cost=np.inf, power_W=np.inf)
 NEAR = 4.0
 """Postures that cost at most this many times the least are as good as the least: no wake model of ours knows the speeds
 of the water within a factor of two (docs/decisions/0014), and cost goes with their square."""
@@ -129,7 +130,11 @@ MOST_POWER = 2.0
 """A posture may take this many times the power of the mission's own. Where wash is carried off by a current or has
 nothing to disturb, wake models still find it, and a vehicle that hovers for nearly nothing would lean for it."""
 WORTH = 0.1
-"""Share of the power, or of the bound on the cost, by which another posture must be better than the present one."""
+"""Share of the power, or of the bound on the cost, by which another posture must be better than the present one.
+
+Of the power it must save `STANDING_W`, too: what a vehicle rights itself with is known to a few tenths of a newton
+metre, and in nearly perfect trim one leaned to and fro by 5 deg for half a watt that it never found there.
+"""
 
 
 def chosen(prices: Sequence[Price], own: int, present: int) -> int:
@@ -144,14 +149,14 @@ def chosen(prices: Sequence[Price], own: int, present: int) -> int:
     own, present : int
         Numbers of the mission's own posture and of the present one.
     """
-    most = MOST_POWER * prices[own].power
-    usable = [k for k, price in enumerate(prices) if price.power <= most and np.isfinite(price.cost)]
+    most = MOST_POWER * prices[own].power_W
+    usable = [k for k, price in enumerate(prices) if price.power_W <= most and np.isfinite(price.cost)]
     if not usable:
         return own
     least = NEAR * min(prices[k].cost for k in usable)
-    best = min((k for k in usable if prices[k].cost <= least), key=lambda k: prices[k].power)
-    cost, power = prices[present].cost, prices[present].power
-    stays = cost <= (1.0 + WORTH) * least and (1.0 - WORTH) * power <= min(prices[best].power, most)
+    best = min((k for k in usable if prices[k].cost <= least), key=lambda k: prices[k].power_W)
+    cost, power, enough = prices[present].cost, prices[present].power_W, prices[best].power_W + STANDING_W
+    stays = cost <= (1.0 + WORTH) * least and (1.0 - WORTH) * power <= min(enough, most)
     return present if stays else best
 
 
@@ -165,6 +170,7 @@ class Scale:
     hinge: Hinge
     body: RigidBody
     layout: Layout
+    law: PowerLaw
     half_m: Array
     around: Surroundings
     w_disturbance: float
@@ -178,6 +184,7 @@ class Scale:
             hinge=Hinge(X_BC=vehicle.X_BC, joint=joint),
             body=compile_body(vehicle),
             layout=compile_layout(vehicle.allocation_matrix, lower, upper),
+            law=power_law(vehicle),
             half_m=0.5 * np.asarray(vehicle.size_m),
             around=around,
             w_disturbance=weights[0],
@@ -217,7 +224,7 @@ class Scale:
         T = found.thrusts_N
         return Price(
             cost=weights.disturbance * found.disturbance + weights.effort * float(T @ T),
-            power=float(np.sum(np.abs(T) ** 1.5)),
+            power_W=float(self.law.power_W(T)),
         )
 
     def gap_m(self, goal: Goal) -> float:

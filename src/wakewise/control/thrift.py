@@ -9,6 +9,9 @@ straight in between. The first two were set beforehand: a flight may cost 1.3 ti
 more than 10 mm/s, 1.05 times where it leaves less than 5 (docs/decisions/0036). Of what lies above 1, a twentieth stays
 for what the bound does not see: pulses, the lag of rotors, corrections between two searches. An instant may cost more
 than a flight, since what is not worth it elsewhere pays (docs/decisions/0065).
+
+Shares of power are of the thrusters' own and `STANDING_W`, and so is what trouble may cost beyond calm: a ballasted
+vehicle hovers on a watt or two, and a quarter of that is no price (docs/decisions/0078).
 """
 
 from __future__ import annotations
@@ -44,6 +47,9 @@ CALM, TROUBLE = 1.0 + KEPT * 0.05, 1.0 + KEPT * 0.3
 CALM_M_S, TROUBLE_M_S, MOST_M_S = 0.005, 0.010, 0.025
 MOST = 1.0 + (TROUBLE - 1.0) * MOST_M_S / TROUBLE_M_S
 """About what the gentlest shares of a heavy vehicle need."""
+STANDING_W = 2.0
+"""Power beside that of the thrusters that shares of power are reckoned with: a watt or two that nobody misses. Well
+below what computer, camera and lights draw, since a flight's bar on energy counts thrusters alone."""
 TOO_FAST = 2.6
 """How many times too fast the wake model has the target's water under the least thrusts, jets carried by the current:
 the median over ten hovers of `dp` in seven worlds (2 to 8 where it sees the wash that is there; in three, where next to
@@ -64,6 +70,7 @@ def power_law(vehicle: Vehicle) -> PowerLaw:
         reverse=electrical_power_W(-one, vehicle.disk_areas_m2),
         least_forward_N=forward_N,
         least_reverse_N=reverse_N,
+        standing_W=STANDING_W,
     )
 
 
@@ -86,7 +93,8 @@ class Sharer:
             return found
         least_N, _ = within_limits(self.layout, self.layout.inverse @ wrench_B)
         speed_m_s = math.sqrt(max(disturbance_of(seen.sent, least_N), 0.0) / total_weight) / TOO_FAST
-        most_W = allowed(speed_m_s) * float(self.law.power_W(least_N))
+        share = allowed(speed_m_s)
+        most_W = share * float(self.law.power_W(least_N)) + (share - CALM) * self.law.standing_W
         calm = _calm(weights, total_weight)
         return worthiest(self.layout, found, least_N, self.law, most_W, calm, seen.gram, weights, previous_N)
 
@@ -94,7 +102,8 @@ class Sharer:
         """What shares of one wrench, shape (n,), are compared by: less is better; the cost alone if no law is known."""
         if self.law is None:
             return cost
-        return worth(cost, float(self.law.power_W(thrusts_N)), _calm(weights, total_weight))
+        drawn_W = float(self.law.power_W(thrusts_N)) + self.law.standing_W
+        return worth(cost, drawn_W, _calm(weights, total_weight))
 
 
 def _calm(weights: Weights, total_weight: float) -> float:

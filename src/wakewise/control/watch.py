@@ -7,7 +7,8 @@ seconds, on a step of its own, the least thrusts and what the allocator makes of
 flown for longer that its own matrix calls worse than the least thrusts.
 
 A belief is not the water. With a share of `DOUBT` a jet is held to have gone astray, and D is the mean of both beliefs:
-thrusts that are harmless only if all goes as reckoned are no longer free.
+thrusts that are harmless only if all goes as reckoned are no longer free. What shares may cost is asked of the first
+belief alone (`thrift`): the second is about the same wherever a vehicle hovers near a target.
 """
 
 from __future__ import annotations
@@ -71,15 +72,14 @@ class Watch:
     def seen(self, estimate: BodyState, thrusts_N: Array) -> Seen:
         """Matrices of D at an estimate, in the flow that it tells of: to choose shares by, and of thrusts as sent.
 
-        Their mean over both beliefs: jets that go where they are reckoned to, and jets that have gone astray.
+        To choose by, their mean over both beliefs: jets that go where they are reckoned to, and jets that have gone
+        astray. As sent, the first alone: a doubt is a reason to choose, but no wash that would be worth power.
         """
         seen = self.view.seen(estimate.X_WB, self.flow(estimate, thrusts_N))
         astray = self.view.astray(estimate.X_WB) if self.levers.doubt else None
         if astray is None:
             return seen
-        beside = np.diag(DOUBT * astray)
-        gram = (1.0 - DOUBT) * seen.gram + beside
-        return Seen(gram=gram, sent=gram if seen.sent is seen.gram else (1.0 - DOUBT) * seen.sent + beside)
+        return Seen(gram=(1.0 - DOUBT) * seen.gram + np.diag(DOUBT * astray), sent=seen.sent)
 
     def flow(self, estimate: BodyState, thrusts_N: Array) -> Flow | None:
         """The current to reckon with and the thrusts, shape (n,), to reckon from; None where it does not count.

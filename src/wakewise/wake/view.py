@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 class Seen(NamedTuple):
     """Matrices of D, shape (2 n, 2 n) each: `gram`, by which shares are chosen, and `sent`, of what thrusts do as sent.
 
-    They are one unless `gram` also charges thrusts for others that may join them (`wakewise.control.spare`).
+    They are one unless `gram` also charges thrusts for what may be: others that join them, jets that go astray
+    (`wakewise.control.watch`).
     """
 
     gram: Array
