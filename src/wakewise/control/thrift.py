@@ -51,9 +51,9 @@ STANDING_W = 2.0
 """Power beside that of the thrusters that shares of power are reckoned with: a watt or two that nobody misses. Well
 below what computer, camera and lights draw, since a flight's bar on energy counts thrusters alone."""
 TOO_FAST = 2.6
-"""How many times too fast the wake model has the target's water under the least thrusts, jets carried by the current:
-the median over ten hovers of `dp` in seven worlds (2 to 8 where it sees the wash that is there; in three, where next to
-none of it comes straight, a half and less)."""
+"""How many times too fast the wake model has the target's water under the least thrusts, as it reckons jets to go, the
+current's way: twice in the median of 14 flights in trouble (1 to 3.7), 3.2 times in 35 calm ones. With 2.6 all but one
+of the first lie above `TROUBLE_M_S` and all but one of the others below (docs/decisions/0078)."""
 
 
 def allowed(speed_m_s: float) -> float:
