@@ -10,14 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from wakewise.campaigns.task import Task
 from wakewise.campaigns.versions import FLIES, PHOTOGRAPHS
 from wakewise.errors import InputError
 from wakewise.studies.reproduce.claim import ORDER, TABLES
 from wakewise.studies.reproduce.quoted import W_TRACKS
 from wakewise.studies.reproduce.quoted_flights import VARIANTS
+from wakewise.studies.reproduce.varied import varied_mission
 from wakewise.studies.reproduce.waters import CACO3, FIELD, PAPER, PUMP_TANK, Water, water, water_names
 from wakewise.targets import coral_kinds
 
@@ -36,9 +35,6 @@ _OPERATOR = (*FLIES, "studies/operator", "studies/gentle", "studies/reproduce/me
 _BENCH = ("benches/planner.py", "benches/paper_planner.py", "benches/solver.py")
 _SOLVER = ("planning", "wake", "vehicles", "thrusters", *_BENCH)
 _WAKE = ("wake", "water", "lattice", "studies/wake_validation.py", "studies/flows.py", "studies/oracle.py")
-
-_SPREAD = {"standoff_m": (0.5, 0.62), "speed_m_s": (0.06, 0.12), "approach_m": (0.2, 0.6)}
-"""Missions of `success`: evenly between these; elevations up to 8 degrees higher, in either order."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,16 +186,9 @@ def _scan(world: str, method: str, target: str, seed: int, wish: Wish) -> Task: 
 
 
 def _varied(world: str, method: str, target: str, seed: int, wish: Wish) -> Task:  # noqa: ARG001
-    rng = np.random.default_rng([seed, 53])
-    mission: dict[str, Any] = {f"mission.{k}": round(float(rng.uniform(*span)), 4) for k, span in _SPREAD.items()}
-    elevations = [round(e + float(rng.uniform(0.0, 8.0)), 2) for e in (20.0, 40.0, 60.0)]
-    views = [20, 16, 12]
-    if rng.uniform() < 0.5:
-        elevations, views = elevations[::-1], views[::-1]
-    mission |= {"mission.elevations_deg": elevations, "mission.views": views}
-    mission["mission.order"] = "current" if rng.uniform() < 0.5 else "plain"
     kind = CORALS[(seed - 1) % len(CORALS)] if target == OWN and world == PUMP_TANK else target
-    fields = _fields(water(world), method, kind, seed) | mission
+    mission = varied_mission(world, None if kind == OWN else kind, seed)
+    fields = _fields(water(world), method, kind, seed) | dict(mission)
     return Task(
         name=_name("varied", world, target, method, seed),
         work="wakewise.studies.reproduce.scans:scan_one",
