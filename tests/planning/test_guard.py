@@ -11,7 +11,7 @@ from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_from_euler
 from wakewise.interfaces import BodyState, Goal
 from wakewise.planning import PlanSettings
-from wakewise.planning.guard import Guard
+from wakewise.planning.guard import SPIN_RAD_S, Guard
 from wakewise.planning.planner import Planner
 from wakewise.planning.reference import reference_of
 from wakewise.thrusters import thruster_lag
@@ -28,7 +28,7 @@ def controller():
 
 
 class Failing(Planner):
-    """Fails as told: an exception, a NaN, or a slow answer on a clock of its own."""
+    """Fails as told: an exception, a NaN, a slow answer on a clock of its own, or a vehicle that spins."""
 
     trouble = None
     now = 0.0
@@ -41,6 +41,10 @@ class Failing(Planner):
             return replace_unchecked(plan, cost=float("nan"))
         if self.trouble == "late":
             self.now += 0.2
+        if self.trouble == "spin":
+            states = np.array(plan.states)
+            states[-1, 11] = -1.01 * SPIN_RAD_S
+            return replace_unchecked(plan, states=states)
         return plan
 
 
@@ -64,6 +68,7 @@ def failing():
         (InputError("bad question"), "refused"),
         ("nan", "not finite"),
         ("late", "late"),
+        ("spin", "spin"),
     ],
 )
 def test_a_planner_that_fails_leaves_the_previous_plan(failing, trouble, kind):

@@ -25,6 +25,9 @@ log = logging.getLogger(__name__)
 
 USABLE_SHARE = 0.5
 """Share of the horizon up to which an old plan may be flown on."""
+SPIN_RAD_S = 2.0
+"""A plan that turns the vehicle faster is none: no mission or hand asks for more than 1 rad/s, stages of a tenth of a
+second do not follow it, and a plan that has begun to spin is the start of the next one (docs/decisions/0078)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +115,9 @@ class Guard:
             return "limits", "plan breaks thrust limits"
         if plan.solver == "not convex":
             return "infeasible", "plan's QP has no solution"
+        fastest = float(np.abs(plan.states[:, 10:]).max())
+        if fastest > SPIN_RAD_S:
+            return "spin", f"plan turns at {fastest:.1f} rad/s, {SPIN_RAD_S:g} are allowed"
         return None
 
 
