@@ -48,14 +48,7 @@ def preflight(parts: Parts) -> Preflight:
     """
     scenario, vehicle, route = parts.scenario, parts.vehicle, parts.route
     check_tilt(route, parts.aim, stops_suffice=scenario.mission.aim == "tilt")
-    clearance_m = check_clearance(
-        route,
-        parts.aim,
-        vehicle.size_m,
-        parts.bounds,
-        parts.found_target.mesh.vertices_m,
-        scenario.mission.clearance_m,
-    )
+    clearance_m = check_route(parts)
     check_way(parts)
     check_target(parts)
     times_s = np.linspace(0.0, route.duration_s, 400)
@@ -64,6 +57,18 @@ def preflight(parts: Parts) -> Preflight:
     for words in idle:
         log.warning("%s", words)
     return Preflight(clearance_m=clearance_m, holding=check_current(parts), idle=idle)
+
+
+def check_route(parts: Parts) -> float:
+    """Least clearance of the hull along the route, in m.
+
+    Raises
+    ------
+    InputError
+        If it comes too near to anything; where, and to what, is named.
+    """
+    corners, allowed_m = parts.found_target.mesh.vertices_m, parts.scenario.mission.clearance_m
+    return check_clearance(parts.route, parts.aim, parts.vehicle.size_m, parts.bounds, corners, allowed_m)
 
 
 def check_target(parts: Parts, looks: int = 200) -> None:

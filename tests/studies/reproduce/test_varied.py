@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from wakewise.errors import InputError
+from wakewise.operation import Scenario
+from wakewise.operation.preflight import check_route
 from wakewise.studies.reproduce import varied
-from wakewise.studies.reproduce.varied import SPREAD, check_fits, varied_mission
+from wakewise.studies.reproduce.varied import SPREAD, varied_mission
 from wakewise.studies.reproduce.waters import water
 
 LOW = ("pump-tank", "plate", 3)
@@ -16,8 +18,9 @@ def first_draw(seed):
     return varied._draw(np.random.default_rng([seed, 53]))
 
 
-def told(world, kind, mission, seed):
-    return water(world).told | {"target.kind": kind, "seed": seed} | dict(mission)
+def parts(world, kind, mission, seed):
+    told = water(world).told | {"target.kind": kind, "seed": seed} | dict(mission)
+    return Scenario.preset("quick", **told).parts()
 
 
 def test_a_first_draw_that_fits_is_taken_as_it_is():
@@ -31,10 +34,10 @@ def test_a_draw_that_comes_too_near_to_the_surface_is_drawn_again():
     """Seed 3 at a plate coral: its first draw is refused, the one that is flown is not."""
     world, kind, seed = LOW
     with pytest.raises(InputError, match="water surface"):
-        check_fits(told(world, kind, first_draw(seed), seed))
+        check_route(parts(world, kind, first_draw(seed), seed))
     mission = varied_mission(*LOW)
     assert dict(mission) != first_draw(seed)
-    check_fits(told(world, kind, mission, seed))
+    check_route(parts(world, kind, mission, seed))
 
 
 def test_water_that_no_draw_fits_is_refused_with_the_reason(monkeypatch):

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from wakewise.errors import InputError
-from wakewise.missions import check_clearance
 from wakewise.operation import Scenario
+from wakewise.operation.preflight import check_route
 from wakewise.studies.reproduce.waters import water
 
 SPREAD = {"standoff_m": (0.5, 0.62), "speed_m_s": (0.06, 0.12), "approach_m": (0.2, 0.6)}
@@ -37,26 +37,12 @@ def varied_mission(world: str, kind: str | None, seed: int) -> Mapping[str, Any]
     for _ in range(TRIES):
         mission = _draw(rng)
         try:
-            check_fits(water(world).told | own | mission | {"seed": seed})
+            check_route(Scenario.preset("quick", **water(world).told, **own, **mission, seed=seed).parts())
         except InputError as error:
             refused = error
             continue
         return MappingProxyType(mission)
     raise InputError(f"success: no mission of {TRIES} draws fits into {world}: {refused}")
-
-
-def check_fits(fields: Mapping[str, Any]) -> None:
-    """Refuse a mission on which the hull comes too near to anything.
-
-    Raises
-    ------
-    InputError
-        Where it does, and to what.
-    """
-    parts = Scenario.preset("quick", **fields).parts()
-    corners = parts.found_target.mesh.vertices_m
-    clearance_m = parts.scenario.mission.clearance_m
-    check_clearance(parts.route, parts.aim, parts.vehicle.size_m, parts.bounds, corners, clearance_m)
 
 
 def _draw(rng: np.random.Generator) -> dict[str, Any]:
