@@ -4,11 +4,11 @@ Sparing a target means load on fewer thrusters, and those need more power for th
 bought where the least thrusts would stir the target's water, and wasted where they would not. So shares must save a
 percent of speed for two percent of power (`allocation.power`), and the bound on power over that of the least thrusts
 goes with the speed that these would leave at the target, by the wake model and what it is known to be wrong by: `CALM`
-up to `CALM_M_S`, `TROUBLE` at `TROUBLE_M_S`, from there on in proportion to the speed up to `MOST` at `MOST_M_S`,
-straight in between. The first two were set beforehand: a flight may cost 1.3 times the energy of `dp` where that leaves
-more than 10 mm/s, 1.05 times where it leaves less than 5 (docs/decisions/0036). Of what lies above 1, a twentieth stays
-for what the bound does not see: pulses, the lag of rotors, corrections between two searches. An instant may cost more
-than a flight, since what is not worth it elsewhere pays (docs/decisions/0065).
+up to `CALM_M_S`, `TROUBLE` at `TROUBLE_M_S`, `MOST` from `MOST_M_S` on, straight in between. The first two were set
+beforehand: a flight may cost 1.3 times the energy of `dp` where that leaves more than 10 mm/s, 1.05 times where it
+leaves less than 5 (docs/decisions/0036). Of what lies above 1, a twentieth stays for what the bound does not see:
+pulses, the lag of rotors, corrections between two searches. An instant may cost more than a flight, since what is not
+worth it elsewhere pays (docs/decisions/0065).
 
 Shares of power are of the thrusters' own and `STANDING_W`, and so is what trouble may cost beyond calm: a ballasted
 vehicle hovers on a watt or two, and a quarter of that is no price (docs/decisions/0078).
@@ -45,8 +45,10 @@ cost 1.307 and 1.299 times the energy of `dp`."""
 CALM, TROUBLE = 1.0 + KEPT * 0.05, 1.0 + KEPT * 0.3
 """Most power over that of the least thrusts, where these leave the target's water calm, and where they do not."""
 CALM_M_S, TROUBLE_M_S, MOST_M_S = 0.005, 0.010, 0.025
-MOST = 1.0 + (TROUBLE - 1.0) * MOST_M_S / TROUBLE_M_S
-"""About what the gentlest shares of a heavy vehicle need."""
+MOST = 1.5
+"""The least bound that costs no wash: 1.7, about what the gentlest shares of a heavy vehicle need, left 33 % of `dp`'s
+in 18 flights in trouble for 1.28 times its energy, 1.5 leaves 32 for 1.27, 1.4 leaves 34 for 1.25
+(docs/decisions/0079)."""
 STANDING_W = 2.0
 """Power beside that of the thrusters that shares of power are reckoned with: a watt or two that nobody misses. Well
 below what computer, camera and lights draw, since a flight's bar on energy counts thrusters alone."""
