@@ -15,6 +15,8 @@ from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_from_euler
 from wakewise.interfaces import BodyState, Command, Goal
 from wakewise.operation import Scenario, fly
+from wakewise.planning import Surroundings
+from wakewise.planning.problem import CLEARANCE_M
 from wakewise.studies.gentle.courses import gentle_route
 from wakewise.studies.gentle.flight import camera_errors
 from wakewise.vehicles import load_vehicle
@@ -67,6 +69,31 @@ def test_heavy_it_leans_and_the_camera_keeps_its_pose_on_the_way():
         moved = after.goal.X_WB.p_m - before.goal.X_WB.p_m
         mean_W = 0.5 * (before.goal.X_WB.R @ before.goal.nu_B[:3] + after.goal.X_WB.R @ after.goal.nu_B[:3])
         np.testing.assert_allclose(moved, DT * mean_W, atol=5e-6)  # the last step of a way is rounded
+
+
+def test_a_lean_is_gone_before_the_mission_comes_near_a_roof():
+    """Up at 5 cm/s to 4 cm below it: the leaning hull is never nearer than the clearance or the mission's."""
+    low, begins_s, stops_s = looking(HEAVY, np.radians(20.0)), 12.0, 24.0
+    up_W = np.array([0.0, 0.0, -0.05])
+    highest = low.X_WB.p_m + (stops_s - begins_s) * up_W
+    roof = float(highest[2] - 0.5 * HEAVY.size_m[2] - 0.04)
+    around = Surroundings(planes=np.array([[0.0, 0.0, 1.0, roof]]))
+    settings = ControlSettings(levers={"drift": False})
+    controller = make_controller("instant", HEAVY, region(), believed(), settings, around)
+
+    def goal_at(t):
+        place = low.X_WB.p_m + np.clip(t - begins_s, 0.0, stops_s - begins_s) * up_W
+        nu = np.concatenate([low.X_WB.R.T @ up_W, np.zeros(3)]) if begins_s <= t < stops_s else np.zeros(6)
+        return replace(low, X_WB=Pose(place, low.X_WB.q), nu_B=nu)
+
+    _, commands = flown(controller, goal_at, stops_s + 2.0, 5.0)
+    leans, rooms = [], []
+    for k, command in enumerate(commands):
+        goal = goal_at(k * DT)
+        leans.append(command.goal.tilt_rad - goal.tilt_rad)
+        rooms.append(controller.scale.gap_m(command.goal) - min(CLEARANCE_M, controller.scale.gap_m(goal)))
+    assert max(np.abs(leans)) > np.radians(4.0)  # down there it leans
+    assert min(rooms) > -0.002
 
 
 def test_neutral_in_still_water_it_stays_level():

@@ -1,5 +1,7 @@
 """A body that leans under its camera: pose and twist of the camera, what a posture costs, and where it may not go."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from posture_helpers import HEAVY, OPEN, VEHICLE, believed, looking, region
@@ -8,8 +10,10 @@ from wakewise.control import ControlSettings
 from wakewise.control.instant import instant
 from wakewise.control.posture import (
     ACCELERATION_RAD_S2,
+    AHEAD_S,
     NOT_TO_BE_HAD,
     RATE_RAD_S,
+    ROUND_S,
     STEP_RAD,
     Hinge,
     Hold,
@@ -17,6 +21,7 @@ from wakewise.control.posture import (
     Scale,
     chosen,
     eased,
+    given_back,
 )
 from wakewise.control.thrift import STANDING_W
 from wakewise.geometry import Pose, matrix_from_quat, quat_from_euler, quat_from_rotvec
@@ -47,6 +52,7 @@ def held(goal, down_N=0.0, vehicle=VEHICLE, seen=None) -> Hold:
     )
 
 
+WAYS = {"level": np.array([0.0, 0.1, 0.0]), "down": np.array([0.0, 0.0, 0.1])}
 HINGES = [
     Hinge(X_BC=VEHICLE.X_BC, joint=VEHICLE.tilt),
     Hinge(
@@ -175,6 +181,30 @@ def test_a_posture_that_comes_too_near_is_refused_and_the_missions_own_never():
     refused = [price is NOT_TO_BE_HAD for price in found]
     assert any(refused) and not refused[level]
     assert all(out or gap >= gaps[level] for out, gap in zip(refused, gaps, strict=True))
+
+
+def test_a_lean_needs_room_where_the_mission_will_be_before_it_can_be_given_back():
+    """Over a floor a quarter of a metre below: there is room at rest and on a level way, none on the way down."""
+    goal = looking(VEHICLE, np.radians(30.0))
+    low = float(goal.X_WB.p_m[2] + 0.5 * VEHICLE.size_m[2] + 0.25)
+    weighed = scale(around=Surroundings(planes=np.array([[0.0, 0.0, -1.0, -low]])))
+    lean = min(weighed.leans(goal), key=lambda lean: weighed.gap_m(weighed.hinge.posed(goal, lean)))
+    lean = float(np.clip(lean, -0.26, 0.26))
+    R = goal.X_WB.R
+    moving = {name: replace(goal, nu_B=np.concatenate([R.T @ v, np.zeros(3)])) for name, v in WAYS.items()}
+    assert weighed.has_room(goal, lean) and weighed.has_room(moving["level"], lean)
+    assert not weighed.has_room(moving["down"], lean) and weighed.has_room(moving["down"], 0.0)
+    assert weighed.price(held(moving["down"], 5.0), lean) is NOT_TO_BE_HAD
+    assert weighed.price(held(goal, 5.0), lean) is not NOT_TO_BE_HAD
+
+
+def test_a_lean_is_given_back_no_faster_than_it_may_change():
+    """Held as long as asked, then level within its rate."""
+    leans = np.array(given_back(0.4, ROUND_S))
+    rest = round(ROUND_S / AHEAD_S)
+    assert np.all(leans[: rest + 1] == 0.4) and leans[-1] == 0.0
+    assert np.all(np.abs(np.diff(leans)) <= RATE_RAD_S * AHEAD_S + 1e-12)
+    assert given_back(0.0) == (0.0,)
 
 
 def test_a_posture_that_the_thrusters_cannot_hold_is_not_to_be_had():

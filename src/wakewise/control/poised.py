@@ -2,8 +2,9 @@
 
 The choice is slow: the leans between the camera's stops are weighed one after the other (`LOOK_S`), for one instant's
 goal, load and water, and at the end of a round one is chosen (`posture.chosen`). The way there is slow, too
-(`posture.eased`), and the goal that the inner controller sees moves along it with the twist that belongs to it, so that
-feed-forward and horizon are right and the camera stays where the mission wants it.
+(`posture.eased`), and is given up at once where there would be no room left to give it back. The goal that the inner
+controller sees moves along it with the twist that belongs to it, so that feed-forward and horizon are right and the
+camera stays where the mission wants it.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.arrays import Array, freeze
-from wakewise.control.posture import Hold, Price, Scale, chosen, eased
+from wakewise.control.posture import LOOK_S, Hold, Price, Scale, chosen, eased
 from wakewise.control.settings import ControlSettings
 from wakewise.control.watch import Watch
 from wakewise.errors import InputError
@@ -22,8 +23,6 @@ from wakewise.interfaces import BodyState, Command, Controller, Goal
 from wakewise.planning import Surroundings
 from wakewise.vehicles import Vehicle
 
-LOOK_S = 0.1
-"""Time between two looks at a lean: the planner's own. A round over joints of 90 deg takes two seconds."""
 LOAD_S = 2.0
 """Time constant over which the load is averaged: a round. A posture is for what stays."""
 
@@ -106,9 +105,11 @@ class Poised:
         return replace(state, force_W_N=force_W, moment_B_Nm=moment_B)
 
     def _look(self, state: PoisedState, dt_s: float, estimate: BodyState, goal: Goal) -> PoisedState:
-        """Weigh one lean if it is time; after the last, choose."""
+        """Weigh one lean if it is time; after the last, choose. A wish without room left is given up."""
         if state.age_s + dt_s < LOOK_S - 1e-6 or state.force_W_N is None or state.moment_B_Nm is None:
             return replace(state, age_s=state.age_s + dt_s)
+        if not self.scale.has_room(goal, state.wished_rad):
+            state = replace(state, wished_rad=0.0, round=None)
         now = state.round
         if now is None:
             watch, now_is = self.watch, estimate

@@ -11,12 +11,16 @@ A *lean* is the angle by which the joint stands above the mission's. The hinge t
 
 whatever the tilt is, since turns about one axis add up: X_BC(tilt) = S(tilt) X_BC(0). The camera's pose
 X_WB' X_BC(tilt + lean) = X_WB X_BC(tilt) is the mission's.
+
+A lean takes seconds to be given back, and the mission goes on meanwhile: it must have room where the mission will be by
+then, carried on as it moves now, and not only where it is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -30,6 +34,7 @@ from wakewise.interfaces import Goal
 from wakewise.planning import Surroundings
 from wakewise.planning.barrier import least_gap
 from wakewise.planning.problem import CLEARANCE_M
+from wakewise.planning.reference import reference_of
 from wakewise.vehicles import RigidBody, TiltJoint, Vehicle, compile_body, restoring_wrench
 from wakewise.vehicles.dynamics import coriolis_wrench, damping_wrench
 
@@ -41,6 +46,11 @@ RATE_RAD_S, ACCELERATION_RAD_S2 = 0.08, 0.04
 """How fast a lean changes, and how fast that. The body's middle goes round a hinge at most a quarter of a metre away:
 at 2 cm/s, a third of a mission's speed on its orbits, with 1 cm/s2, a fifth of the acceleration of a mission's legs, so
 that a change of posture asks for less than the mission itself does."""
+
+LOOK_S, ROUND_S = 0.1, 2.0
+"""Time between two looks at a lean: the planner's own; and what a round of them takes over a joint of 90 deg."""
+AHEAD_S = 0.5
+"""Time between two places where there must be room: at a mission's fastest, .3 m/s, half a hull."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -86,6 +96,17 @@ class Hinge:
 def eased(lean_rad: float, rate_rad_s: float, wished_rad: float, dt_s: float) -> tuple[float, float]:
     """Lean and its rate a step later on the way to a wished lean at rest, within `RATE_RAD_S` and its own change."""
     return easing.eased(lean_rad, rate_rad_s, wished_rad, dt_s, RATE_RAD_S, ACCELERATION_RAD_S2)
+
+
+@lru_cache(maxsize=512)
+def given_back(lean_rad: float, held_s: float = 0.0) -> tuple[float, ...]:
+    """Leans every `AHEAD_S` from now on, if one is held for a while and then given back."""
+    lean, rate, leans = lean_rad, 0.0, [lean_rad] * (1 + round(held_s / AHEAD_S))
+    while lean != 0.0:
+        for _ in range(round(AHEAD_S / LOOK_S)):
+            lean, rate = eased(lean, rate, 0.0, LOOK_S)
+        leans.append(lean)
+    return tuple(leans)
 
 
 Gram = Callable[[Pose, Array], Array]
@@ -200,12 +221,12 @@ class Scale:
     def price(self, hold: Hold, lean_rad: float) -> Price:
         """What the gentlest thrusts that hold a posture cost; `NOT_TO_BE_HAD` where there are none.
 
-        That is: where the hull would come nearer to anything than `CLEARANCE_M` and than the mission's own attitude
-        has it, or the thrusters' limits do not suffice. The wrench is the tracker's feed-forward: against weight,
-        buoyancy and the moment that rights the vehicle, against the drag of the goal's own motion and the load.
+        That is: where there is no room (`has_room`), or the thrusters' limits do not suffice. The wrench is the
+        tracker's feed-forward: against weight, buoyancy and the moment that rights the vehicle, against the drag of the
+        goal's own motion and the load.
         """
         goal = self.hinge.posed(hold.goal, lean_rad)
-        if lean_rad != 0.0 and self.gap_m(goal) < min(CLEARANCE_M, self.gap_m(hold.goal)):
+        if lean_rad != 0.0 and not self.has_room(hold.goal, lean_rad, ROUND_S):
             return NOT_TO_BE_HAD
         nu = np.array(goal.nu_B)
         wrench = -restoring_wrench(self.body, goal.X_WB.q) - damping_wrench(self.body, nu)
@@ -226,6 +247,18 @@ class Scale:
             cost=weights.disturbance * found.disturbance + weights.effort * float(T @ T),
             power_W=float(self.law.power_W(T)),
         )
+
+    def has_room(self, goal: Goal, lean_rad: float, held_s: float = 0.0) -> bool:
+        """Whether a lean that is held for a while keeps the hull clear until it is given back, the goal going on.
+
+        Clear is: no nearer to anything than `CLEARANCE_M`, or than the mission's own attitude there.
+        """
+        leans = given_back(lean_rad, held_s)
+        for row, lean in zip(reference_of(goal, len(leans) - 1, AHEAD_S), leans, strict=True):
+            there = replace(goal, X_WB=Pose(row[:3], row[3:7]))
+            if self.gap_m(self.hinge.posed(there, lean)) < min(CLEARANCE_M, self.gap_m(there)):
+                return False
+        return True
 
     def gap_m(self, goal: Goal) -> float:
         """Least distance of the hull from what it may not touch."""
