@@ -108,9 +108,9 @@ class Poised:
         """Weigh one lean if it is time; after the last, choose. A wish without room left is given up."""
         if state.age_s + dt_s < LOOK_S - 1e-6 or state.force_W_N is None or state.moment_B_Nm is None:
             return replace(state, age_s=state.age_s + dt_s)
-        if not self.scale.has_room(goal, state.wished_rad):
-            state = replace(state, wished_rad=0.0, round=None)
-        now = state.round
+        now, wished = state.round, state.wished_rad
+        if not self.scale.has_room(goal, wished):
+            now, wished = None, 0.0
         if now is None:
             watch, now_is = self.watch, estimate
             hold = Hold(
@@ -121,12 +121,12 @@ class Poised:
                 total_weight=watch.view.total_weight,
             )
             low, high = self.scale.hinge.span(goal.tilt_rad)
-            present = min(max(state.wished_rad, low), high)
+            present = min(max(wished, low), high)
             leans = (present, *(lean for lean in self.scale.leans(goal) if lean != present))
             now = Round(hold=hold, leans=leans)
         now = replace(now, prices=(*now.prices, self.scale.price(now.hold, now.leans[len(now.prices)])))
         if len(now.prices) < len(now.leans):
-            return replace(state, round=now, age_s=0.0)
+            return replace(state, round=now, age_s=0.0, wished_rad=wished)
         return replace(state, round=None, age_s=0.0, wished_rad=now.leans[chosen(now.prices, now.leans.index(0.0), 0)])
 
 
