@@ -27,6 +27,8 @@ from wakewise.control.thrift import STANDING_W
 from wakewise.geometry import Pose, matrix_from_quat, quat_from_euler, quat_from_rotvec
 from wakewise.interfaces import BodyState, Goal
 from wakewise.planning import Surroundings
+from wakewise.planning.problem import CLEARANCE_M
+from wakewise.planning.reference import reference_of
 from wakewise.vehicles import TiltJoint
 from wakewise.wake import WakeView
 
@@ -196,6 +198,26 @@ def test_a_lean_needs_room_where_the_mission_will_be_before_it_can_be_given_back
     assert not weighed.has_room(moving["down"], lean) and weighed.has_room(moving["down"], 0.0)
     assert weighed.price(held(moving["down"], 5.0), lean) is NOT_TO_BE_HAD
     assert weighed.price(held(goal, 5.0), lean) is not NOT_TO_BE_HAD
+
+
+def test_room_is_what_the_posed_hull_has_place_by_place():
+    """As `posed` and `gap_m` say it of each place on the way, for floors at random depths and any twist."""
+    rng = np.random.default_rng(3)
+    seen = set()
+    for _ in range(60):
+        goal = looking(VEHICLE, np.radians(30.0))
+        goal = replace(goal, nu_B=0.1 * rng.normal(size=6))
+        low = float(goal.X_WB.p_m[2] + rng.uniform(0.1, 0.8))
+        weighed = scale(around=Surroundings(planes=np.array([[0.0, 0.0, -1.0, -low]]), spheres=OPEN.spheres))
+        lean = float(rng.choice(weighed.leans(goal)))
+        leans, has = given_back(lean, ROUND_S), True
+        for row, then in zip(reference_of(goal, len(leans) - 1, AHEAD_S), leans, strict=True):
+            there = replace(goal, X_WB=Pose(row[:3], row[3:7]))
+            own = weighed.gap_m(there)
+            has = has and weighed.gap_m(weighed.hinge.posed(there, then)) >= min(CLEARANCE_M, own) - 1e-12
+        seen.add(has)
+        assert weighed.has_room(goal, lean, ROUND_S) == has
+    assert seen == {True, False}
 
 
 def test_a_lean_is_given_back_no_faster_than_it_may_change():

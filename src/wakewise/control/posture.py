@@ -29,7 +29,7 @@ from wakewise.arrays import Array, freeze
 from wakewise.control import easing
 from wakewise.control.thrift import STANDING_W, power_law
 from wakewise.control.watch import FULL
-from wakewise.geometry import Pose, quat_from_rotvec
+from wakewise.geometry import Pose, matrix_from_quat, quat_from_rotvec
 from wakewise.interfaces import Goal
 from wakewise.planning import Surroundings
 from wakewise.planning.barrier import least_gap
@@ -64,6 +64,16 @@ class Hinge:
         """Least and largest lean that the stops allow a camera that the mission tilts so; they hold zero."""
         return min(self.joint.low_rad - tilt_rad, 0.0), max(self.joint.high_rad - tilt_rad, 0.0)
 
+    @property
+    def axis(self) -> Array:
+        """The joint's axis in B, shape (3,): the camera's own, to its right."""
+        return self.X_BC.R[:, 0]
+
+    @property
+    def pivot_m(self) -> Array:
+        """A point on the joint's axis, shape (3,), from B's origin."""
+        return self.X_BC.p_m if self.joint.p_BJ_m is None else self.joint.p_BJ_m
+
     def posed(self, goal: Goal, lean_rad: float, rate_rad_s: float = 0.0) -> Goal:
         """The goal with another attitude and tilt, the camera's pose and motion as they were.
 
@@ -81,8 +91,7 @@ class Hinge:
         """
         if lean_rad == 0.0 and rate_rad_s == 0.0:
             return goal
-        axis = self.X_BC.R[:, 0]
-        pivot = self.X_BC.p_m if self.joint.p_BJ_m is None else self.joint.p_BJ_m
+        axis, pivot = self.axis, self.pivot_m
         turn = Pose(np.zeros(3), quat_from_rotvec(-lean_rad * axis))
         R = turn.R
         shift = pivot - R @ pivot
@@ -253,14 +262,19 @@ class Scale:
 
         Clear is: no nearer to anything than `CLEARANCE_M`, or than the mission's own attitude there.
         """
-        leans = given_back(lean_rad, held_s)
-        for row, lean in zip(reference_of(goal, len(leans) - 1, AHEAD_S), leans, strict=True):
-            there = replace(goal, X_WB=Pose(row[:3], row[3:7]))
-            if self.gap_m(self.hinge.posed(there, lean)) < min(CLEARANCE_M, self.gap_m(there)):
-                return False
-        return True
+        leans = np.array(given_back(lean_rad, held_s))
+        way = reference_of(goal, len(leans) - 1, AHEAD_S)
+        turns = matrix_from_quat(quat_from_rotvec(np.multiply.outer(-leans, self.hinge.axis)))
+        R_own = matrix_from_quat(way[:, 3:7])
+        p_own, pivot = way[:, :3].copy(), self.hinge.pivot_m
+        # As `Hinge.posed` has it, for all places at once.
+        p_posed = p_own + np.squeeze(R_own @ (pivot - turns @ pivot)[..., None], -1)
+        both = zip(p_own, R_own, p_posed, R_own @ turns, strict=True)
+        return all(self._gap(p, R) >= min(CLEARANCE_M, self._gap(p0, R0)) for p0, R0, p, R in both)
 
     def gap_m(self, goal: Goal) -> float:
         """Least distance of the hull from what it may not touch."""
-        around, X_WB = self.around, goal.X_WB
-        return float(least_gap(X_WB.p_m, X_WB.R, self.half_m, around.planes, around.spheres))
+        return self._gap(goal.X_WB.p_m, goal.X_WB.R)
+
+    def _gap(self, p_m: Array, R: Array) -> float:
+        return float(least_gap(p_m, R, self.half_m, self.around.planes, self.around.spheres))
