@@ -36,3 +36,8 @@ def looking(vehicle, elevation_rad, range_m=0.5, tilt=None) -> Goal:
     R_WC = look_at(eye, CENTRE) @ np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     tilt = vehicle.tilt.within(-elevation_rad) if tilt is None else tilt
     return Goal(X_WB=Pose.from_matrix(R_WC, eye) @ vehicle.X_BC_at(tilt).inverse(), tilt_rad=tilt)
+
+
+def gap_m(scale, goal) -> float:
+    """How far the hull of a vehicle that is at its goal is from what it may not touch."""
+    return scale.gap_m(goal.X_WB.p_m, goal.X_WB.R)

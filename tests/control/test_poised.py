@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import polars as pl
 import pytest
-from posture_helpers import CENTRE, HEAVY, OPEN, VEHICLE, believed, looking, region
+from posture_helpers import CENTRE, HEAVY, OPEN, VEHICLE, believed, gap_m, looking, region
 
 from wakewise.control import ControlSettings, make_controller
 from wakewise.control.poised import Poised
@@ -91,7 +91,7 @@ def test_a_lean_is_gone_before_the_mission_comes_near_a_roof():
     for k, command in enumerate(commands):
         goal = goal_at(k * DT)
         leans.append(command.goal.tilt_rad - goal.tilt_rad)
-        rooms.append(controller.scale.gap_m(command.goal) - min(CLEARANCE_M, controller.scale.gap_m(goal)))
+        rooms.append(gap_m(controller.scale, command.goal) - min(CLEARANCE_M, gap_m(controller.scale, goal)))
     assert max(np.abs(leans)) > np.radians(4.0)  # down there it leans
     assert min(rooms) > -0.002
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from posture_helpers import HEAVY, OPEN, VEHICLE, believed, looking, region
+from posture_helpers import HEAVY, OPEN, VEHICLE, believed, gap_m, looking, region
 
 from wakewise.control import ControlSettings
 from wakewise.control.instant import instant
@@ -178,7 +178,7 @@ def test_a_posture_that_comes_too_near_is_refused_and_the_missions_own_never():
     low = float(goal.X_WB.p_m[2] + 0.5 * VEHICLE.size_m[2] + 0.03)
     weighed = scale(around=Surroundings(planes=np.array([[0.0, 0.0, -1.0, -low]])))
     leans, found = prices(weighed, held(goal, 5.0))
-    gaps = [weighed.gap_m(weighed.hinge.posed(goal, lean)) for lean in leans]
+    gaps = [gap_m(weighed, weighed.hinge.posed(goal, lean)) for lean in leans]
     level = leans.index(0.0)
     refused = [price is NOT_TO_BE_HAD for price in found]
     assert any(refused) and not refused[level]
@@ -190,7 +190,7 @@ def test_a_lean_needs_room_where_the_mission_will_be_before_it_can_be_given_back
     goal = looking(VEHICLE, np.radians(30.0))
     low = float(goal.X_WB.p_m[2] + 0.5 * VEHICLE.size_m[2] + 0.25)
     weighed = scale(around=Surroundings(planes=np.array([[0.0, 0.0, -1.0, -low]])))
-    lean = min(weighed.leans(goal), key=lambda lean: weighed.gap_m(weighed.hinge.posed(goal, lean)))
+    lean = min(weighed.leans(goal), key=lambda lean: gap_m(weighed, weighed.hinge.posed(goal, lean)))
     lean = float(np.clip(lean, -0.26, 0.26))
     R = goal.X_WB.R
     moving = {name: replace(goal, nu_B=np.concatenate([R.T @ v, np.zeros(3)])) for name, v in WAYS.items()}
@@ -213,8 +213,8 @@ def test_room_is_what_the_posed_hull_has_place_by_place():
         leans, has = given_back(lean, ROUND_S), True
         for row, then in zip(reference_of(goal, len(leans) - 1, AHEAD_S), leans, strict=True):
             there = replace(goal, X_WB=Pose(row[:3], row[3:7]))
-            own = weighed.gap_m(there)
-            has = has and weighed.gap_m(weighed.hinge.posed(there, then)) >= min(CLEARANCE_M, own) - 1e-12
+            own = gap_m(weighed, there)
+            has = has and gap_m(weighed, weighed.hinge.posed(there, then)) >= min(CLEARANCE_M, own) - 1e-12
         seen.add(has)
         assert weighed.has_room(goal, lean, ROUND_S) == has
     assert seen == {True, False}

@@ -270,11 +270,8 @@ class Scale:
         # As `Hinge.posed` has it, for all places at once.
         p_posed = p_own + np.squeeze(R_own @ (pivot - turns @ pivot)[..., None], -1)
         both = zip(p_own, R_own, p_posed, R_own @ turns, strict=True)
-        return all(self._gap(p, R) >= min(CLEARANCE_M, self._gap(p0, R0)) for p0, R0, p, R in both)
+        return all(self.gap_m(p, R) >= min(CLEARANCE_M, self.gap_m(p0, R0)) for p0, R0, p, R in both)
 
-    def gap_m(self, goal: Goal) -> float:
-        """Least distance of the hull from what it may not touch."""
-        return self._gap(goal.X_WB.p_m, goal.X_WB.R)
-
-    def _gap(self, p_m: Array, R: Array) -> float:
+    def gap_m(self, p_m: Array, R: Array) -> float:
+        """Least distance of a hull from what it may not touch: its middle, shape (3,), and its attitude, (3, 3)."""
         return float(least_gap(p_m, R, self.half_m, self.around.planes, self.around.spheres))
