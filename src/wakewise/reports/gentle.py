@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogFormatter
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from wakewise.errors import InputError
 from wakewise.files import whole_file
@@ -56,8 +56,9 @@ def draw_gentle(result: Mapping[str, Any], path: Path) -> None:
             axes.plot([v for _, v, _ in drawn], [p for p, _, _ in drawn], mark, color=colour, label=method, alpha=0.85)
     axes.axvline(TROUBLE_MM_S, color=QUIET, linewidth=0.8, linestyle=":")
     axes.set_xscale("log")
-    for part in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
-        part(LogFormatter(minor_thresholds=(2.0, 0.5)))
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_yticks(range(len(names)), names)
     axes.invert_yaxis()
     axes.set_xlabel("mean speed at the target's surface that the vehicle causes (mm/s); trouble right of the dots")
