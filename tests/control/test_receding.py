@@ -38,6 +38,23 @@ def test_a_vehicle_on_its_plan_gets_what_was_planned_and_no_more(controller):
     assert speeds[-1] > 2.0 * speeds[0] > 0.0
 
 
+def test_what_holds_a_load_is_turned_back_where_the_vehicle_is_turned_from_its_plan(controller):
+    """Six degrees off its plan the vehicle pushes against the load as it lies in the world, not six degrees beside."""
+    held_W = np.array([3.0, -22.0, 1.0])
+    load = np.concatenate([PLACE.R.T @ held_W, np.zeros(3)])
+    state, _ = controller.step(controller.init(), 0.02, BodyState(X_WB=PLACE, load_B=load), Goal(X_WB=PLACE))
+    x = controller.expected(state)
+    turned = Pose(x[:3], quat_multiply(x[3:7], quat_from_euler(0.02, -0.03, 0.1)))
+    found = BodyState(X_WB=turned, nu_B=x[7:], load_B=load)
+    _, command = controller.step(state, 0.02, found, Goal(X_WB=PLACE))
+    _, steadies = controller.tracker.to_path(state.tracker, 0.02, found, x)
+    planned = VEHICLE.allocation_matrix @ state.plan.commands_N[0]
+    beside_load = planned[:3] + Pose(x[:3], x[3:7]).R.T @ held_W
+    pushes_W = turned.R @ (command.wrench_B[:3] - steadies[:3] - beside_load)
+    np.testing.assert_allclose(pushes_W, -held_W, atol=1e-9)
+    np.testing.assert_allclose(VEHICLE.allocation_matrix @ command.thrusts_N, command.wrench_B, atol=1e-6)
+
+
 def test_a_goal_that_speeds_up_is_followed_without_lag(controller):
     """Asked for 0.1 m/s at 0.1 m/s2 the plan, once it has seen the change, expects to be as fast as the goal."""
     state, velocity, place = controller.init(), 0.0, PLACE.p_m.copy()

@@ -10,7 +10,9 @@ plan begins anew at the estimate.
 
 How corrections are shared out. The thrusts of a correction minimise its cost in the planner's own majorised model of
 the first stage, so thrusters whose jets hit the target are spared there, too. The load that the estimator found acts
-in the plan; the PID's integral makes up for what is left.
+in the plan, whose thrusts hold against it at the planned attitude; where the vehicle is turned from that, the
+correction turns the force back, as 22 N of stream held 6 deg askew push 2 N aside (docs/decisions/0080). The PID's
+integral makes up for what is left.
 """
 
 from __future__ import annotations
@@ -30,7 +32,7 @@ from wakewise.control.instant import instant_allocator
 from wakewise.control.loop import HOLD_S, ControllerState, TrackingController
 from wakewise.control.settings import ControlSettings
 from wakewise.control.tracker import Tracker, TrackerState, make_tracker
-from wakewise.geometry import Pose, quat_conjugate, quat_multiply, rotvec_from_quat
+from wakewise.geometry import Pose, matrix_from_quat, quat_conjugate, quat_multiply, rotvec_from_quat
 from wakewise.interfaces import BodyState, Command, Goal, WakeModel
 from wakewise.planning.guard import Guard
 from wakewise.planning.planner import PlanModel, Planner, compile_plan
@@ -61,6 +63,7 @@ class PlanState:
     of PID and allocator; `goal_nu`, shape (6,), is the twist of the last goal. `moved_N` is what was flown beside the
     planned commands in the null space, where somebody else shared the wrench out, and `moved_given_N` what of it the
     thrusters give by now, both shape (n,). `firmness` multiplies the weights of tracking (see `firmness.py`).
+    `force_W_N`, shape (3,), is the load's force that the plan reckons with.
     """
 
     tracker: TrackerState
@@ -76,9 +79,10 @@ class PlanState:
     moved_N: Array | None = None
     moved_given_N: Array | None = None
     firmness: float = 1.0
+    force_W_N: Array = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
-        freeze(self, thrusts_N=(None,), nominal_N=(None,))
+        freeze(self, thrusts_N=(None,), nominal_N=(None,), force_W_N=(3,))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -200,6 +204,7 @@ class PlanningController:
                 )
 
         reference = reference_of(goal, settings.stages, settings.stage_s, change_B)
+        force_W = estimate.X_WB.R @ estimate.load_B[:3]
 
         def make() -> PlanProblem:
             return PlanProblem(
@@ -207,7 +212,7 @@ class PlanningController:
                 thrusts_N=thrusts,
                 command_N=before,
                 reference=reference,
-                force_W_N=estimate.X_WB.R @ estimate.load_B[:3],
+                force_W_N=force_W,
                 moment_B_Nm=estimate.load_B[3:],
                 obedience=goal.obedience * state.firmness,
             )
@@ -226,6 +231,7 @@ class PlanningController:
             share=correction_share(self.model, found.plan),
             age_s=0.0,
             nominal_N=thrusts,
+            force_W_N=force_W,
             trouble=None,
             # They are in the thrusts that the new plan began with.
             moved_given_N=None,
@@ -251,6 +257,7 @@ class PlanningController:
         nominal = _at(plan, state.age_s, stage_s)
         # All feed-forward, acceleration and load included, is in the plan; given twice it would run ahead of it.
         tracker, correction = self.tracker.to_path(state.tracker, dt_s, estimate, nominal, saturated=state.saturated)
+        correction[:3] += (matrix_from_quat(nominal[3:7]) - estimate.X_WB.R).T @ state.force_W_N
         planned = plan.commands_N[_stage(plan, state.age_s, stage_s)]
         wished = planned + share @ correction
         thrusts = np.minimum(np.maximum(wished, model.table.lower), model.table.upper)
