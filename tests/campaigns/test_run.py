@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import threading
+import time
 from pathlib import Path
 
 import cheap
@@ -101,6 +102,18 @@ def test_stopping_ends_what_is_under_way_and_it_counts_as_no_failure(tmp_path: P
     told = read_attempts(place)
     assert (told.begun, told.failed, told.how) == (1, 0, "stopped")
     assert not told.is_failure(0)
+
+
+def test_time_that_is_over_ends_what_is_under_way_and_no_more_than_it_is_told(tmp_path: Path) -> None:
+    """Twenty seconds of trials within five: the first are kept, and at most five seconds are told to be left."""
+    told: list[str] = []
+    tasks = cheap.adding(40, takes_s=0.5)
+    until = time.monotonic() + 5.0
+    outcomes = run(tasks, tmp_path / "c", Processes(1), until=until, progress=lambda *words: told.append(words[2]))
+    made = [outcome.figures is not None for outcome in outcomes]
+    assert made == sorted(made, reverse=True) and not made[-1]
+    left_s = [float(words.removesuffix(" s left")) for words in told if words.endswith("s left")]
+    assert left_s and max(left_s) <= 5.0
 
 
 def test_workers_share_the_cores(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,7 +16,7 @@ def made(monkeypatch, tmp_path):
     from wakewise.studies.reproduce import run as module
 
     def campaign(tasks, folder, engine, **options):
-        wash = {"dp": 0.02, "unaware": 0.02, "smooth": 0.018, "wake-aware": 0.005}
+        wash = {"manual": 0.03, "dp": 0.02, "unaware": 0.02, "smooth": 0.018, "wake-aware": 0.005}
         fields = [task.settings["fields"] for task in tasks]
         return [
             Outcome(

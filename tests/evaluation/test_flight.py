@@ -29,6 +29,18 @@ def table(n=400, dt=0.05, late_s=0.0, **extra):
     return pl.DataFrame(columns | extra)
 
 
+def test_what_the_controller_sees_and_what_it_cannot_know_are_told_apart():
+    """An estimate 4 mm off one way and a vehicle held 3 mm off by it the other way."""
+    steps = table()
+    goal = steps.select(f"goal_{k}_m" for k in "xyz").to_numpy()
+    est = pl.DataFrame({f"est_{k}_m": goal[:, i] + (0.003 if k == "z" else 0.0) for i, k in enumerate("xyz")})
+    true = [pl.Series("true_z_m", goal[:, 2] + 0.007)]
+    figures = flight_figures(pl.concat([steps, est], how="horizontal").with_columns(true))
+    told = (figures["tracking_rmse_mm"], figures["estimate_rmse_mm"], figures["position_rmse_mm"])
+    assert told == pytest.approx((3.0, 4.0, 7.0))
+    assert flight_figures(steps)["tracking_rmse_mm"] is None
+
+
 def test_being_late_is_no_path_error():
     """Lateness costs position error (chord of the arc) but no path error."""
     figures = flight_figures(table(late_s=0.2))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import json
+import math
 import os
 import time
 from collections import deque
@@ -58,6 +59,7 @@ def run(
     retries: int = 2,
     progress: Progress = no_progress,
     stop: Callable[[], bool] = never,
+    until: float | None = None,
     again: bool = False,
 ) -> list[Outcome]:
     """Make what is missing of some trials.
@@ -78,6 +80,8 @@ def run(
         Called as `(done, total, note)`.
     stop : callable
         Asked a few times a second; true ends what is under way and returns.
+    until : float, optional
+        Instant of `time.monotonic`, s, after which it is the same; no more time than that is told to be left.
     again : bool
         Try trials anew that failed in an earlier run.
 
@@ -91,7 +95,7 @@ def run(
     check_bounds(timeout_s, memory_MB, retries)
     with told_if_full(folder):
         store = open_store(folder)
-        driver = _Driver(store, tasks, timeout_s, memory_MB, retries, progress, again)
+        driver = _Driver(store, tasks, timeout_s, memory_MB, retries, progress, until, again)
         if driver.pending:
             with _driver_file(folder) as name, engine.crew(name) as crew:
                 driver.work(crew, name, stop)
@@ -123,10 +127,12 @@ class _Driver:
         memory_MB: float | None,
         retries: int,
         progress: Progress,
+        until: float | None,
         again: bool,
     ) -> None:
         self._store, self._retries, self._progress = store, retries, progress
         self._timeout_s, self._memory_MB = timeout_s, memory_MB
+        self._until = math.inf if until is None else until
         self._done: dict[str, Outcome] = {}
         self._held: dict[str, _Held] = {}
         self._abandoned: dict[str, int | None] = {}
@@ -156,11 +162,11 @@ class _Driver:
             )
 
     def work(self, crew: Crew, driver: Path, stop: Callable[[], bool]) -> None:
-        """Hand out what is pending until nothing is left or `stop` says so."""
+        """Hand out what is pending until nothing is left, `stop` says so or the time is over."""
         futures: dict[Future[Report], Task] = {}
         try:
             self._tell(crew, None)
-            while (self.pending or self._held or futures) and not stop():
+            while (self.pending or self._held or futures) and not (stop() or time.monotonic() > self._until):
                 while self.pending and len(futures) < crew.size():
                     self._hand_out(self.pending.popleft(), crew, driver, futures)
                 self._look_at_held()
@@ -257,6 +263,7 @@ class _Driver:
         words = f"{failed} failed; " if failed else ""
         if self._made:
             left_s = self._made_s / self._made * (self._total - done) / crew.size()
+            left_s = max(0.0, min(left_s, self._until - time.monotonic()))
             words += f"{left_s / 60.0:.0f} min left" if left_s >= 90.0 else f"{left_s:.0f} s left"
         else:
             words += f"{done} known already"

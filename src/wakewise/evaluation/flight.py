@@ -120,7 +120,8 @@ def flight_figures(steps: pl.DataFrame) -> dict[str, float | int | None]:
     silt_lifted_g: given up by the bed until the end, settled again or not, so that sand counts at every hop.
     silt_suspended_max_g: most in the water at once, the figure to compare beds by.
     position_rmse_mm: true position against the goal's at the same instant. path_rmse_mm: against the goal's path.
-    estimate_rmse_mm: estimated against true position. velocity_deviation_pct, roll_pitch_rms_deg,
+    estimate_rmse_mm: estimated against true position. tracking_rmse_mm: estimated position against the goal's, which is
+    what the controller sees of its own error. velocity_deviation_pct, roll_pitch_rms_deg,
     attitude_rmse_deg: see the functions.
     energy_kJ: electrical. sign_flips_per_s: reversals of all thrusters together per second. fallbacks: steps on which
     the controller fell back. collisions: times that the vehicle touched something. duration_s: length of the flight.
@@ -222,6 +223,7 @@ def _tracking(steps: pl.DataFrame, time_s: Array) -> dict[str, float | int | Non
             "position_rmse_mm",
             "path_rmse_mm",
             "estimate_rmse_mm",
+            "tracking_rmse_mm",
             "velocity_deviation_pct",
             "roll_pitch_rms_deg",
             "attitude_rmse_deg",
@@ -236,6 +238,8 @@ def _tracking(steps: pl.DataFrame, time_s: Array) -> dict[str, float | int | Non
         out["path_rmse_mm"] = 1e3 * rms(path_distance(true, goal, time_s))
     if true is not None and est is not None:
         out["estimate_rmse_mm"] = 1e3 * rms(np.linalg.norm(true - est, axis=1))
+    if goal is not None and est is not None:
+        out["tracking_rmse_mm"] = 1e3 * rms(np.linalg.norm(est - goal, axis=1))
     q_true, q_goal = turn["true"], turn["goal"]
     if q_true is not None and q_goal is not None:
         out["roll_pitch_rms_deg"] = roll_pitch_rms_deg(q_true, q_goal)

@@ -54,6 +54,8 @@ def test_the_figures_that_the_records_quote_are_among_them():
     assert known["success", "wake-aware", "success", None] == 98.5
     assert known["station", "wake-aware", "position_rmse_mm", None] == 2.1
     assert known["station", "wake-aware", "energy_kJ", "unaware"] == 31.0
+    asked = {c.than: c.asked for _, c in EVERY if (c.figure, c.reading) == ("roll_pitch_rms_deg", "less_pct")}
+    assert asked == {"unaware": None, "manual": 45.0, "smooth": 45.0, "dp": 45.0}
     assert known["solver", "wake-aware", "ms_mean", None] == 45.0
     assert known["wake", "paper", "r2_core", None] == 0.99
     assert known["operator", "wake-aware, w_track 5", "velocity_deviation_pct", None] == 15.0

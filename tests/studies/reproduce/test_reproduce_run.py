@@ -34,16 +34,16 @@ def campaign(monkeypatch):
 def test_without_a_budget_all_trials_are_made_at_once(tmp_path, campaign):
     """So that workers are busy to the end."""
     told = reproduce(["station"], tmp_path, Options(trials=2, worlds=("pump-tank",)))["station"]
-    assert [len(call) for call in campaign] == [8]
-    assert (told["trials"], told["seeds"], told["made"], told["failed"]) == (2, [1, 2], 8, 0)
-    assert {row["method"] for row in told["rows"]} == {"dp", "unaware", "smooth", "wake-aware"}
+    assert [len(call) for call in campaign] == [10]
+    assert (told["trials"], told["seeds"], told["made"], told["failed"]) == (2, [1, 2], 10, 0)
+    assert {row["method"] for row in told["rows"]} == {"manual", "dp", "unaware", "smooth", "wake-aware"}
 
 
 def test_a_budget_buys_whole_blocks_by_what_they_were_found_to_cost(tmp_path, campaign):
-    """Eighty seconds with two workers hold 16 trials of ten, of which a tenth is kept back: three blocks of four."""
-    told = reproduce(["station"], tmp_path, Options(budget_s=80.0, worlds=("pump-tank",)))["station"]
-    assert [len(call) for call in campaign] == [4, 12]
-    assert (told["made"], told["seeds"]) == (12, [1, 2, 3])
+    """A hundred seconds with two workers hold 20 trials of ten, of which a tenth is kept back: three blocks of five."""
+    told = reproduce(["station"], tmp_path, Options(budget_s=100.0, worlds=("pump-tank",)))["station"]
+    assert [len(call) for call in campaign] == [5, 15]
+    assert (told["made"], told["seeds"]) == (15, [1, 2, 3])
 
 
 def test_a_budget_is_shared_by_time_spent(tmp_path, campaign):

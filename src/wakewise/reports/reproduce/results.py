@@ -333,6 +333,17 @@ def _reasons(tables: Mapping[str, Mapping[str, Any]]) -> list[str]:
                     f"*{name}, {world}*: there is {number(1e3 * speeds['unaware'])} mm/s of wash to take away with "
                     f"`unaware`, where the paper has 180; `wake-aware` leaves {number(1e3 * speeds['wake-aware'])}."
                 )
+    for world in tables.get("station", {}).get("worlds", ()):
+        place, estimate, seen = (
+            _means(tables["station"], world, f"{figure}_rmse_mm", ("wake-aware",)).get("wake-aware")
+            for figure in ("position", "estimate", "tracking")
+        )
+        if place is not None and estimate is not None and seen is not None:
+            said.append(
+                f"*station, {world}*: the true place is {number(place)} mm off, the estimate of it {number(estimate)}, "
+                f"which no controller can know (the paper's is 5.2 off, and its place 2.1); by its own estimate the "
+                f"vehicle is {number(seen)} mm off."
+            )
     said += [
         f"*flow, {row['world']}*: PIV reads {number(1e3 * row['ours'])} mm/s where there is no wash at all, and sees "
         "nothing below that."

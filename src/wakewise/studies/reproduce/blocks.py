@@ -320,7 +320,7 @@ def _asked(world: str) -> tuple[str, ...]:
 
 
 _FLOWN = (PUMP_TANK, TROUBLE, PAPER)
-_STATION = ("dp", "unaware", "smooth", "wake-aware")
+_STATION = ("manual", "dp", "unaware", "smooth", "wake-aware")
 
 TABLE: dict[str, Table] = {
     "dynamic": Table(
@@ -334,7 +334,7 @@ TABLE: dict[str, Table] = {
         block_s=200.0,
         weight=2.0,
     ),
-    "station": Table(methods=_STATION, worlds=_FLOWN, targets=_own, plan=_flight("station"), block_s=250.0, weight=3.0),
+    "station": Table(methods=_STATION, worlds=_FLOWN, targets=_own, plan=_flight("station"), block_s=150.0, weight=3.0),
     "ablation": Table(methods=("wake-aware", *VARIANTS), worlds=_FLOWN, targets=_own, plan=_ablated, block_s=45.0),
     "sediment": Table(
         methods=("unaware", "wake-aware"), worlds=(CACO3, "fluff"), targets=_own, plan=_plain_scan, block_s=220.0

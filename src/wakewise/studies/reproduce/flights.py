@@ -45,6 +45,7 @@ FIGURES = (
     "position_rmse_mm",
     "path_rmse_mm",
     "estimate_rmse_mm",
+    "tracking_rmse_mm",
     "velocity_deviation_pct",
     "roll_pitch_rms_deg",
     "attitude_rmse_deg",

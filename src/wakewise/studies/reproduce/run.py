@@ -208,7 +208,7 @@ def _make(tables: list[_Growing], folder: Path, options: Options, until: float |
         Processes(options.workers),
         timeout_s=TRIAL_LIMIT_S,
         progress=options.progress,
-        stop=(lambda: False) if until is None else (lambda: time.monotonic() > until),
+        until=until,
         again=options.again,
     )
     for table in tables:
