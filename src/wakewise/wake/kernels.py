@@ -15,11 +15,15 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.compiled import njit
 
+FAST = {"reassoc", "contract", "nsz", "arcp"}
 PRINTED_CONE, POWER_CONE, ROUND_JET = 0, 1, 2
 """Kinds of kernel: the paper's cone without powers to take, the cone with any powers, and the turbulent round jet."""
 
 TAIL_WIDTHS = 4.3
 """A Gaussian profile is cut where less than 1e-8 of its middle is left, exp(-4.3^2): beyond is called nothing."""
+
+_NOTHING = 1e-300
+"""Added to a distance that may be zero where what it divides is zero, too."""
 
 
 def cone_parameters(
@@ -170,6 +174,94 @@ def _jet(numbers, x0, b0, limit6, x, r2):  # type: ignore[no-untyped-def]
     by_x = f * (shrink + 2.0 * out * (a_slope + out * slope) / b)
     beta = -2.0 * f * out / (b * across)
     return f, by_x - beta * x, beta
+
+
+@njit(apart=True, fastmath=FAST)
+def fill_cored_jet(q, roots, t, axis, own, numbers, slopes, near, pose):  # type: ignore[no-untyped-def]
+    """A round jet with a core at many points: signed speed by the force axis (negative astern of T > 0) into
+    pose[0, 0], (P,); with `slopes` the gradient of |f| into pose[1], (3, P).
+
+    The law of `_jet`, its twin in the tests, where a point waits for cube root, roots and exponential in turn. Here
+    each step is a loop of its own over the points within reach, so that all but the cube root and the exponential run
+    on several points at a time: close to a target a plan asks for a hundred thousand of them.
+
+    q : (3, P) points, t : (3,) the disk and axis : (3,) its force; own : (6,), numbers : (7,), see `own_constants`;
+    near : (P,) and the rest of pose, (6, 3, P), are room to work in.
+    """
+    count = q.shape[1]
+    f_row, g = pose[0, 0], pose[1]
+    along, r2 = pose[2, 0], pose[2, 1]
+    tx, ty, tz, ax, ay, az = t[0], t[1], t[2], axis[0], axis[1], axis[2]
+    for j in range(count):
+        ex, ey, ez = q[0, j] - tx, q[1, j] - ty, q[2, j] - tz
+        along[j] = ax * ex + ay * ey + az * ez
+        r2[j] = ex * ex + ey * ey + ez * ez
+        f_row[j] = 0.0
+    if slopes:
+        for x in range(3):
+            row = g[x]
+            for j in range(count):
+                row[j] = 0.0
+    found, reach0, reach1, reach2 = 0, own[3], own[4], own[5]
+    for j in range(count):
+        # Without a branch: which points are within reach has no pattern that a processor could guess.
+        x = abs(along[j])
+        near[found] = j
+        found += (x > 0.0) & (r2[j] <= reach0 + reach1 * x + reach2 * x * x)
+    _cored_law(numbers, own, near, found, slopes, pose)
+    f, alpha, beta = pose[3, 0], pose[4, 0], pose[4, 1]
+    for k in range(found):
+        j = near[k]
+        root = roots[j] if along[j] > 0.0 else -roots[j]
+        f_row[j] = root * f[k]
+    if slopes:
+        for k in range(found):
+            j = near[k]
+            root = roots[j]
+            a, b = root * alpha[k] if along[j] > 0.0 else -root * alpha[k], root * beta[k]
+            g[0, j] = a * ax + b * (q[0, j] - tx)
+            g[1, j] = a * ay + b * (q[1, j] - ty)
+            g[2, j] = a * az + b * (q[2, j] - tz)
+
+
+@njit(fastmath=FAST)
+def _cored_law(numbers, own, near, found, slopes, pose):  # type: ignore[no-untyped-def]
+    """(f, alpha, beta) of `speed_and_slope` at the first `found` points of `near` into pose[3, 0], [4, 0], [4, 1]."""
+    x0, b0, limit6, spread = own[0], own[1], own[2], numbers[4]
+    decay, momentum, flat = numbers[0], numbers[1] / (numbers[0] * numbers[0]), np.sqrt(np.pi / 8.0)
+    along, r2 = pose[2, 0], pose[2, 1]
+    x, across, third = pose[3, 1], pose[3, 2], pose[2, 2]
+    f, out, decrease, widening = pose[3, 0], pose[5, 0], pose[4, 0], pose[4, 1]
+    for k in range(found):
+        j = near[k]
+        x[k] = abs(along[j])
+        across[k] = r2[j]
+    for k in range(found):
+        square = (x[k] + x0) * (x[k] + x0)
+        third[k] = np.cbrt(square * square * square + limit6)
+    for k in range(found):
+        b = b0 + spread * x[k]
+        carried = momentum * third[k]
+        root = np.sqrt(max(carried + (np.pi / 8.0 - 0.5) * b * b, 0.0))
+        across[k] = np.sqrt(max(across[k] - x[k] * x[k], 0.0))
+        # Within the core `out` is zero, and with it all that the profile adds.
+        out[k] = max(across[k] - max(root - flat * b, 0.0), 0.0) / b
+        f[k] = out[k] * out[k]
+        if slopes:
+            origin = x[k] + x0
+            square = origin * origin
+            decrease[k] = -square * square * origin / (square * square * square + limit6)
+            widening[k] = (-carried * decrease[k] + (np.pi / 8.0 - 0.5) * b * spread) / root - flat * spread
+    for k in range(found):
+        f[k] = np.exp(-f[k])
+    for k in range(found):
+        f[k] *= decay / np.sqrt(third[k])
+        if slopes:
+            b = b0 + spread * x[k]
+            by_x = f[k] * (decrease[k] + 2.0 * out[k] * (widening[k] + out[k] * spread) / b)
+            by_across2 = -2.0 * f[k] * out[k] / (b * across[k] + _NOTHING)
+            decrease[k] = by_x - by_across2 * x[k]
+            widening[k] = by_across2
 
 
 @njit

@@ -15,11 +15,9 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.compiled import assign, njit
 from wakewise.wake.floor_sums import floor_stage_sum
-from wakewise.wake.kernels import as_tuple, speed_and_slope
+from wakewise.wake.kernels import FAST, ROUND_JET, as_tuple, fill_cored_jet, speed_and_slope
 from wakewise.wake.stage import smooth_root
 from wakewise.wake.table import PLAIN_CONE
-
-FAST = {"reassoc", "contract", "nsz", "arcp"}
 
 
 class WakeScratch(NamedTuple):
@@ -31,6 +29,7 @@ class WakeScratch(NamedTuple):
     jets: Array
     pose: Array
     active: Array
+    near: Array
 
 
 def wake_scratch(points: int, thrusters: int) -> WakeScratch:
@@ -42,6 +41,7 @@ def wake_scratch(points: int, thrusters: int) -> WakeScratch:
         jets=np.empty((thrusters, points)),
         pose=np.empty((6, 3, points)),
         active=np.empty(thrusters, np.int64),
+        near=np.empty(points, np.int64),
     )
 
 
@@ -149,7 +149,7 @@ def stage_disturbance(table, scratch, p, quat, R, thrusts, slopes, gradient, H):
 
 @njit(apart=True, fastmath=FAST)
 def _free_jets(table, scratch, p, R, thrusts, slopes, gradient, H):  # type: ignore[no-untyped-def]
-    q, sums, S, jets, pose, active = scratch
+    q, sums, S, jets, pose, active, near = scratch
     count, n = q.shape[1], thrusts.shape[0]
     if slopes:
         gradient[:] = 0.0
@@ -199,6 +199,9 @@ def _free_jets(table, scratch, p, R, thrusts, slopes, gradient, H):  # type: ign
                 f_row,
                 g,
             )
+        elif table.kind == ROUND_JET and table.numbers[5] != 0.0:
+            t, a = table.positions[i], table.axes[i]
+            fill_cored_jet(q, table.roots, t, a, table.own[i], table.numbers, slopes, near, pose)
         else:
             _any_jet(q, table.roots, count, tx, ty, tz, ax, ay, az, table.own[i], table.kind, numbers, f_row, g)
         # A point ahead of the disk (along the force) is blown at by T < 0, along the axis; one astern by T > 0.
