@@ -15,8 +15,9 @@ def campaign(monkeypatch):
     """Trials that take ten seconds each of a clock of their own, and what was asked for in each call."""
     clock, calls, known = {"now": 0.0}, [], {}
 
-    def run(tasks, folder, engine, **options):
+    def run(tasks, folder, engine, progress, **options):
         calls.append([task.name for task in tasks])
+        progress(0, len(tasks), "a while left")
         outcomes = []
         for task in tasks:
             if task.key not in known:
@@ -41,9 +42,12 @@ def test_without_a_budget_all_trials_are_made_at_once(tmp_path, campaign):
 
 def test_a_budget_buys_whole_blocks_by_what_they_were_found_to_cost(tmp_path, campaign):
     """A hundred seconds with two workers hold 20 trials of ten, of which a tenth is kept back: three blocks of five."""
-    told = reproduce(["station"], tmp_path, Options(budget_s=100.0, worlds=("pump-tank",)))["station"]
+    said = []
+    options = Options(budget_s=100.0, worlds=("pump-tank",), progress=lambda *words: said.append(words[2]))
+    told = reproduce(["station"], tmp_path, options)["station"]
     assert [len(call) for call in campaign] == [5, 15]
     assert (told["made"], told["seeds"]) == (15, [1, 2, 3])
+    assert said[-2:] == ["the first block of each table: a while left", "a while left"]
 
 
 def test_a_budget_is_shared_by_time_spent(tmp_path, campaign):

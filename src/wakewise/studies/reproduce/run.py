@@ -178,7 +178,7 @@ def _within(tables: list[_Growing], folder: Path, options: Options, began: float
             table.why = f"no room in {budget_s / 60.0:.0f} min: its first trials take some {table.block_s:.0f} s"
             continue
         left_s -= table.block_s
-    _make(tables, folder, options, until)
+    _make(tables, folder, _telling(options, "the first block of each table"), until)
     left_s = room_s()
     open_tables = [table for table in tables if table.why is None]
     while open_tables:
@@ -195,6 +195,15 @@ def _within(tables: list[_Growing], folder: Path, options: Options, began: float
             left_s -= cheapest.block_s
         cheapest.spent_s += cheapest.block_s
     _make(tables, folder, options, until)
+
+
+def _telling(options: Options, words: str) -> Options:
+    """The same, with these words before what is told of progress: its time left is not that of the budget."""
+
+    def progress(done: float, total: float, note: str = "") -> None:
+        options.progress(done, total, f"{words}: {note}")
+
+    return replace(options, progress=progress)
 
 
 def _make(tables: list[_Growing], folder: Path, options: Options, until: float | None) -> None:
