@@ -344,6 +344,11 @@ def _reasons(tables: Mapping[str, Mapping[str, Any]]) -> list[str]:
                 f"which no controller can know (the paper's is 5.2 off, and its place 2.1); by its own estimate the "
                 f"vehicle is {number(seen)} mm off."
             )
+    if tables.get("station", {}).get("worlds"):
+        said.append(
+            "*station, energy*: least thrusts spend next to the least power that makes the same wrenches "
+            "(docs/decisions/0080), and shares that spare the water spend more."
+        )
     said += [
         f"*flow, {row['world']}*: PIV reads {number(1e3 * row['ours'])} mm/s where there is no wash at all, and sees "
         "nothing below that."
