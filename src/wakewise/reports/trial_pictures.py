@@ -104,7 +104,8 @@ def sheet(worst: Mapping[str, Mapping[str, Any]], store: Path) -> bytes | None:
                 axes.text(4, image.shape[0] - 8, f"{after_s:.1f} s", fontsize=7.5, color="white")
         drawn = _views(store / place["folder"] / MODEL)
         if drawn is None:
-            why = f"no model: {place['reason'] or 'none was kept'}"
+            reason = str(place["reason"] or "none was kept")
+            why = f"no model: {reason.removeprefix('no model: ')}"
             row[2].text(0.0, 0.5, why, wrap=True, fontsize=7.5, color="#b72f3c", transform=row[2].transAxes)
             continue
         shown = {view.name.split()[-1]: source for view, source in zip(SIDES, drawn, strict=True)}
