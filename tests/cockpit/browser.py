@@ -221,7 +221,12 @@ class Page:
         return found
 
     def close(self) -> None:
+        """Close the tab and wait until it is gone: the browser answers before."""
         self._browser.call("Target.closeTarget", targetId=self.target)
+        until_s = time.monotonic() + PATIENCE_S
+        while self.alive():
+            assert time.monotonic() < until_s, "the tab does not close"
+            time.sleep(0.02)
 
     def alive(self) -> bool:
         """Whether the tab is still there."""
