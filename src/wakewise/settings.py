@@ -1,10 +1,21 @@
-"""Base of every group of settings that a user may write in a scenario file."""
+"""Base of every group of settings that a user may write in a file, and the words for what is wrong in one."""
 
 from __future__ import annotations
 
-from typing import Any, get_args
+from collections.abc import Callable, Mapping
+from difflib import get_close_matches
+from typing import Annotated, Any, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+
+MAX_SEED = 2**63 - 1
+"""Largest seed of a random draw: what a signed number of 64 bits holds."""
+
+Seed = Annotated[int, Field(ge=0, le=MAX_SEED)]
+"""Seed of random draws."""
+
+MOST_FAULTS = 6
+"""So many faults of one file are told in full; of the others, how many there are."""
 
 
 class Settings(BaseModel):
@@ -22,3 +33,69 @@ class Settings(BaseModel):
             if bool not in meant and meant & {int, float}:
                 raise ValueError("must be a number, not true or false")
         return value
+
+
+def guess(word: str, known: list[str] | tuple[str, ...]) -> str:
+    """The known word nearest to a misspelt one, as the beginning of a hint; empty where none is near."""
+    close = get_close_matches(word, known, 1)
+    return f"did you mean {close[0]}? " if close else ""
+
+
+def describe_faults(
+    error: ValidationError, model: type[BaseModel], whole: str, known: Callable[[str, Any], str | None] | None = None
+) -> str:
+    """All faults of a file in one line: which field of `model` is wrong, what was found and what is allowed.
+
+    Parameters
+    ----------
+    error : ValidationError
+    model : type of BaseModel
+        What the file was read as.
+    whole : str
+        What the file is called where a fault is of no single field.
+    known : callable, optional
+        Called with dotted name and value of each; words that it returns are told in place of ours.
+    """
+    told, more = [], 0
+    for fault in error.errors(include_url=False):
+        dotted = ".".join(str(part) for part in fault["loc"]) or whole
+        words = None if known is None else known(dotted, fault["input"])
+        if words is None and len(told) >= MOST_FAULTS:
+            more += 1
+        else:
+            told.append(f"{dotted}: {words or _words(fault, model)}")
+    return "; ".join(told) + (f"; and {more} more" if more else "")
+
+
+def _words(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
+    """What is wrong with a field and what is allowed."""
+    *parents, name = [str(part) for part in fault["loc"]] or [""]
+    if fault["type"] == "extra_forbidden":
+        allowed = list(_owner(model, parents).model_fields)
+        return f"no such field, {guess(name, allowed).rstrip() or 'allowed are ' + ', '.join(allowed)}"
+    if fault["type"] == "missing":
+        return "missing, it is required"
+    found = fault["input"]
+    plain = isinstance(found, (str, int, float, bool, type(None)))
+    text = " ".join(repr(found).split())
+    shown = f"found {text if len(text) <= 80 else text[:80] + '...'}, " if plain else ""
+    message = str(fault["msg"]).removeprefix("Value error, ").replace("Input should", "should").replace("\n", " ")
+    message = message.replace("a valid tuple", "a list in square brackets")
+    message = message.replace("a valid list", "a list in square brackets")
+    return f"{shown}{message[:1].lower()}{message[1:]}"
+
+
+def _owner(model: type[BaseModel], parents: list[str]) -> type[BaseModel]:
+    """The group of settings that a dotted name's parents lead to."""
+    owner = model
+    for part in parents:
+        if part in owner.model_fields:  # or the place in a list, whose items the list's type names
+            owner = next(iter(_groups(owner.model_fields[part].annotation)), owner)
+    return owner
+
+
+def _groups(annotation: Any) -> list[type[BaseModel]]:
+    """Groups of settings that an annotation names, however deep."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [group for inner in get_args(annotation) for group in _groups(inner)]

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
 import yaml
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
@@ -27,7 +26,7 @@ from wakewise.operation.worlds.library import load_world, world_names
 from wakewise.operation.worlds.makers import WORLDS
 from wakewise.plugins import names
 from wakewise.reconstruction import ReconstructionSettings
-from wakewise.settings import Settings
+from wakewise.settings import Seed, Settings, describe_faults, guess
 from wakewise.tank import TankSettings
 from wakewise.tank.beds import SILTS
 from wakewise.vehicles.ballast import Block
@@ -50,7 +49,7 @@ class Scenario(Settings):
     """One trial, resolved: vehicle, target, mission, method, world, camera, reconstruction and seed."""
 
     name: str = Field("scan", min_length=1, max_length=80, description="what the trial is called in its report")
-    seed: int = Field(1, ge=0, description="every random draw of the trial follows from it")
+    seed: Seed = Field(1, description="every random draw of the trial follows from it")
     replaced: dict[str, str] = Field(
         default={},
         description="parts that were given in Python in place of the scenario's own, in words; not to be set",
@@ -85,9 +84,7 @@ class Scenario(Settings):
             return value  # what the part that was given calls itself
         known = names({"flow": "world"}.get(kind, kind), _OWN[kind])
         if value not in known and ":" not in value:
-            close = difflib.get_close_matches(value, known, 1)
-            hint = f"did you mean {close[0]}? " if close else ""
-            raise ValueError(f"{hint}allowed are {', '.join(known)}, or package.module:make")
+            raise ValueError(f"{guess(value, known)}allowed are {', '.join(known)}, or package.module:make")
         return value
 
     @field_validator("name")
@@ -232,33 +229,11 @@ def check_scenario(tree: dict[str, Any], source: str) -> Scenario:
 
 
 def describe_fault(fault: ValidationError, model: type[BaseModel]) -> str:
-    """Say in one line which field of `model` is wrong, what was found and what is allowed (the first fault only).
+    """Say in one line which fields of `model` are wrong, what was found and what is allowed.
 
-    Names of an older scenario are told all at once, each with what became of it.
+    Names of an older scenario are told with what became of them.
     """
-    faults = fault.errors(include_url=False)
-    old = [(dotted, became(dotted, one["input"])) for one in faults for dotted in (".".join(map(str, one["loc"])),)]
-    if any(words for _, words in old):
-        return "; ".join(f"{dotted}: {words}" for dotted, words in old if words)
-    first = faults[0]
-    where = ".".join(str(part) for part in first["loc"]) or "scenario"
-    if first["type"] == "extra_forbidden":
-        *parents, unknown = [str(part) for part in first["loc"]]
-        owner: Any = model
-        for part in parents:
-            if part in owner.model_fields:  # or the place in a list, whose items the list's type names
-                annotation = owner.model_fields[part].annotation
-                inner = [a for a in (annotation, *get_args(annotation)) if isinstance(a, type)]
-                owner = next((a for a in inner if issubclass(a, BaseModel)), owner)
-        allowed = list(owner.model_fields)
-        close = difflib.get_close_matches(unknown, allowed, 1)
-        hint = f"did you mean {close[0]}?" if close else f"allowed are {', '.join(allowed)}"
-        return f"{where}: no such field, {hint}"
-    found = first["input"]
-    shown = f"found {found!r}, " if isinstance(found, (str, int, float, bool, type(None))) else ""
-    message = first["msg"].removeprefix("Value error, ").replace("Input should", "should").replace("\n", " ")
-    message = message.replace("a valid tuple", "a list in square brackets").replace("Field required", "is missing")
-    return f"{where}: {shown}{message}"
+    return describe_faults(fault, model, "scenario", became)
 
 
 def parse_overrides(items: list[str]) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from wakewise.errors import InputError
 from wakewise.files import write_text
+from wakewise.settings import describe_faults
 from wakewise.wake.calibration import Calibration
 from wakewise.wake.models import WakeSettings
 from wakewise.yaml_text import YamlError, read_yaml
@@ -61,9 +62,7 @@ def read_wake_settings(path: Path) -> WakeSettings:
     try:
         return WakeSettings.model_validate(tree)
     except ValidationError as fault:
-        first = fault.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in first["loc"]) or "wake"
-        raise InputError(f"{path}: {where}: {first['msg'].removeprefix('Value error, ')}") from None
+        raise InputError(f"{path}: {describe_faults(fault, WakeSettings, 'wake')}") from None
 
 
 def fit_figures(fit: Calibration) -> dict[str, Any]:

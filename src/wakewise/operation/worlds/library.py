@@ -7,7 +7,6 @@ user says.
 
 from __future__ import annotations
 
-import difflib
 import functools
 from dataclasses import dataclass
 from importlib import resources
@@ -17,7 +16,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from wakewise.errors import InputError
 from wakewise.operation.draws import Draw
-from wakewise.settings import Settings
+from wakewise.settings import Settings, describe_faults, guess
 from wakewise.yaml_text import read_yaml
 
 
@@ -91,8 +90,7 @@ def load_world(name: str) -> NamedWorld:
         If there is none of that name, or its file is not one.
     """
     if name not in world_names():
-        close = difflib.get_close_matches(name, world_names(), 1)
-        hint = f"did you mean {close[0]}? " if close else ""
+        hint = guess(name, world_names())
         raise InputError(f"world '{name}': not in the library, {hint}allowed are {', '.join(world_names())}")
     own = parse_world(name, _text(name)).file
     return NamedWorld(name=name, file=own.model_copy(update={"fields": every_world() | own.fields}))
@@ -119,6 +117,4 @@ def parse_world(name: str, text: str) -> NamedWorld:
     try:
         return NamedWorld(name=name, file=WorldFile.model_validate(read_yaml(text)))
     except ValidationError as fault:
-        first = fault.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise InputError(f"world {name}: {where}: {first['msg'].removeprefix('Value error, ')}") from None
+        raise InputError(f"world {name}: {describe_faults(fault, WorldFile, 'world')}") from None

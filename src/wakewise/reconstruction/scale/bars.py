@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError
 
 from wakewise.errors import InputError
 from wakewise.reconstruction.calibration import Board
-from wakewise.settings import Settings
+from wakewise.settings import Settings, describe_faults
 from wakewise.yaml_text import yaml_file
 
 SIGMA_SHARE = 1e-3
@@ -148,9 +148,8 @@ def read_bars(path: Path) -> Bars:
     try:
         said = _BarsFile.model_validate(value)
     except ValidationError as fault:
-        first = fault.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise InputError(f"{path}: {where}: {first['msg']}; a bar has ends: [3, 7], length_m, sigma_m") from None
+        told = describe_faults(fault, _BarsFile, "bars")
+        raise InputError(f"{path}: {told}; a bar has ends: [3, 7], length_m, sigma_m") from None
     try:
         return Bars(
             bars=tuple(

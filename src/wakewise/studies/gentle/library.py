@@ -17,7 +17,7 @@ from pydantic import Field, ValidationError
 from wakewise.errors import InputError
 from wakewise.operation.draws import Draw
 from wakewise.operation.worlds.library import NamedWorld, WorldField, WorldFile, every_world, load_world, world_names
-from wakewise.settings import Settings
+from wakewise.settings import Settings, describe_faults
 from wakewise.studies.gentle.strata import Side, current_W_m_s, stratum
 from wakewise.yaml_text import read_yaml
 
@@ -78,9 +78,7 @@ def load_scenario_file(name: str) -> ScenarioFile:
     try:
         return ScenarioFile.model_validate(read_yaml(text))
     except ValidationError as fault:
-        first = fault.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise InputError(f"scenario {name}: {where}: {first['msg'].removeprefix('Value error, ')}") from None
+        raise InputError(f"scenario {name}: {describe_faults(fault, ScenarioFile, 'file')}") from None
 
 
 def drawn(name: str, seed: int) -> Drawn:

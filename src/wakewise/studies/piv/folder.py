@@ -12,7 +12,7 @@ from pydantic import Field, ValidationError
 from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.extras import need
-from wakewise.settings import Settings
+from wakewise.settings import Settings, describe_faults
 from wakewise.studies.piv.images import Picture
 from wakewise.studies.piv.processing import Engine, displacements
 from wakewise.studies.piv.vectors import Displacements, averaged
@@ -85,9 +85,7 @@ def read_piv_settings(folder: Path) -> PivFolder:
     except (yaml.YAMLError, UnicodeDecodeError):
         raise InputError(f"{path}: not YAML, it must hold {wanted}") from None
     except ValidationError as fault:
-        first = fault.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in first["loc"]) or "piv.yaml"
-        raise InputError(f"{path}: {where}: {first['msg']}; it must hold {wanted}") from None
+        raise InputError(f"{path}: {describe_faults(fault, PivFolder, 'piv.yaml')}; it must hold {wanted}") from None
 
 
 def samples_of_folder(folder: Path, engine: Engine = "auto") -> JetSamples:
