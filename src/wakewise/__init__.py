@@ -5,8 +5,8 @@ Scenario, Parts, fly
     their place; fly.
 trial, compare
     Whole trials: photographs, model, report.
-allocate, disturbance
-    Thruster allocation of one wrench, and the disturbance D of thrusts at a pose.
+allocate, disturbance, velocity
+    Thruster allocation of one wrench; the disturbance D of thrusts at a pose, and the velocity of the water they make.
 reconstruct, evaluate
     Photographs to a model; a model against the truth.
 load_vehicle, load_target, wake_model, methods
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         methods,
         reconstruct,
         trial,
+        velocity,
     )
     from wakewise.geometry import Pose
     from wakewise.importers import any_vehicle as load_vehicle
@@ -58,6 +59,7 @@ __all__ = [
     "methods",
     "reconstruct",
     "trial",
+    "velocity",
     "wake_model",
 ]
 

@@ -14,6 +14,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from wakewise.arrays import Array, freeze
+from wakewise.checks import instance_of
 from wakewise.geometry import Pose
 
 S = TypeVar("S")
@@ -38,6 +39,7 @@ class BodyState:
     current_covariance: Array | None = None
 
     def __post_init__(self) -> None:
+        instance_of(self.X_WB, Pose, "X_WB")
         freeze(self, nu_B=(6,), load_B=(6,))
         for name, shape in (("covariance", (12, 12)), ("current_W_m_s", (3,)), ("current_covariance", (3, 3))):
             if getattr(self, name) is not None:
@@ -80,6 +82,7 @@ class Goal:
     stray: float | None = None
 
     def __post_init__(self) -> None:
+        instance_of(self.X_WB, Pose, "X_WB")
         freeze(self, nu_B=(6,))
 
 

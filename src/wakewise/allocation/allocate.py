@@ -20,7 +20,8 @@ from wakewise.allocation.layout import Layout, compile_layout
 from wakewise.allocation.reach import AXES, by_priority, is_all, parse_priority, within_limits
 from wakewise.allocation.search import cost, disjoint_search, split_allocation
 from wakewise.arrays import Array, freeze, frozen
-from wakewise.errors import InputError
+from wakewise.checks import finite_number, instance_of, whole_number
+from wakewise.defaults import BUDGET, CHANGE_WEIGHT, EFFORT_WEIGHT
 
 __all__ = [
     "Allocation",
@@ -36,9 +37,8 @@ __all__ = [
 COUPLING_LIMIT = 1e-10
 """Gram entries between two parts of the null space below this share of the largest count as zero: they are rounding."""
 
-BUDGET = 2000
-"""Most boxes that branch and bound looks at unless told otherwise: a few milliseconds with two spare thrusters."""
-
+_NOTHING = 1e-18
+"""A wrench whose square is less than this, or less than this share of what was asked for, is rounding."""
 _DISTURBANCE = np.array([1.0, 0.0, 0.0])
 
 
@@ -61,7 +61,9 @@ class Allocation:
         How far the weighted cost may lie above its global minimum, relative: proven by a lower bound, zero for
         "pseudo-inverse" and "unique". Up to 1e-5 counts as closed; more means that the budget of "boxes" was spent.
     scale : float
-        Share of the attainable part of the requested wrench that the limits allow in its own direction, 1 if all of it.
+        Share of the attainable part of the requested wrench that the limits allow in its own direction: 1 if all of
+        it, 0 where nothing of the wrench is made. What thrusters that failed or are not there cannot make at all is no
+        part of it: `given_up` says what of the wrench is not made.
     """
 
     thrusts_N: Array
@@ -74,6 +76,19 @@ class Allocation:
 
     def __post_init__(self) -> None:
         freeze(self, thrusts_N=(None,), wrench_B=(6,), requested_B=(6,))
+
+    def __str__(self) -> str:
+        """Thrusts, D, method and gap, and what of the wrench is not made, in one line."""
+        words = [f"{np.array2string(self.thrusts_N, precision=2, suppress_small=True, max_line_width=10_000)} N"]
+        if self.disturbance is not None:
+            words.append(f"D {self.disturbance:.3g} (m/s)^2")
+        words.append(f"{self.method}, gap {self.gap:.1e}")
+        if self.given_up:
+            lost = ", ".join(
+                f"{axis} {value:.3g} {'N' if axis in 'XYZ' else 'N m'}" for axis, value in self.given_up.items()
+            )
+            words.append(f"scale {self.scale:.3g}, given up {lost}")
+        return "; ".join(words)
 
     @property
     def given_up_B(self) -> Array:
@@ -92,14 +107,12 @@ class Weights:
     """Weights of the cost w_D D + w_u |T|^2 + w_p |T - T_previous|^2, each per unit of its own term."""
 
     disturbance: float = 1.0
-    effort: float = 1e-3
-    previous: float = 0.0
+    effort: float = EFFORT_WEIGHT
+    previous: float = CHANGE_WEIGHT
 
     def __post_init__(self) -> None:
         for name in ("disturbance", "effort", "previous"):
-            value = float(getattr(self, name))
-            if not (np.isfinite(value) and value >= 0.0):
-                raise InputError(f"weight {name}: {value:g}, must be finite and not negative")
+            finite_number(getattr(self, name), f"weight {name}", least=0.0)
 
     @cached_property
     def packed(self) -> Array:
@@ -140,6 +153,7 @@ def least_thrusts(
     `priority`, such as "ZKMN,XY", says which axes to give up last where the limits (or missing thrusters) do not allow
     the whole wrench; without it the wrench keeps its direction.
     """
+    instance_of(layout, Layout, "layout")
     requested = frozen(wrench_B, (6,), "wrench")
     thrusts, scale = _start(layout, requested, priority)
     return Allocation(
@@ -149,8 +163,14 @@ def least_thrusts(
         disturbance=None if gram is None else disturbance_of(gram, thrusts),
         method="pseudo-inverse",
         gap=0.0,
-        scale=scale,
+        scale=_share(layout, thrusts, requested, scale),
     )
+
+
+def _share(layout: Layout, thrusts: Array, requested: Array, scale: float) -> float:
+    """The share that limits allow, or 0 where nothing of a wrench is made: then nothing of it was attainable."""
+    made, asked = layout.B @ thrusts, float(requested @ requested)
+    return 0.0 if asked > _NOTHING and made @ made <= _NOTHING * asked else scale
 
 
 def _start(layout: Layout, requested: Array, priority: str | None) -> tuple[Array, float]:
@@ -204,13 +224,14 @@ def gentle_allocation(
         If the wrench, the Gram matrix or the previous thrusts have a wrong shape or are not finite, the priority is not
         a list of axes, or the budget is less than 1.
     """
+    instance_of(layout, Layout, "layout")
+    instance_of(weights, Weights, "weights")
     n = layout.B.shape[1]
     requested = frozen(wrench_B, (6,), "wrench")
     G = frozen(gram, (2 * n, 2 * n), "Gram matrix")
     # Copies, here and of the lines: kernels are compiled for arrays that may be written to, and not again for others.
     previous = np.zeros(n) if previous_N is None else frozen(previous_N, (n,), "previous thrusts").copy()
-    if budget < 1:
-        raise InputError(f"budget: {budget} boxes, must be at least 1")
+    whole_number(budget, "budget", 1)
     if priority is not None:
         parse_priority(priority)
     packed = weights.packed
@@ -234,7 +255,7 @@ def gentle_allocation(
         disturbance=cost(G, thrusts, previous, _DISTURBANCE),
         method=method,
         gap=gap / value if value > 0.0 else 0.0,
-        scale=scale,
+        scale=_share(layout, thrusts, requested, scale),
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from wakewise.allocation.layout import Layout, axis_scaling
 from wakewise.allocation.search import box_range
 from wakewise.arrays import Array
+from wakewise.checks import quoted
 from wakewise.errors import InputError
 
 AXES = "XYZKMN"
@@ -47,6 +48,8 @@ def parse_priority(text: str) -> tuple[tuple[int, ...], ...]:
     InputError
         If a letter is no axis, or comes twice.
     """
+    if not isinstance(text, str):
+        raise InputError(f"priority: {quoted(text)}, must be a text such as 'ZKMN,XY'")
     groups = [tuple(part.strip().upper()) for part in text.split(",") if part.strip()]
     named = [letter for group in groups for letter in group]
     wrong = [letter for letter in named if letter not in AXES or named.count(letter) > 1]

@@ -19,10 +19,12 @@ import numpy as np
 from pydantic import Field
 
 from wakewise.arrays import Array, freeze
+from wakewise.checks import one_of
+from wakewise.defaults import DISTURBANCE_WEIGHT, EFFORT_WEIGHT
 from wakewise.errors import InputError
 from wakewise.interfaces import BodyState
 from wakewise.settings import Settings
-from wakewise.wake.gradients import Superposition
+from wakewise.wake.gradients import SUPERPOSITIONS, Superposition
 
 PLAN_EVERY_S = 0.1
 """Time between two plans, and the most that one may take: a thruster's lag, within which nothing can be undone."""
@@ -36,8 +38,6 @@ SMOOTH_N = 0.5
 """Thrust below which the root of thrust is rounded off, or its slope at 0 would be infinite."""
 EDGE_DEG = 3.0
 """Width of the edge that a planner gives to a cone with a sharp one, whose slope is not to be had."""
-DISTURBANCE_WEIGHT, EFFORT_WEIGHT = 150.0, 1e-3
-"""Weights of the disturbance, per (m/s)^2 (s), and of squared thrusts, per N^2 (s): see `ControlSettings`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,6 +61,9 @@ class PlanTerms:
     superposition: Superposition = "coherent"
     tolerance: float = 1e-3
     second_start_every: int = 10
+
+    def __post_init__(self) -> None:
+        one_of(self.superposition, SUPERPOSITIONS, "superposition")
 
 
 class PlanSettings(Settings):

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wakewise.arrays import Array, IntArray, freeze
+from wakewise.arrays import Array, IntArray, freeze, frozen_indices
 from wakewise.errors import InputError
 from wakewise.files import broken_promise, whole_file
 
@@ -49,14 +49,13 @@ class Mesh:
 
     def __post_init__(self) -> None:
         freeze(self, vertices_m=(None, 3))
-        faces = np.array(self.faces, dtype=np.int64, order="C")
-        if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
-            raise InputError(f"faces: shape {faces.shape}, allowed (m, 3) with m >= 1")
+        faces = frozen_indices(self.faces, (None, 3), "faces")
+        if len(faces) == 0:
+            raise InputError("faces: none, allowed (m, 3) with m >= 1")
         if faces.min() < 0 or faces.max() >= len(self.vertices_m):
             raise InputError(
                 f"faces: vertex numbers {faces.min()} to {faces.max()}, allowed 0 to {len(self.vertices_m) - 1}"
             )
-        faces.setflags(write=False)
         object.__setattr__(self, "faces", faces)
 
     @cached_property

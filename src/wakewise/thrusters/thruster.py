@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from wakewise.arrays import Array, frozen
+from wakewise.checks import finite_number
 from wakewise.errors import InputError
 
 REACH_M = 10.0
@@ -60,10 +60,10 @@ def mount(record: Mounted) -> None:
 
 def require_limit(where: str, field: str, value: float) -> None:
     """Refuse a limit, area, lag or gain of a thruster that is not finite or out of range."""
-    low_allowed = field in _ZERO_ALLOWED
-    if not math.isfinite(value) or value < 0.0 or (value == 0.0 and not low_allowed):
-        allowed = "at least 0" if low_allowed else "more than 0"
-        raise InputError(f"{where}: {field} = {value:g}, must be finite and {allowed}")
+    if field in _ZERO_ALLOWED:
+        finite_number(value, f"{where}: {field}", least=0.0)
+    else:
+        finite_number(value, f"{where}: {field}", above=0.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -107,7 +107,7 @@ class Thruster:
         mount(self)
         where = f"thruster {self.name}"
         for field in ("max_forward_N", "max_reverse_N", "disk_area_m2", "time_constant_s"):
-            require_limit(where, field, float(getattr(self, field)))
+            require_limit(where, field, getattr(self, field))
         require_limit(where, "gain", self.gain)
 
     @property

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from wakewise.arrays import Array, freeze
+from wakewise.checks import finite_number, instance_of
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.thrusters.curve_library import library_curve
@@ -112,6 +113,11 @@ class Vehicle:
         require_fov(self.camera_fov_rad)
         require_size(self.size_m)
         require_inertia(self.inertia_kg_m2)
+        instance_of(self.X_BC, Pose, "X_BC")
+        if not isinstance(self.thrusters, tuple):
+            raise InputError(f"thrusters: a {type(self.thrusters).__name__}, must be a tuple of Thruster")
+        for thruster in self.thrusters:
+            instance_of(thruster, Thruster, "thrusters")
         if not self.thrusters:
             raise InputError("thrusters: none, there must be at least one")
         require_different_names([t.name for t in self.thrusters])
@@ -199,8 +205,7 @@ def thrust_steps(curve: CurveChoice | None, least: LeastThrust | None) -> Thrust
 
 def require_positive(field: str, value: float) -> None:
     """Refuse a number that is not finite or not more than 0."""
-    if not math.isfinite(value) or value <= 0.0:
-        raise InputError(f"{field}: {value:g}, must be finite and more than 0")
+    finite_number(value, field, above=0.0)
 
 
 def require_fov(camera_fov_rad: float) -> None:

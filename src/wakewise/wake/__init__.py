@@ -21,7 +21,7 @@ from wakewise.doors import lazy_door
 if TYPE_CHECKING:
     from wakewise.wake.beds import bed_of, free_jet
     from wakewise.wake.cones import PaperJet, PowerJet
-    from wakewise.wake.disturbance import disturbance, gram, incoherent, point_disturbance, split_roots
+    from wakewise.wake.disturbance import disturbance, gram, incoherent, point_disturbance, split_roots, velocity
     from wakewise.wake.floor import FloorJet
     from wakewise.wake.gradients import (
         Superposition,
@@ -56,6 +56,7 @@ __all__ = [
     "point_disturbance",
     "smooth_roots",
     "split_roots",
+    "velocity",
     "wake_model",
 ]
 

@@ -26,7 +26,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wakewise.arrays import Array
+from wakewise.arrays import Array, frozen
+from wakewise.checks import one_of
 from wakewise.compiled import njit
 from wakewise.errors import InputError
 from wakewise.interfaces import WakeModel
@@ -36,7 +37,7 @@ from wakewise.wake.checks import explain, same_sizes
 from wakewise.wake.floor import FloorJet
 from wakewise.wake.floor_carried import add_carried_walls
 from wakewise.wake.floor_sums import floor_gram_sum
-from wakewise.wake.gradients import Superposition
+from wakewise.wake.gradients import SUPERPOSITIONS, Superposition
 from wakewise.wake.jets import AxialJet
 from wakewise.wake.kernels import as_tuple, own_constants, section_of
 from wakewise.wake.sums import FAST, dot, gram_sum
@@ -84,6 +85,7 @@ def gram(
     InputError
         If shapes do not belong together, something is not finite, a weight is negative or an area not positive.
     """
+    one_of(superposition, SUPERPOSITIONS, "superposition")
     same_sizes(region_points_W, weights, origins_W, axes_W, areas_m2)
     place = (region_points_W, weights, origins_W, axes_W, areas_m2)
     if flow is not None and isinstance(free_jet(model), AxialJet):
@@ -98,7 +100,8 @@ def gram(
         in_world = (region_points_W, weights, _ORIGIN, _LEVEL, origins_W, axes_W, areas_m2)
         G, _, check = floor_gram_sum(*in_world, *model.jet.law, model.numbers, False)
     else:
-        velocity = model.unit_velocity(
+        velocity = unit_velocity(
+            model,
             region_points_W,
             np.concatenate([origins_W, origins_W]),
             np.concatenate([-axes_W, axes_W]),
@@ -108,6 +111,34 @@ def gram(
     if check != 0.0:
         raise explain(*place)
     return incoherent(G) if superposition == "incoherent" else G
+
+
+def unit_velocity(
+    model: WakeModel, points_W_m: Array, origins_W_m: Array, directions_W: Array, areas_m2: Array
+) -> Array:
+    """What a wake model answers, shape (m, n, 3), held against what it must be (see `WakeModel.unit_velocity`).
+
+    Raises
+    ------
+    InputError
+        If it is of another shape or not finite.
+    """
+    answer = model.unit_velocity(points_W_m, origins_W_m, directions_W, areas_m2)
+    name = getattr(model, "name", type(model).__name__)
+    return frozen(answer, (len(origins_W_m), len(points_W_m), 3), f"wake model {name}: unit_velocity")
+
+
+def velocity(
+    model: WakeModel, points_W_m: Array, origins_W_m: Array, axes_W: Array, areas_m2: Array, thrusts_N: Array
+) -> Array:
+    """Velocity of the water in m/s, shape (n, 3), at points, shape (n, 3): that of all jets, added up.
+
+    Arguments as for `gram`; thrusts, shape (m,). Where squares are summed over points with their weights it is the
+    coherent D.
+    """
+    jets = -np.sign(thrusts_N)[:, None] * axes_W
+    alone = unit_velocity(model, points_W_m, origins_W_m, jets, areas_m2)
+    return np.asarray(np.einsum("i,inx->nx", np.sqrt(np.abs(thrusts_N)), alone))
 
 
 @njit(fastmath=FAST)
@@ -242,6 +273,7 @@ def point_disturbance(
     superposition: Superposition = "coherent",
 ) -> float:
     """D in (m/s)^2, point by point as the definition reads; slow, and the check on `gram`. Arguments as there."""
+    one_of(superposition, SUPERPOSITIONS, "superposition")
     same_sizes(region_points_W, weights, origins_W, axes_W, areas_m2)
     thrusts = np.asarray(thrusts_N, dtype=np.float64)
     jets = -np.sign(thrusts)[:, None] * axes_W

@@ -22,12 +22,13 @@ an edge of about 3 deg in anything that follows gradients. The jets' Gaussian ta
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from wakewise.arrays import Array
+from wakewise.checks import one_of
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.interfaces import WakeModel
@@ -40,6 +41,8 @@ from wakewise.wake.stage import stage_sum
 from wakewise.wake.sums import gram_slope_sum
 
 Superposition = Literal["coherent", "incoherent"]
+SUPERPOSITIONS: tuple[Superposition, ...] = get_args(Superposition)
+"""How jets that meet may be added up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +105,7 @@ def gram_with_derivatives(
     InputError
         If shapes do not belong together, something is not finite, a weight is negative or an area not positive.
     """
+    one_of(superposition, SUPERPOSITIONS, "superposition")
     same_sizes(region_points_W, weights, positions_B_m, axes_B, areas_m2)
     place = (region_points_W, weights, X_WB.p_m, X_WB.q, positions_B_m, axes_B, areas_m2)
     if isinstance(model, AxialJet):

@@ -25,6 +25,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from wakewise.checks import quoted
 from wakewise.errors import InputError
 from wakewise.interfaces import WakeModel
 from wakewise.plugins import find, names, offered
@@ -168,6 +169,8 @@ def wake_model(which: str | WakeSettings, bed_z_m: float | None = None) -> WakeM
             return _from_outside(which)
         recipe = _RECIPES[which]
         return recipe.make(**recipe.numbers)
+    if not isinstance(which, WakeSettings):
+        raise InputError(f"wake model: {quoted(which)}, must be a name: {', '.join(model_names())}")
     if which.model in RIVALS:
         return learned_wake(_bed(which, bed_z_m))
     if which.model not in _RECIPES:

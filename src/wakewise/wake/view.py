@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 import numpy as np
 
 from wakewise.arrays import Array, freeze
+from wakewise.checks import one_of
 from wakewise.compiled import njit
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
@@ -16,7 +17,7 @@ from wakewise.interfaces import WakeModel
 from wakewise.wake.beds import free_jet
 from wakewise.wake.carried import Flow
 from wakewise.wake.disturbance import astray, gram
-from wakewise.wake.gradients import Superposition
+from wakewise.wake.gradients import SUPERPOSITIONS, Superposition
 from wakewise.wake.jets import AxialJet, Law
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ class WakeView:
     superposition: Superposition = "coherent"
 
     def __post_init__(self) -> None:
+        one_of(self.superposition, SUPERPOSITIONS, "superposition")
         n, m = len(self.points_W_m), len(self.positions_B_m)
         freeze(self, points_W_m=(n, 3), weights=(n,), positions_B_m=(m, 3), axes_B=(m, 3), areas_m2=(m,))
         if not np.sum(self.weights) > 0.0 or np.any(self.weights < 0.0):

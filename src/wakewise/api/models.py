@@ -1,0 +1,164 @@
+"""Photographs to a model, a model against the truth, and targets and methods by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from numpy.typing import ArrayLike
+
+from wakewise.arrays import frozen
+from wakewise.checks import finite_number, instance_of
+from wakewise.control import MAKERS
+from wakewise.plugins import names
+from wakewise.targets import find_target
+
+if TYPE_CHECKING:
+    from wakewise.evaluation import SurfaceScore
+    from wakewise.reconstruction import Model, ReconstructionSettings
+    from wakewise.targets import Mesh, Target
+
+
+def reconstruct(
+    photos: str | Path,
+    out: str | Path,
+    *,
+    settings: ReconstructionSettings | None = None,
+    reference_cameras: str | Path | None = None,
+    focal_px: float | None = None,
+    camera: str | Path | None = None,
+    region: tuple[ArrayLike, float] | None = None,
+) -> Model:
+    """Photographs to a sparse model, a dense cloud and a mesh (photogrammetry with COLMAP and stereo).
+
+    Parameters
+    ----------
+    photos, out : path
+        Folder of photographs; folder for the model. Stages that are done are skipped.
+    settings : ReconstructionSettings, optional
+    reference_cameras : path, optional
+        Known camera centres (m), which give scale and frame: CSV or COLMAP's images.txt.
+    focal_px : float, optional
+        Focal length to start from.
+    camera : path, optional
+        A known lens: folder with COLMAP's cameras.txt.
+    region : (centre, radius), optional
+        What is wanted, in the frame of the references (m).
+
+    Returns
+    -------
+    Model
+        Its `summary()` holds the figures.
+
+    Raises
+    ------
+    InputError, StageError
+        If photographs or references cannot be used; if too little of them fits together.
+
+    Examples
+    --------
+    >>> import wakewise as ww
+    >>> ww.reconstruct("photos", "runs/photos").summary()["registered_images"]  # doctest: +SKIP
+    """
+    from wakewise.reconstruction import read_lens, read_reference_cameras
+    from wakewise.reconstruction import reconstruct as build
+
+    return build(
+        Path(photos),
+        Path(out),
+        settings,
+        focal_px=focal_px,
+        lens=None if camera is None else read_lens(Path(camera)),
+        reference_positions=None if reference_cameras is None else read_reference_cameras(Path(reference_cameras)),
+        region=None if region is None else (frozen(region[0], (3,), "region"), float(region[1])),
+    )
+
+
+def evaluate(
+    cloud: str | Path | ArrayLike,
+    reference: str | Path | Mesh,
+    *,
+    bed_z_m: float | None = None,
+    camera_centres_m: ArrayLike | None = None,
+    icp: bool = True,
+) -> SurfaceScore:
+    """A cloud against a true surface: accuracy, completeness, F-score.
+
+    Parameters
+    ----------
+    cloud : path or array_like, shape (n, 3)
+        Points in m.
+    reference : path or Mesh
+        The true surface, in m and in the same frame up to a few millimetres.
+    bed_z_m : float, optional
+        Depth of the bed: what lies less than 10 mm above it does not count.
+    camera_centres_m : array_like, shape (k, 3), optional
+        With them the surface that at least three cameras see is judged apart.
+    icp : bool
+        Move the cloud onto the surface first, rigidly.
+
+    Raises
+    ------
+    InputError, StageError
+        If a file cannot be used; if the cloud is no model of the reference.
+
+    Examples
+    --------
+    >>> import numpy as np, wakewise as ww
+    >>> coral = ww.load_target("brain").mesh
+    >>> corners = coral.triangles_m.reshape(-1, 3)
+    >>> score = ww.evaluate(corners, coral)
+    >>> bool(score.rmse_mm < 0.01)
+    True
+    """
+    from wakewise.evaluation import Crop, evaluate_surface
+    from wakewise.reconstruction import read_cloud
+    from wakewise.targets import Mesh, read_mesh
+
+    points = read_cloud(Path(cloud)).points_m if isinstance(cloud, (str, Path)) else frozen(cloud, (None, 3), "cloud")
+    bed = None if bed_z_m is None else finite_number(bed_z_m, "bed_z_m")
+    mesh = (
+        read_mesh(Path(reference)) if isinstance(reference, (str, Path)) else instance_of(reference, Mesh, "reference")
+    )
+    centres = None if camera_centres_m is None else frozen(camera_centres_m, (None, 3), "camera_centres_m")
+    return evaluate_surface(points, mesh, crop=Crop(bed_z_m=bed), camera_centres_W_m=centres, icp=icp)
+
+
+def load_target(kind: str, *, bed_z_m: float = 1.5, seed: int = 0, size_m: float | None = None) -> Target:
+    """A target standing on the bed: a procedural coral by name, a mesh file, or one from outside.
+
+    Parameters
+    ----------
+    kind : str
+        "branching", "brain", "plate", the path of a mesh file, a plug-in's name, or ``package.module:make``.
+    bed_z_m : float
+        Depth of the bed.
+    seed : int
+        Which individual of a procedural one.
+    size_m : float, optional
+        Scale a mesh file's largest extent to this.
+
+    Raises
+    ------
+    InputError
+        If there is no such target, or its file is not usable.
+
+    Examples
+    --------
+    >>> import wakewise as ww
+    >>> ww.load_target("plate").bed_z_m
+    1.5
+    """
+    return find_target(kind, bed_z_m, seed, size_m)
+
+
+def methods() -> list[str]:
+    """Names of the methods that a scenario may ask for: ours, then those that installed packages offer.
+
+    Examples
+    --------
+    >>> import wakewise as ww
+    >>> "wake-aware" in ww.methods()
+    True
+    """
+    return names("method", MAKERS)

@@ -1,0 +1,117 @@
+"""Whole trials: photographs, model, report; and several of them side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from wakewise.checks import quoted
+from wakewise.errors import InputError
+
+if TYPE_CHECKING:
+    from wakewise.operation import Parts, Scenario
+    from wakewise.trials import Watch
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a trial or a comparison left: its folder, its figures (see docs/conventions.md), its report."""
+
+    folder: Path
+    figures: dict[str, Any]
+    report: Path
+
+
+def trial(
+    flight: Parts | Scenario,
+    folder: str | Path,
+    watch: Watch | None = None,
+    told: Callable[[dict[str, Any]], None] | None = None,
+) -> Result:
+    """Fly, photograph, reconstruct, evaluate and report; what is done already is skipped.
+
+    Parameters
+    ----------
+    flight : Parts or Scenario
+    folder : path
+        Where everything goes; a trial that was cut off goes on there.
+    watch : Watch, optional
+        Is told how far each stage is.
+    told : callable, optional
+        Called with the figures as soon as they are known; mesh and report are made after that.
+
+    Raises
+    ------
+    InputError
+        If the parts do not fit each other, or the folder holds another trial.
+    StageError
+        If a stage cannot finish.
+
+    Examples
+    --------
+    >>> import wakewise as ww
+    >>> scenario = ww.Scenario.preset("quick", **{"mission.views": [8, 6, 4]})
+    >>> ww.trial(scenario, "runs/few")  # doctest: +SKIP
+    """
+    from wakewise.reports import Draft, begin_report, write_report
+    from wakewise.trials import Quiet, run_trial
+
+    watch, place, draft = watch or Quiet(), _path(folder), Draft()
+    figures = run_trial(flight, place, watch, told, lambda missing: begin_report(place, draft, missing))
+    with watch.stage("report") as progress:
+        report = write_report(place, draft)
+        progress(1, 1)
+    return Result(place, figures, report)
+
+
+def compare(flights: Mapping[str, Parts | Scenario], folder: str | Path, watch: Watch | None = None) -> Result:
+    """One trial for each flight, in its own folder, and their outcomes side by side; ratios are to the first.
+
+    Parameters
+    ----------
+    flights : mapping
+        Name to parts or scenario; the same seed gives all of them the same water.
+    folder : path
+    watch : Watch, optional
+
+    Raises
+    ------
+    InputError, StageError
+        As `trial`.
+
+    Examples
+    --------
+    >>> import wakewise as ww
+    >>> parts = ww.Scenario.preset("quick").parts()
+    >>> flights = {"dp": parts.replace(method="dp"), "ours": parts}
+    >>> ww.compare(flights, "runs/both").figures["ratios"]["ours"]  # doctest: +SKIP
+    """
+    from wakewise.reports import Draft, begin_report, write_comparison, write_report
+    from wakewise.trials import Quiet, compare_methods
+
+    if not isinstance(flights, Mapping):
+        raise InputError(f"flights: {quoted(flights)}, must be names with parts or scenarios")
+    if len(flights) < 2:
+        raise InputError(f"compare: {len(flights)} flights, at least two are needed to compare; one alone is a `trial`")
+    for name in flights:
+        if not isinstance(name, str) or not name or "/" in name or "\\" in name or name.startswith("."):
+            raise InputError(f"compare: '{name}' names a folder, it must hold no separator and not begin with a dot")
+    watch, place = watch or Quiet(), _path(folder)
+    drafts = {name: Draft() for name in flights}
+    figures = compare_methods(
+        flights, place, watch, lambda name, lacks: begin_report(place / name, drafts[name], lacks)
+    )
+    with watch.stage("report") as progress:
+        for name in flights:
+            write_report(place / name, drafts.pop(name))
+        report = write_comparison({name: place / name for name in flights}, place)
+        progress(1, 1)
+    return Result(place, figures, report)
+
+
+def _path(folder: str | Path) -> Path:
+    if not isinstance(folder, (str, Path)):
+        raise InputError(f"folder: {quoted(folder)}, must be a path")
+    return Path(folder)
