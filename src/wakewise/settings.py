@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from difflib import get_close_matches
 from typing import Annotated, Any, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+
+from wakewise.errors import InputError
 
 MAX_SEED = 2**63 - 1
 """Largest seed of a random draw: what a signed number of 64 bits holds."""
@@ -99,3 +102,33 @@ def _groups(annotation: Any) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [group for inner in get_args(annotation) for group in _groups(inner)]
+
+
+class Faults:
+    """All that is wrong with one input, gathered so that it is told in one line."""
+
+    def __init__(self) -> None:
+        self.found: list[InputError] = []
+
+    @contextmanager
+    def gathered(self) -> Iterator[None]:
+        """Keep an InputError that is raised within, and go on after it."""
+        try:
+            yield
+        except InputError as fault:
+            self.found.append(fault)
+
+    def tell(self) -> None:
+        """Raise what was gathered, if anything was.
+
+        Raises
+        ------
+        InputError
+            The one that was gathered, or one whose message joins those of all.
+        """
+        if len(self.found) == 1:
+            raise self.found[0]
+        if self.found:
+            rest = len(self.found) - MOST_FAULTS
+            more = f"; and {rest} more" if rest > 0 else ""
+            raise InputError("; ".join(str(fault) for fault in self.found[:MOST_FAULTS]) + more) from self.found[0]

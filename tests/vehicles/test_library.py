@@ -244,7 +244,7 @@ def test_a_missing_file_and_a_folder_are_refused(tmp_path: Path) -> None:
         ("mass_kg: 4.5", "mass_kg: heavy", r"body\.mass_kg: found 'heavy'"),
         ("mass_kg: 4.5", "mass_kg: 4.5\n  colour: red", r"body\.colour: no such field"),
         ("mass_kg: 4.5", "mass_kg: 4.5\n  mass_kg: 5.5", "mass_kg given more than once"),
-        ("  mass_kg: 4.5", "", r"cannot fly, its file does not hold mass$"),
+        ("  mass_kg: 4.5", "", r"does not hold mass; fill in body\.mass_kg \(docs/veh"),
         ("  linear_N_m_s: [0.07, 0.07, 0.07]", "", r"damping\.linear_N_m_s: missing, it goes with linear_N_s_m"),
         ("translation_kg: [3.8, 7.7, 9.0]", "translation_kg: [3.8, 7.7]", r"added_mass\.translation_kg"),
         (

@@ -96,8 +96,7 @@ def any_vehicle(name_or_path: str) -> Vehicle:
     8
     """
     draft = find_vehicle(name_or_path)
-    if draft.missing:
-        raise InputError(f"vehicle {name_or_path}: cannot fly, its file does not hold {', '.join(draft.missing)}")
+    draft.require_whole(name_or_path)
     return draft.vehicle()
 
 

@@ -3,8 +3,9 @@
 Body frame B is FRD. A positive thrust pushes the vehicle along the thruster's axis and sends the jet the other way.
 
 Start reading in `vehicle.py` (the record, with `hydrodynamics.py`) and `library.py` with `library_data/` (one file
-per cited source; `vehicle_file.py` and `draft.py` read them). `dynamics.py` has the equations of motion and the steps
-(`fossen.py` the readable matrices, `kernels.py`, `runge_kutta.py`, `semi_implicit.py` the compiled steps,
+per cited source; `vehicle_file.py` and `draft.py` read them, `file_writing.py` writes them; `needs.py` and
+`completion.py` say what one lacks and estimate it after another vehicle). `dynamics.py` has the equations of motion and
+the steps (`fossen.py` the readable matrices, `kernels.py`, `runge_kutta.py`, `semi_implicit.py` the compiled steps,
 `jacobians.py` their derivatives, `batch.py` many vehicles at once), `check.py` and `mixing.py` rank, null space and
 wrong signs in shipped matrices, `describe.py` and `parameters.py` all of it in words, `perturbation.py` the vehicle
 that the tank flies, `drag.py` its drag as other sources have it, `tilt.py` the joint of its camera, `ballast.py` floats
@@ -20,6 +21,7 @@ from wakewise.vehicles.check import (
     failures,
     null_space_names,
 )
+from wakewise.vehicles.completion import blanks, completed, plausible, unit_of
 from wakewise.vehicles.describe import check_report, describe, summary_line
 from wakewise.vehicles.draft import ThrusterDraft, VehicleDraft
 from wakewise.vehicles.drag import drag_coefficients, possible_drags, with_drag, with_each_drag
@@ -33,9 +35,10 @@ from wakewise.vehicles.dynamics import (
     step_rk4,
     step_semi_implicit,
 )
+from wakewise.vehicles.file_writing import draft_yaml
 from wakewise.vehicles.hydrodynamics import DragCase, Hydrodynamics
 from wakewise.vehicles.jacobians import acceleration_jacobians, step_rk4_jacobians, step_semi_implicit_jacobians
-from wakewise.vehicles.library import draft_names, draft_yaml, load_draft, load_vehicle, vehicle_names
+from wakewise.vehicles.library import draft_names, load_draft, load_vehicle, vehicle_names
 from wakewise.vehicles.mixing import (
     ARDUSUB_VECTORED,
     ARDUSUB_VECTORED_6DOF,
@@ -64,10 +67,12 @@ __all__ = [
     "achievable_wrench",
     "actuation",
     "allocation_rank",
+    "blanks",
     "check_report",
     "compare_matrix",
     "compare_with_ardusub",
     "compile_body",
+    "completed",
     "coriolis_wrench",
     "damping_wrench",
     "describe",
@@ -83,6 +88,7 @@ __all__ = [
     "pack_bodies",
     "parameters",
     "perturbed",
+    "plausible",
     "possible_drags",
     "restoring_wrench",
     "step_batch",
@@ -91,6 +97,7 @@ __all__ = [
     "step_semi_implicit",
     "step_semi_implicit_jacobians",
     "summary_line",
+    "unit_of",
     "vehicle_names",
     "with_drag",
     "with_each_drag",

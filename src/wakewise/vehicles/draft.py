@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
 from wakewise.arrays import Array, frozen
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
+from wakewise.settings import Faults
 from wakewise.thrusters.thruster import Thruster, mount, require_limit
 from wakewise.vehicles.hydrodynamics import (
     DragCase,
@@ -18,6 +21,7 @@ from wakewise.vehicles.hydrodynamics import (
     require_linear_damping,
     require_quadratic_damping,
 )
+from wakewise.vehicles.needs import THRUSTER_FIELDS, THRUSTER_WORDS, VEHICLE_WORDS
 from wakewise.vehicles.tilt import TiltJoint
 from wakewise.vehicles.vehicle import (
     CurveChoice,
@@ -33,17 +37,20 @@ from wakewise.vehicles.vehicle import (
     thrust_steps,
 )
 
+T = TypeVar("T")
+
 ROUNDING = 1e-3
 """Largest asymmetry of an added mass, relative to its largest element, that passes as rounding in the file."""
 
 MAX_THRUSTERS = 64
 """More than any vehicle has; beyond it a file is a mistake, and the checks of single failures take for ever."""
 
-_THRUSTER_WORDS = {
-    "max_forward_N": "forward limit",
-    "max_reverse_N": "reverse limit",
-    "disk_area_m2": "disk",
-    "time_constant_s": "lag",
+_CHECKS: dict[str, Callable[[Array], None]] = {
+    "size_m": require_size,
+    "inertia_kg_m2": require_inertia,
+    "added_mass": require_added_mass,
+    "linear_damping": require_linear_damping,
+    "quadratic_damping": require_quadratic_damping,
 }
 
 
@@ -77,7 +84,7 @@ class ThrusterDraft:
 
     def __post_init__(self) -> None:
         mount(self)
-        for field in _THRUSTER_WORDS:
+        for field in THRUSTER_WORDS:
             value = getattr(self, field)
             if value is not None:
                 require_limit(f"thruster {self.name}", field, float(value))
@@ -155,6 +162,7 @@ class VehicleDraft:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        faults = Faults()
         for field, shape in (
             ("size_m", (3,)),
             ("inertia_kg_m2", (3, 3)),
@@ -165,24 +173,38 @@ class VehicleDraft:
             ("quadratic_damping", (6, 6)),
             ("shipped_matrix", (6, None)),
         ):
-            if getattr(self, field) is not None:
-                object.__setattr__(self, field, frozen(getattr(self, field), shape, field))
+            with faults.gathered():
+                self._freeze(field, shape)
         for field in ("mass_kg", "displaced_volume_m3"):
-            if getattr(self, field) is not None:
-                require_positive(field, getattr(self, field))
-        if self.size_m is not None:
-            require_size(self.size_m)
-        if self.inertia_kg_m2 is not None:
-            require_inertia(self.inertia_kg_m2)
-        if self.camera_fov_rad is not None:
-            require_fov(self.camera_fov_rad)
-        self._check_water()
-        thrust_steps(self.curve, self.least_thrust)
-        require_different_names([t.name for t in self.thrusters])
+            with faults.gathered():
+                if getattr(self, field) is not None:
+                    require_positive(field, getattr(self, field))
+        with faults.gathered():
+            if self.camera_fov_rad is not None:
+                require_fov(self.camera_fov_rad)
+        with faults.gathered():
+            thrust_steps(self.curve, self.least_thrust)
+        with faults.gathered():
+            require_different_names([t.name for t in self.thrusters])
+        with faults.gathered():
+            self._check_count()
+        faults.tell()
+
+    def _freeze(self, field: str, shape: tuple[int | None, ...]) -> None:
+        """Check an array, if there is one, as `Vehicle` and `Hydrodynamics` do."""
+        if getattr(self, field) is None:
+            return
+        object.__setattr__(self, field, frozen(getattr(self, field), shape, field))
+        if field == "added_mass":
+            self._round_added_mass()
+        if field in _CHECKS:
+            _CHECKS[field](getattr(self, field))
+
+    def _check_count(self) -> None:
         n = len(self.thrusters)
         if n > MAX_THRUSTERS:
             raise InputError(f"{n} thrusters, at most {MAX_THRUSTERS} are read")
-        if self.shipped_matrix is not None and n and self.shipped_matrix.shape[1] != n:
+        if self.shipped_matrix is not None and n and np.shape(self.shipped_matrix)[-1] != n:
             raise InputError(f"shipped_matrix: shape {self.shipped_matrix.shape}, allowed (6, {n}), one per thruster")
 
     @classmethod
@@ -224,46 +246,59 @@ class VehicleDraft:
             provenance=vehicle.provenance,
         )
 
-    def _check_water(self) -> None:
-        if self.added_mass is not None:
-            skew = float(np.abs(self.added_mass - self.added_mass.T).max())
-            if 0.0 < skew <= ROUNDING * float(np.abs(self.added_mass).max()):
-                mean = frozen(0.5 * (self.added_mass + self.added_mass.T), (6, 6), "added_mass")
-                object.__setattr__(self, "added_mass", mean)
-                note = f"added mass: entries differ from their mirror image by up to {skew:.3g}, the mean is taken"
-                object.__setattr__(self, "notes", (*self.notes, note))
-            require_added_mass(self.added_mass)
-        if self.linear_damping is not None:
-            require_linear_damping(self.linear_damping)
-        if self.quadratic_damping is not None:
-            require_quadratic_damping(self.quadratic_damping)
+    def _round_added_mass(self) -> None:
+        """Take the mean of two halves that differ by no more than rounding, and say so."""
+        if self.added_mass is None:
+            return
+        skew = float(np.abs(self.added_mass - self.added_mass.T).max())
+        if 0.0 < skew <= ROUNDING * float(np.abs(self.added_mass).max()):
+            mean = frozen(0.5 * (self.added_mass + self.added_mass.T), (6, 6), "added_mass")
+            object.__setattr__(self, "added_mass", mean)
+            note = f"added mass: entries differ from their mirror image by up to {skew:.3g}, the mean is taken"
+            object.__setattr__(self, "notes", (*self.notes, note))
 
     @cached_property
     def missing(self) -> tuple[str, ...]:
         """What the file would have to hold for the vehicle to fly, in words; empty if it is all there."""
-        words = {
-            "size_m": "size",
-            "mass_kg": "mass",
-            "inertia_kg_m2": "inertia",
-            "displaced_volume_m3": "displaced volume",
-            "p_BG_m": "centre of gravity",
-            "p_BB_m": "centre of buoyancy",
-            "added_mass": "added mass",
-            "linear_damping": "linear damping",
-            "quadratic_damping": "quadratic damping",
-            "X_BC": "camera mount",
-            "camera_fov_rad": "camera field of view",
-        }
-        found = [word for field, word in words.items() if getattr(self, field) is None]
+        found = [word for field, (word, _) in VEHICLE_WORDS.items() if getattr(self, field) is None]
         if not self.thrusters:
-            return (*found, "thruster places and axes", *(f"thruster {word}" for word in _THRUSTER_WORDS.values()))
-        for field, word in _THRUSTER_WORDS.items():
+            return (*found, "thruster places and axes", *(f"thruster {word}" for word in THRUSTER_WORDS.values()))
+        for field, word in THRUSTER_WORDS.items():
             lacking = [str(i) for i, t in enumerate(self.thrusters, start=1) if getattr(t, field) is None]
             if len(lacking) == len(self.thrusters):
                 found.append(f"thruster {word}")
             elif lacking:
                 found.append(f"thruster {word} (of thruster {', '.join(lacking)})")
         return tuple(found)
+
+    @property
+    def missing_fields(self) -> tuple[str, ...]:
+        """The same as dotted names of fields of a vehicle file."""
+        found = [name for field, (_, names) in VEHICLE_WORDS.items() if getattr(self, field) is None for name in names]
+        if not self.thrusters:
+            return (*found, "thruster_layout.mounts", *THRUSTER_FIELDS.values())
+        lacking = (field for field in THRUSTER_FIELDS if any(getattr(t, field) is None for t in self.thrusters))
+        return (*found, *(THRUSTER_FIELDS[field] for field in lacking))
+
+    def require_whole(self, called: str | None = None) -> None:
+        """Refuse to fly what is incomplete.
+
+        Parameters
+        ----------
+        called : str, optional
+            What the user calls the vehicle: a path; its name if not given.
+
+        Raises
+        ------
+        InputError
+            Naming all that is missing, and how it is filled in.
+        """
+        if self.missing:
+            raise InputError(
+                f"vehicle {called or self.name}: cannot fly, its file does not hold {', '.join(self.missing)}; "
+                f"fill in {', '.join(self.missing_fields)} (docs/vehicle-file.md), or let "
+                f"`wakewise vehicle import {called or self.name} --like NAME --out FILE` estimate them"
+            )
 
     @cached_property
     def allocation_matrix(self) -> Array:
@@ -313,54 +348,42 @@ class VehicleDraft:
         InputError
             If something is missing; the message lists it.
         """
-        if (
-            self.missing
-            or self.size_m is None
-            or self.mass_kg is None
-            or self.inertia_kg_m2 is None
-            or self.displaced_volume_m3 is None
-            or self.p_BG_m is None
-            or self.p_BB_m is None
-            or self.added_mass is None
-            or self.linear_damping is None
-            or self.quadratic_damping is None
-            or self.X_BC is None
-            or self.camera_fov_rad is None
-        ):
-            raise InputError(f"vehicle {self.name}: cannot fly, its file does not hold {', '.join(self.missing)}")
+        self.require_whole()
         return Vehicle(
             name=self.name,
             title=self.title,
             source=self.source,
             does_not_claim=self.does_not_claim,
-            size_m=self.size_m,
-            mass_kg=self.mass_kg,
-            inertia_kg_m2=self.inertia_kg_m2,
-            displaced_volume_m3=self.displaced_volume_m3,
-            p_BG_m=self.p_BG_m,
-            p_BB_m=self.p_BB_m,
+            size_m=stated(self.size_m),
+            mass_kg=stated(self.mass_kg),
+            inertia_kg_m2=stated(self.inertia_kg_m2),
+            displaced_volume_m3=stated(self.displaced_volume_m3),
+            p_BG_m=stated(self.p_BG_m),
+            p_BB_m=stated(self.p_BB_m),
             hydrodynamics=Hydrodynamics(
-                added_mass=self.added_mass,
-                linear_damping=self.linear_damping,
-                quadratic_damping=self.quadratic_damping,
+                added_mass=stated(self.added_mass),
+                linear_damping=stated(self.linear_damping),
+                quadratic_damping=stated(self.quadratic_damping),
             ),
             thrusters=tuple(_whole(t) for t in self.thrusters),
-            X_BC=self.X_BC,
+            X_BC=stated(self.X_BC),
             tilt=self.tilt,
             curve=self.curve,
             least_thrust=self.least_thrust,
             drag_cases=self.drag_cases,
-            camera_fov_rad=self.camera_fov_rad,
+            camera_fov_rad=stated(self.camera_fov_rad),
             provenance=self.provenance,
         )
 
 
-def _whole(draft: ThrusterDraft) -> Thruster:
-    def stated(value: float | None) -> float:
-        if value is None:
-            raise InputError(f"thruster {draft.name}: limits, disk and lag must all be stated")
-        return value
+def stated(value: T | None) -> T:
+    """A value that was found to be there."""
+    if value is None:
+        raise InputError("vehicle: is not whole")
+    return value
 
+
+def _whole(draft: ThrusterDraft) -> Thruster:
     return Thruster(
         name=draft.name,
         p_BT_m=draft.p_BT_m,

@@ -11,8 +11,8 @@ from pydantic import Discriminator, Field, Tag
 from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, matrix_from_quat, quat_from_euler
-from wakewise.settings import Settings
-from wakewise.vehicles.draft import ThrusterDraft, VehicleDraft
+from wakewise.settings import Faults, Settings
+from wakewise.vehicles.draft import ThrusterDraft, VehicleDraft, stated
 from wakewise.vehicles.hydrodynamics import DragCase
 from wakewise.vehicles.tilt import TiltJoint
 from wakewise.vehicles.vehicle import CurveChoice, LeastThrust, Provenance
@@ -67,9 +67,13 @@ class Inertia(Group):
 class Buoyancy(Group):
     """Displaced volume and the two centres."""
 
-    displaced_volume_m3: Positive | None = None
-    centre_of_gravity_m: Three | None = None
-    centre_of_buoyancy_m: Three | None = None
+    displaced_volume_m3: Positive | None = Field(
+        default=None, description="volume of water that it displaces; mass / 1000 kg/m3 floats in fresh water"
+    )
+    centre_of_gravity_m: Three | None = Field(default=None, description="from the body origin, FRD")
+    centre_of_buoyancy_m: Three | None = Field(
+        default=None, description="from the body origin, FRD; above the centre of gravity, so its z is the smaller one"
+    )
 
 
 class AddedMass(Group):
@@ -138,20 +142,20 @@ class DragCaseGroup(Damping):
 class ThrusterLimits(Group):
     """What the thrusters of the vehicle can do, unless a mount says otherwise."""
 
-    max_forward_N: Positive
-    max_reverse_N: NotNegative = Field(description="positive magnitude")
+    max_forward_N: Positive = Field(description="largest thrust along the axis of the mount")
+    max_reverse_N: NotNegative = Field(description="largest thrust against it, as a positive magnitude")
 
 
 class ThrusterDisk(Group):
     """The propeller's disk, unless a mount says otherwise."""
 
-    diameter_m: Positive
+    diameter_m: Positive = Field(description="of the area that the propeller sweeps")
 
 
 class ThrusterLag(Group):
     """How fast thrust follows its command, unless a mount says otherwise."""
 
-    time_constant_s: NotNegative
+    time_constant_s: NotNegative = Field(description="first-order lag from commanded to delivered thrust; 0: at once")
 
 
 class ThrusterCurve(Group):
@@ -164,26 +168,26 @@ class ThrusterCurve(Group):
 class ThrusterLeast(Group):
     """Thrusts below which the thrusters give none, where no table of theirs says so."""
 
-    forward_N: NotNegative
-    reverse_N: NotNegative = Field(description="positive magnitude")
+    forward_N: NotNegative = Field(description="least thrust along the axis of the mount")
+    reverse_N: NotNegative = Field(description="least thrust against it, as a positive magnitude")
 
 
 class Mount(Settings):
     """One thruster's place, and its own figures where they differ from the group's."""
 
-    name: Text
+    name: Text = Field(description="what reports call it; each name once")
     position_m: Three = Field(description="disk centre from the body origin, FRD")
     axis: Three = Field(description="direction of the force on the vehicle for positive thrust (no unit)")
-    max_forward_N: Positive | None = None
-    max_reverse_N: NotNegative | None = None
-    disk_diameter_m: Positive | None = None
-    time_constant_s: NotNegative | None = None
+    max_forward_N: Positive | None = Field(default=None, description="in place of thruster_limits.max_forward_N")
+    max_reverse_N: NotNegative | None = Field(default=None, description="in place of thruster_limits.max_reverse_N")
+    disk_diameter_m: Positive | None = Field(default=None, description="in place of thruster_disk.diameter_m")
+    time_constant_s: NotNegative | None = Field(default=None, description="in place of thruster_lag.time_constant_s")
 
 
 class Layout(Group):
     """Where the thrusters are."""
 
-    mounts: Annotated[list[Mount], Field(min_length=1)]
+    mounts: Annotated[list[Mount], Field(min_length=1)] = Field(description="one for each thruster, in their order")
 
 
 class ShippedMatrix(Group):
@@ -234,9 +238,9 @@ class CameraLens(Group):
 class VehicleFile(Settings):
     """A vehicle file, whole; a group that the source does not state is left out."""
 
-    title: Text
-    source: Text
-    does_not_claim: Text
+    title: Text = Field(description="name for people")
+    source: Text = Field(description="where the numbers come from, as a whole")
+    does_not_claim: Text = Field(description="what must not be concluded from these numbers")
     notes: list[Text] = Field(default=[], description="what is odd about the source's numbers")
     body: Body | None = None
     inertia: Inertia | None = None
@@ -258,56 +262,76 @@ class VehicleFile(Settings):
     def draft(self, name: str) -> VehicleDraft:
         """Turn the file's numbers into a record, None where the file says nothing."""
         groups = [(field, getattr(self, field)) for field in type(self).model_fields]
-        body, buoyancy, damping, curve = self.body, self.buoyancy, self.damping, self.thruster_curve
-        least = self.thruster_least
-        return VehicleDraft(
-            name=name,
-            title=self.title,
-            source=self.source,
-            does_not_claim=self.does_not_claim,
-            size_m=vector(None if body is None else body.size_m),
-            mass_kg=None if body is None else body.mass_kg,
-            inertia_kg_m2=None if self.inertia is None else _inertia(self.inertia),
-            displaced_volume_m3=None if buoyancy is None else buoyancy.displaced_volume_m3,
-            p_BG_m=vector(None if buoyancy is None else buoyancy.centre_of_gravity_m),
-            p_BB_m=vector(None if buoyancy is None else buoyancy.centre_of_buoyancy_m),
-            added_mass=None if self.added_mass is None else self.added_mass.matrix(),
-            linear_damping=None if damping is None else damping.linear(),
-            quadratic_damping=None if damping is None else damping.quadratic(),
-            drag_cases=tuple(group.case(name) for name, group in self.drag_cases.items()),
-            thrusters=tuple(self._thrusters()),
-            shipped_matrix=None if self.shipped_matrix is None else self.shipped_matrix.matrix(),
-            curve=None if curve is None else CurveChoice(table=curve.table, supply_V=curve.supply_V),
-            least_thrust=None if least is None else LeastThrust(forward_N=least.forward_N, reverse_N=least.reverse_N),
-            X_BC=None if self.camera_mount is None else _pose(self.camera_mount),
-            tilt=None if self.camera_tilt is None else self.camera_tilt.joint(),
-            camera_fov_rad=None if self.camera_lens is None else math.radians(self.camera_lens.horizontal_fov_deg),
-            provenance=tuple(
-                Provenance(group=field, source=group.source, estimate=group.estimate)
-                for field, group in groups
-                if isinstance(group, Group)
-            ),
-            notes=tuple(self.notes),
-        )
+        body, buoyancy, curve, least = self.body, self.buoyancy, self.thruster_curve, self.thruster_least
+        faults = Faults()
+        linear = quadratic = shipped = tilt = None
+        cases: list[DragCase] = []
+        thrusters: list[ThrusterDraft] = []
+        with faults.gathered():
+            linear = None if self.damping is None else self.damping.linear()
+        with faults.gathered():
+            quadratic = None if self.damping is None else self.damping.quadratic()
+        with faults.gathered():
+            shipped = None if self.shipped_matrix is None else self.shipped_matrix.matrix()
+        with faults.gathered():
+            tilt = None if self.camera_tilt is None else self.camera_tilt.joint()
+        for case_name, group in self.drag_cases.items():
+            with faults.gathered():
+                cases.append(group.case(case_name))
+        for mount in [] if self.thruster_layout is None else self.thruster_layout.mounts:
+            with faults.gathered():
+                thrusters.append(self._thruster(mount))
+        draft = None
+        with faults.gathered():
+            draft = VehicleDraft(
+                name=name,
+                title=self.title,
+                source=self.source,
+                does_not_claim=self.does_not_claim,
+                size_m=vector(None if body is None else body.size_m),
+                mass_kg=None if body is None else body.mass_kg,
+                inertia_kg_m2=None if self.inertia is None else _inertia(self.inertia),
+                displaced_volume_m3=None if buoyancy is None else buoyancy.displaced_volume_m3,
+                p_BG_m=vector(None if buoyancy is None else buoyancy.centre_of_gravity_m),
+                p_BB_m=vector(None if buoyancy is None else buoyancy.centre_of_buoyancy_m),
+                added_mass=None if self.added_mass is None else self.added_mass.matrix(),
+                linear_damping=linear,
+                quadratic_damping=quadratic,
+                drag_cases=tuple(cases),
+                thrusters=tuple(thrusters),
+                shipped_matrix=None if faults.found else shipped,
+                curve=None if curve is None else CurveChoice(table=curve.table, supply_V=curve.supply_V),
+                least_thrust=None
+                if least is None
+                else LeastThrust(forward_N=least.forward_N, reverse_N=least.reverse_N),
+                X_BC=None if self.camera_mount is None else _pose(self.camera_mount),
+                tilt=tilt,
+                camera_fov_rad=None if self.camera_lens is None else math.radians(self.camera_lens.horizontal_fov_deg),
+                provenance=tuple(
+                    Provenance(group=field, source=group.source, estimate=group.estimate)
+                    for field, group in groups
+                    if isinstance(group, Group)
+                ),
+                notes=tuple(self.notes),
+            )
+        faults.tell()
+        return stated(draft)
 
-    def _thrusters(self) -> list[ThrusterDraft]:
+    def _thruster(self, mount: Mount) -> ThrusterDraft:
         limits, disk, lag = self.thruster_limits, self.thruster_disk, self.thruster_lag
         forward = None if limits is None else limits.max_forward_N
         reverse = None if limits is None else limits.max_reverse_N
         diameter = None if disk is None else disk.diameter_m
         delay = None if lag is None else lag.time_constant_s
-        return [
-            ThrusterDraft(
-                name=mount.name,
-                p_BT_m=np.array(mount.position_m),
-                axis_B=np.array(mount.axis),
-                max_forward_N=first(mount.max_forward_N, forward),
-                max_reverse_N=first(mount.max_reverse_N, reverse),
-                disk_area_m2=_area(first(mount.disk_diameter_m, diameter)),
-                time_constant_s=first(mount.time_constant_s, delay),
-            )
-            for mount in ([] if self.thruster_layout is None else self.thruster_layout.mounts)
-        ]
+        return ThrusterDraft(
+            name=mount.name,
+            p_BT_m=np.array(mount.position_m),
+            axis_B=np.array(mount.axis),
+            max_forward_N=first(mount.max_forward_N, forward),
+            max_reverse_N=first(mount.max_reverse_N, reverse),
+            disk_area_m2=_area(first(mount.disk_diameter_m, diameter)),
+            time_constant_s=first(mount.time_constant_s, delay),
+        )
 
 
 def square(block: list[float] | list[list[float]]) -> Array:
