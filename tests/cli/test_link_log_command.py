@@ -42,7 +42,7 @@ def test_a_log_becomes_a_folder(capsys: Capture, tmp_path: Path, monkeypatch: py
     assert run(["link", "log", str(file), "--out", str(tmp_path / "other")]) == 0
     told = capsys.readouterr().out
     assert "saved" in told
-    assert "no page: pip install" in told
+    assert "no page: pip install -e '.[reports]'" in told
     assert not (tmp_path / "other" / "report.html").exists()
 
 
@@ -75,7 +75,7 @@ def test_a_logs_folder_goes_where_a_trials_goes(capsys: Capture, tmp_path: Path)
     ("arguments", "said"),
     [
         (["missing.tlog"], "cannot be read"),
-        (["."], "cannot be read"),
+        (["."], "a folder (give one of its files, such as dive.tlog)"),
         (["text.tlog"], "not one record found"),
         (["dive.tlog", "--ahead", "-1"], "--ahead"),
         (["dive.tlog", "--vehicle", "no-such"], "no-such"),

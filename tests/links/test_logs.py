@@ -61,6 +61,79 @@ def test_every_format_gives_the_dive_back(tmp_path: Path, name: str) -> None:
     assert table.rows["time_s"].diff().drop_nulls().to_numpy() == pytest.approx(1.0 / RATE_HZ)
 
 
+def test_records_without_a_time_are_records(tmp_path: Path) -> None:
+    """Old logs tell parameters, events, modes and messages without one: each is of the time of the last that had one.
+
+    As many are whole as pymavlink reads.
+    """
+    from pymavlink.DFReader import DFReader_binary
+
+    path = tmp_path / "old.BIN"
+    path.write_bytes(made_logs.dataflash(old=True, firmware="ArduSub V3.4 (d1f6a2)"))
+    log = read_log(path)
+    theirs = DFReader_binary(str(path))
+    count = 0
+    while theirs.recv_msg() is not None:
+        count += 1
+    theirs.close()
+    assert (log.bad_records, log.records, log.unread) == (0, count, {})
+    assert [log.parameters[f"MOT_{i}_DIRECTION"] for i in range(1, 9)] == list(made_logs.DIRECTIONS)
+    before, after = _row(log, 3.0), _row(log, 15.0)
+    assert (before["armed"], after["armed"]) == (False, True)
+    assert (before["mode"], after["mode"]) == ("MANUAL", "ALT_HOLD")
+    assert [after[f"servo_{i}_us"] for i in range(1, 9)] == made_logs.pulses(150)[:8]
+
+
+def test_records_of_other_fields_are_counted_by_name(tmp_path: Path) -> None:
+    """A kind of record whose fields have other names is whole, is not read, and that is said."""
+    data = WHOLE["dive.BIN"].replace(b"TimeUS,Alt", b"TimeUS,Foo")
+    log = _read(tmp_path, "dive.BIN", data)
+    assert log.unread == {"CTUN": made_logs.SECONDS * RATE_HZ}
+    assert log.bad_records == 0
+    assert "depth CTUN" not in log.series
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "said"),
+    [
+        ("a.db3", b"SQLite format 3\0" + bytes(100), "as a ROS 2 bag's .db3 is"),
+        ("a.bag", b"#ROSBAG V2.0\n" + bytes(100), "a ROS 1 bag"),
+        ("a.ulg", b"ULog\x01\x12\x35" + bytes(100), "PX4"),
+        ("a.tlog.gz", b"\x1f\x8b" + bytes(100), "unpack it first"),
+    ],
+)
+def test_what_people_have_beside_logs_is_named(tmp_path: Path, name: str, data: bytes, said: str) -> None:
+    """By its first bytes, in one line that says what is read instead."""
+    path = tmp_path / name
+    path.write_bytes(data)
+    with pytest.raises(InputError, match=said) as fault:
+        read_log(path)
+    assert ".tlog" in str(fault.value)
+    assert "\n" not in str(fault.value)
+
+
+def test_a_ros_bag_is_no_recording_of_blueos(tmp_path: Path) -> None:
+    """As a folder and as its MCAP file; a folder that holds a log names it."""
+    from mcap.writer import Writer
+
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    with (bag / "bag_0.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2", library="libmcap")
+        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+        channel = writer.register_channel("/chat", "cdr", schema)
+        writer.add_message(channel, 0, bytes(8), 0)
+        writer.finish()
+    with pytest.raises(InputError, match=r"a ROS bag .MCAP., not a recording of BlueOS"):
+        read_log(bag / "bag_0.mcap")
+    with pytest.raises(InputError, match="give one of its files, such as bag_0"):
+        read_log(bag)
+    (bag / "metadata.yaml").write_text("rosbag2_bagfile_information: {}\n")
+    with pytest.raises(InputError, match="a ROS 2 bag folder"):
+        read_log(bag)
+
+
 @pytest.mark.parametrize("name", MADE)
 def test_half_a_log_is_half_a_dive(tmp_path: Path, name: str) -> None:
     """What is before the cut is read as in the whole log."""

@@ -48,6 +48,16 @@ Out = Annotated[
 ]
 
 
+AnyVehicle = Annotated[
+    bool,
+    typer.Option(
+        "--any-vehicle",
+        help="Read the log of another vehicle than an ArduSub, too: attitude, height, outputs and voltage, without "
+        "thrusts, sticks and names of modes.",
+    ),
+]
+
+
 @app.command("log")
 def log(
     file: LogFile,
@@ -55,6 +65,7 @@ def log(
     ahead: Ahead = 0.4,
     points: Points = None,
     wake_model: WakeModelName = "jet",
+    any_vehicle: AnyVehicle = False,
     out: Out = None,
     json: Json = False,
 ) -> None:
@@ -62,7 +73,8 @@ def log(
 
     Leaves steps.parquet (sticks, servo outputs, depth, attitude, pose, thrusts, D on one clock), log.json,
     parameters.csv and report.html: a folder that `wakewise export` takes to rosbag2 and tum like a trial's. A bad
-    record is a packet with a wrong checksum, or a stretch of bytes that is no record.
+    record is a packet with a wrong checksum, or a stretch of bytes that is no record. What vehicle it is of is asked of
+    its heartbeats or its firmware's name: another than an ArduSub is refused.
     """
     from wakewise.errors import InputError
     from wakewise.extras import has
@@ -78,12 +90,12 @@ def log(
         raise InputError(f"--out {folder}: a file is there, a folder is needed")
     bars = Bars()
     with bars.stage("reading"):
-        found = read_log(file)
+        found = read_log(file, any_vehicle=any_vehicle)
         table = tabulate(found)
     with bars.stage("hindsight"):
         looked, why_not = _hindsight(found, table, chosen, region, wake_model, named=vehicle is not None)
     facts = {
-        "vehicle": chosen.name,
+        "vehicle": found.identity.words if found.identity.is_other else chosen.name,
         "wake_model": wake_model,
         "points": region_words(ahead, points),
         **log_facts(found, table, looked, why_not),
@@ -111,6 +123,13 @@ def _hindsight(
     from wakewise.links.logs.hindsight import hindsight
 
     model = wake.wake_model(wake_model)
+    if found.identity.is_other:
+        why = f"are judged for an ArduSub only, this is {found.identity.words}"
+        if named:
+            raise InputError(f"--vehicle {vehicle.name}: thrusters {why}; leave the option out")
+        return None, why
+    if not found.identity.is_known and not named:
+        return None, "are not judged: nothing in the log says what vehicle it is of, --vehicle NAME does"
     if "servo" not in found.series:
         return None, "the log holds no servo outputs"
     try:
@@ -122,6 +141,8 @@ def _hindsight(
 
 
 def _show(facts: dict[str, Any], folder: Path, page: bool) -> None:
+    from wakewise.extras import how_to_install
+
     reasons = ", ".join(f"{count} {reason}" for reason, count in facts["bad_by_reason"].items())
     bad = f"{facts['bad_records']} bad" + (f" ({reasons}; {facts['bad_bytes']} bytes)" if reasons else "")
     cut = "; the file ends within a record" if facts["cut_short"] else ""
@@ -130,13 +151,18 @@ def _show(facts: dict[str, Any], folder: Path, page: bool) -> None:
         typer.echo(f"clock           jumped by {jump['step_s']:+.1f} s at {jump['time_s']:.1f} s; taken out")
     if len(facts["clock_jumps"]) > 5:
         typer.echo(f"                and {len(facts['clock_jumps']) - 5} more jumps")
-    if facts["other_systems"]:
-        typer.echo(f"vehicle         system {facts['system']}; others left aside: {facts['other_systems']}")
+    if facts["unread_records"]:
+        unread = ", ".join(f"{count} {name}" for name, count in facts["unread_records"].items())
+        typer.echo(f"not read        records of other fields than are known: {unread}")
+    system = "" if facts["system"] is None else f", system {facts['system']}"
+    others = f"; others left aside: {facts['other_systems']}" if facts["other_systems"] else ""
+    typer.echo(f"vehicle         {facts['identity']}{system}{others}")
     modes = ", ".join(f"{mode} {seconds:.0f} s" for mode, seconds in facts["modes"].items())
     typer.echo(
         f"time            {facts['duration_s']:.0f} s, armed {facts['armed_s']:.0f} s; {modes or 'no mode said'}"
     )
-    typer.echo(f"depth           {shown(facts['depth_max_m'])} m at most, from {facts['depth_from'] or 'nothing'}")
+    what = "height" if "height_max_m" in facts else "depth"
+    typer.echo(f"{what:16}{shown(facts[f'{what}_max_m'])} m at most, from {facts['depth_from'] or 'nothing'}")
     if "why_no_hindsight" in facts:
         typer.echo(f"thrusters       {facts['why_no_hindsight']}")
     elif not facts["running_s"]:
@@ -149,4 +175,4 @@ def _show(facts: dict[str, Any], folder: Path, page: bool) -> None:
             typer.echo(f"saved           {facts['saved_pct']:.1f} % of D as flown, at points {facts['points']}")
         else:
             typer.echo(f"saved           nothing to: no jet moves the points by 0.1 mm/s ({facts['points']})")
-    typer.echo(f"written to      {folder}" + ("" if page else " (no page: pip install 'wakewise[reports]')"))
+    typer.echo(f"written to      {folder}" + ("" if page else f" (no page: {how_to_install('reports')})"))

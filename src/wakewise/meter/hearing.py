@@ -12,6 +12,7 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.geometry import Pose, quat_from_euler
 from wakewise.links.logs.gather import HELD_S, MODES, is_parameter, sound
+from wakewise.links.logs.identity import Identity
 from wakewise.links.logs.mavlink import AUTOPILOT, Stamped, take
 
 _SLACK_S = 1e-9
@@ -23,6 +24,7 @@ class Said:
 
     samples: dict[str, tuple[float, tuple[float, ...]]] = field(default_factory=dict)
     parameters: dict[str, float] = field(default_factory=dict)
+    identity: Identity = field(default_factory=Identity)
 
     def put(self, channel: str, time_s: float, values: Iterable[float]) -> None:
         """Keep a sample in place of the last."""
@@ -32,6 +34,10 @@ class Said:
         """Keep a parameter under a name that can be one."""
         if is_parameter(name, value):
             self.parameters[name] = value
+
+    def beat(self, mav_type: int, autopilot: int) -> None:
+        """Keep what the last heartbeat says the vehicle is."""
+        self.identity = Identity(mav_type=mav_type, autopilot=autopilot)
 
 
 class _AsStamped:
@@ -83,6 +89,11 @@ class Hearing:
         return self._before | (self._own.parameters if self._own is not None else {})
 
     @property
+    def identity(self) -> Identity:
+        """What the vehicle says it is."""
+        return self._own.identity if self._own is not None else Identity()
+
+    @property
     def others(self) -> tuple[int, ...]:
         """Systems with servo outputs that are not the vehicle."""
         return tuple(sorted(s for s, said in self._said.items() if s != self.system and "servo" in said.samples))
@@ -106,7 +117,8 @@ class Hearing:
     def mode(self, now_s: float) -> str | None:
         """The flight mode in words."""
         number = self.number("mode", now_s)
-        return None if number is None else MODES.get(int(number), f"mode {int(number)}")
+        modes = {} if self.identity.is_other else MODES
+        return None if number is None else modes.get(int(number), f"mode {int(number)}")
 
     def pose(self, now_s: float) -> Pose | None:
         """Where the vehicle is and how it lies, by the autopilot's own estimate; None where it does not know."""

@@ -143,6 +143,8 @@ class Meter:
         while self._minute and self._minute[0][0] < now_s - MINUTE_S:
             self._minute.popleft()
         pulses = self.hearing.last("servo", now_s)
+        if self.hearing.identity.is_other:
+            return Reading(time_s=now_s, why_not=f"the vehicle is no ArduSub: {self.hearing.identity.words}")
         if self._misfit is not None:
             return Reading(time_s=now_s, why_not=self._misfit)
         if pulses is None:

@@ -2,5 +2,6 @@
 
 Start reading in `read.py` (a file becomes a `VehicleLog`). `tlog.py`, `dataflash.py` and `mcap_file.py` are the
 formats, `mavlink.py` what MAVLink messages say, `gather.py` where it is collected, `clock.py` one clock of one that
-jumps. `table.py` is the log as rows, `hindsight.py` holds the flown thrusts against others, `folder.py` writes both.
+jumps, `identity.py` what vehicle it is. `table.py` is the log as rows, `hindsight.py` holds the flown thrusts against
+others, `folder.py` writes both.
 """

@@ -38,6 +38,11 @@ class Clock:
         self._ahead_s = 0.0
         self._stray: tuple[float, int] | None = None
 
+    @property
+    def now_s(self) -> float:
+        """Mended time of the last record that had a stamp; 0 before the first."""
+        return self._now_s
+
     def at(self, stamp_s: float, boot_s: float | None = None) -> float:
         """Mended time of a record by its stamp, and by the vehicle's own time since boot where it has one."""
         if self.first_stamp_s is None:

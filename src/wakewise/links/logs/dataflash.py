@@ -1,7 +1,9 @@
 """Logs that the autopilot writes itself (.BIN): records that begin with A3 95 and a type, described by FMT records.
 
 The format has no checksums. A record counts as bad where its type was never described, as does a stretch of bytes in
-which no record begins; after one the reader goes on where a record is followed by another.
+which no record begins; after one the reader goes on where a record is followed by another. A record without a time is
+one of the time of the last that had one, as old logs have parameters, events and messages. One of other fields than are
+known is whole, and is counted by its name.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from wakewise.links.logs.gather import SERVOS, Gather, Vessel
+from wakewise.links.logs.identity import firmware_of
 
 HEAD = b"\xa3\x95"
 _FMT_TYPE, _FMT_LENGTH = 128, 89
@@ -23,7 +26,9 @@ _CODES: dict[str, tuple[str, float | None]] = {
     "c": ("h", 0.01), "C": ("H", 0.01), "e": ("i", 0.01), "E": ("I", 0.01), "L": ("i", 1e-7),
     "n": ("4s", None), "N": ("16s", None), "Z": ("64s", None), "a": ("64s", None),
 }  # fmt: skip
-_WANTED = frozenset({"ATT", "RCOU", "RCIN", "CTUN", "BARO", "BAT", "MODE", "ARM", "EV", "PARM", "XKF1"})
+_WANTED = frozenset(
+    {"ATT", "RCOU", "RCIN", "CTUN", "BARO", "BAT", "MODE", "ARM", "EV", "PARM", "XKF1", "MSG", "VER", "BAR2"}
+)
 _ARMED_EVENT, _DISARMED_EVENT = 10, 11
 _MIDDLE_US, _HALF_US = 1500.0, 400.0
 
@@ -111,13 +116,24 @@ def _take(gather: Gather, vessel: Vessel, form: Format, body: bytes) -> None:
     if form.name not in _WANTED:
         return
     fields = form.read(body)
-    stamp_s = 1e-6 * fields["TimeUS"] if "TimeUS" in fields else 1e-3 * fields["TimeMS"]
-    time_s = gather.clock.at(stamp_s)
-    match form.name:
+    time_s = gather.clock.now_s
+    for label, second in (("TimeUS", 1e-6), ("TimeMS", 1e-3)):
+        if label in fields:
+            time_s = gather.clock.at(second * fields[label])
+            break
+    try:
+        _keep(vessel, form.name, time_s, fields)
+    except KeyError:
+        gather.unread[form.name] += 1
+
+
+def _keep(vessel: Vessel, name: str, time_s: float, fields: dict[str, Any]) -> None:
+    """Keep what a record says; KeyError if it lacks a field that is needed."""
+    match name:
         case "ATT":
             vessel.put("attitude", time_s, (_turn(fields[k]) for k in ("Roll", "Pitch", "Yaw")))
         case "RCOU":
-            vessel.put("servo", time_s, (fields.get(f"C{i}", 0) for i in range(1, SERVOS + 1)))
+            vessel.put("servo", time_s, (_output(fields, i) for i in range(1, SERVOS + 1)))
         case "RCIN":
             # ArduSub's channels: pitch, roll, throttle (up), yaw, forward, lateral.
             forward, right, up, turn = ((fields[f"C{i}"] - _MIDDLE_US) / _HALF_US for i in (5, 6, 3, 4))
@@ -125,9 +141,11 @@ def _take(gather: Gather, vessel: Vessel, form: Format, body: bytes) -> None:
         case "CTUN":
             vessel.put("depth CTUN", time_s, (-fields["Alt"],))
         case "BARO":
-            # The first is inside the hull.
-            if fields.get("I", fields.get("Id", 1)) == 1:
+            # The first is inside the hull; old logs have a kind of record for each.
+            if fields.get("I", fields.get("Id", 0)) == 1:
                 vessel.put("depth BARO", time_s, (-fields["Alt"],))
+        case "BAR2":
+            vessel.put("depth BARO", time_s, (-fields["Alt"],))
         case "XKF1":
             # The estimator's first core; the autopilot may change over to another, which MAVLink's position follows.
             if fields.get("C", 0) == 0:
@@ -143,7 +161,23 @@ def _take(gather: Gather, vessel: Vessel, form: Format, body: bytes) -> None:
             if fields["Id"] in (_ARMED_EVENT, _DISARMED_EVENT):
                 vessel.put("armed", time_s, (float(fields["Id"] == _ARMED_EVENT),))
         case "PARM":
-            vessel.parameter(fields["Name"].rstrip(b"\0").decode("ascii"), float(fields["Value"]))
+            vessel.parameter(_text(fields["Name"]), float(fields["Value"]))
+        case "MSG":
+            vessel.firmware = vessel.firmware or firmware_of(_text(fields["Message"]))
+        case "VER":
+            vessel.firmware = firmware_of(_text(fields["FWS"])) or vessel.firmware
+
+
+def _output(fields: dict[str, Any], number: int) -> float:
+    """A servo output by its number from 1; old logs name them otherwise."""
+    found = next((fields[f"{begin}{number}"] for begin in ("C", "Ch", "Chan") if f"{begin}{number}" in fields), 0)
+    return float(found)
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, bytes):
+        raise TypeError
+    return value.partition(b"\0")[0].decode("ascii")
 
 
 def _turn(degrees: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import polars as pl
 
@@ -18,9 +18,11 @@ STEPS, FACTS, PARAMETERS, PAGE = "steps.parquet", "log.json", "parameters.csv", 
 def log_facts(log: VehicleLog, table: LogTable, hindsight: Hindsight | None, why_not: str | None) -> dict[str, Any]:
     """What a log held and what it would have saved, as figures; `why_not` says why there is no hindsight."""
     rows = table.rows
+    lowest = cast("float | None", rows["depth_m"].min())
     facts: dict[str, Any] = {
         "file": log.path.name,
         "format": log.kind,
+        "identity": log.identity.words,
         "system": log.system,
         "other_systems": list(log.others),
         "started_s": log.started_s,
@@ -29,6 +31,7 @@ def log_facts(log: VehicleLog, table: LogTable, hindsight: Hindsight | None, why
         "bad_records": log.bad_records,
         "bad_by_reason": log.bad,
         "bad_bytes": log.bad_bytes,
+        "unread_records": log.unread,
         "cut_short": log.cut_short,
         "clock_jumps": [{"time_s": jump.time_s, "step_s": jump.step_s} for jump in log.jumps],
         "samples": {name: len(series.time_s) for name, series in sorted(log.series.items())},
@@ -36,7 +39,7 @@ def log_facts(log: VehicleLog, table: LogTable, hindsight: Hindsight | None, why
         "rows": len(rows),
         "rate_hz": table.rate_hz,
         "depth_from": table.depth_from,
-        "depth_max_m": rows["depth_m"].max(),
+        "depth_max_m": None if log.identity.is_other else rows["depth_m"].max(),
         "voltage_min_V": rows["voltage_V"].min(),
         "armed_s": float(rows["armed"].fill_null(False).sum()) / table.rate_hz,
         "modes": {
@@ -44,6 +47,8 @@ def log_facts(log: VehicleLog, table: LogTable, hindsight: Hindsight | None, why
             for mode, count in rows["mode"].drop_nulls().value_counts(sort=True, name="count").iter_rows()
         },
     }
+    if log.identity.is_other:
+        facts["height_max_m"] = None if lowest is None else -lowest
     if hindsight is None:
         return facts | {"why_no_hindsight": why_not}
     running = int(hindsight.running.sum())

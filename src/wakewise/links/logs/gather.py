@@ -18,6 +18,7 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.links.logs.clock import Clock, ClockJump
+from wakewise.links.logs.identity import Identity, firmware_of_parameters
 
 SERVOS = 16
 WIDTHS = {"sticks": 4, "servo": SERVOS, "attitude": 3, "position": 3}
@@ -71,6 +72,8 @@ class VehicleLog:
         How many records were bad, by reason; a stretch of bytes that is no record counts as one.
     bad_bytes : int
         Bytes in them.
+    unread : dict
+        How many whole records of a wanted kind had other fields than are known, by kind.
     cut_short : bool
         Whether the file ends within a record.
     series : dict of Series
@@ -80,6 +83,8 @@ class VehicleLog:
     jumps : tuple of ClockJump
     started_s : float or None
         Stamp of the first record in seconds: since 1970 for tlog and mcap, since boot for dataflash.
+    identity : Identity
+        What the vehicle says it is.
     """
 
     path: Path
@@ -94,6 +99,8 @@ class VehicleLog:
     started_s: float | None = None
     system: int | None = None
     others: tuple[int, ...] = ()
+    identity: Identity = field(default_factory=Identity)
+    unread: dict[str, int] = field(default_factory=dict)
 
     @property
     def bad_records(self) -> int:
@@ -123,6 +130,8 @@ class Vessel:
 
     rows: dict[str, list[tuple[float, ...]]] = field(default_factory=dict)
     parameters: dict[str, float] = field(default_factory=dict)
+    beats: Counter[tuple[int, int]] = field(default_factory=Counter)
+    firmware: str | None = None
 
     def put(self, channel: str, time_s: float, values: Iterable[float]) -> None:
         """Keep one sample; a value out of its range, or none, becomes NaN."""
@@ -133,6 +142,18 @@ class Vessel:
         """Keep a parameter under a name that can be one."""
         if is_parameter(name, value):
             self.parameters[name] = value
+
+    def beat(self, mav_type: int, autopilot: int) -> None:
+        """Count what a heartbeat says the vehicle is."""
+        self.beats[mav_type, autopilot] += 1
+
+    @property
+    def identity(self) -> Identity:
+        """By most heartbeats; without any by the firmware's name, or by parameters that only one firmware has."""
+        if self.beats:
+            ((mav_type, autopilot), _) = self.beats.most_common(1)[0]
+            return Identity(mav_type=mav_type, autopilot=autopilot, firmware=self.firmware)
+        return Identity(firmware=self.firmware or firmware_of_parameters(self.parameters))
 
     @property
     def samples(self) -> int:
@@ -148,6 +169,7 @@ class Gather:
         self.records = 0
         self.bad: Counter[str] = Counter()
         self.bad_bytes = 0
+        self.unread: Counter[str] = Counter()
         self.cut_short = False
         self.vessels: dict[int | None, Vessel] = {}
 
@@ -161,9 +183,10 @@ class Gather:
         self.bad_bytes += size
 
     def done(self, path: Path, kind: str) -> VehicleLog:
-        """The log of the system that most is known of."""
+        """The log of the ArduSub, or where none is of the system, that most is known of."""
         self.clock.close()
-        system = max(self.vessels, key=lambda s: self.vessels[s].samples, default=None)
+        held = {s: (vessel.identity.is_ardusub, vessel.samples) for s, vessel in self.vessels.items() if vessel.samples}
+        system = max(held, key=lambda s: held[s], default=None)
         vessel = self.vessels.get(system, Vessel())
         series = {}
         for channel, rows in vessel.rows.items():
@@ -181,5 +204,7 @@ class Gather:
             jumps=tuple(self.clock.jumps),
             started_s=self.clock.first_stamp_s,
             system=system,
+            identity=vessel.identity,
+            unread=dict(self.unread),
             others=tuple(sorted(s for s, v in self.vessels.items() if s is not None and s != system and v.samples)),
         )

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
 from wakewise.links.logs.gather import SERVOS
+from wakewise.links.logs.identity import NO_AUTOPILOT, enumerated
 
 WANTED = frozenset({
     "MANUAL_CONTROL", "SERVO_OUTPUT_RAW", "ATTITUDE", "VFR_HUD", "AHRS2", "SCALED_PRESSURE", "SCALED_PRESSURE2",
@@ -37,6 +38,10 @@ class Told(Protocol):
 
     def parameter(self, name: str, value: float) -> None:
         """Keep a parameter."""
+        ...
+
+    def beat(self, mav_type: int, autopilot: int) -> None:
+        """Keep what a heartbeat says the vehicle is."""
         ...
 
 
@@ -94,6 +99,10 @@ def take(gather: Listener, stamp_s: float, system: int, component: int, name: st
     elif name == "HEARTBEAT":
         vessel.put("armed", time_s, (float(_is_armed(fields["base_mode"])),))
         vessel.put("mode", time_s, (_number(fields["custom_mode"]),))
+        # BlueOS's JSON has the message's own name under `type`, and the vehicle's type beside it.
+        kind = fields.get("mavtype", fields.get("type", name))
+        if kind != name and (autopilot := enumerated("MAV_AUTOPILOT", fields["autopilot"])) != NO_AUTOPILOT:
+            vessel.beat(enumerated("MAV_TYPE", kind), autopilot)
     elif name == "PARAM_VALUE":
         vessel.parameter(_text(fields["param_id"]), _number(fields["param_value"]))
 

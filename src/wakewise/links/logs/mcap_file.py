@@ -18,7 +18,7 @@ from wakewise.links.logs.gather import Gather
 from wakewise.links.logs.mavlink import take
 
 MAGIC = b"\x89MCAP0\r\n"
-_CHANNEL, _MESSAGE, _CHUNK, _DATA_END, _FOOTER = 0x04, 0x05, 0x06, 0x0F, 0x02
+_HEADER, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END, _FOOTER = 0x01, 0x04, 0x05, 0x06, 0x0F, 0x02
 _HEAD = struct.Struct("<BQ")
 _MESSAGE_HEAD = struct.Struct("<HIQQ")
 _TOPIC = re.compile(r"/?mavlink/(\d{1,3})/(\d{1,3})/([A-Z][A-Z0-9_]*)\Z")
@@ -31,6 +31,15 @@ def read_mcap(data: Any) -> Gather:
     gather = Gather()
     _walk(gather, data, len(MAGIC), {}, inside=False)
     return gather
+
+
+def is_ros_bag(data: Any) -> bool:
+    """Whether an MCAP file's header says that its messages are of ROS."""
+    start = len(MAGIC) + _HEAD.size
+    if len(data) < start + 4 or data[len(MAGIC)] != _HEADER:
+        return False
+    (length,) = struct.unpack("<I", data[start : start + 4])
+    return bytes(data[start + 4 : start + 4 + min(length, 4)]) in (b"ros1", b"ros2")
 
 
 def _walk(gather: Gather, data: Any, at: int, topics: dict[int, tuple[int, int, str]], *, inside: bool) -> None:

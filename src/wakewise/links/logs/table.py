@@ -66,7 +66,8 @@ def tabulate(log: VehicleLog, rate_hz: float = RATE_HZ) -> LogTable:
     columns |= _pose(log, depth, turned, time_s)
     columns["armed"] = _held(log, "armed", time_s, 1)[:, 0]
     mode = _held(log, "mode", time_s, 1)[:, 0]
-    columns["mode"] = [None if np.isnan(m) else MODES.get(int(m), f"mode {int(m)}") for m in mode]
+    modes = MODES if log.identity.is_ardusub else {}
+    columns["mode"] = [None if np.isnan(m) else modes.get(int(m), f"mode {int(m)}") for m in mode]
     columns["voltage_V"] = _held(log, "voltage", time_s, 1)[:, 0]
     rows = pl.DataFrame(columns, schema_overrides={"mode": pl.String}).with_columns(pl.col(pl.Float64).fill_nan(None))
     return LogTable(rows=rows.with_columns(pl.col("armed") > 0.5), rate_hz=rate, depth_from=source)
