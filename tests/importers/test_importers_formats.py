@@ -246,7 +246,8 @@ def test_stonefish_is_frd_and_hands_turn_the_thrust(tmp_path: Path) -> None:
     assert (down.max_forward_N, down.max_reverse_N, down.time_constant_s) == (80.0, 80.0, 0.1)
     left = imported(tmp_path, STONEFISH.replace("THRUSTER", FORWARD.replace("RIGHT", "false")), "sub.scn").thrusters[0]
     np.testing.assert_allclose(left.axis_B, [-1, 0, 0], atol=1e-12)
-    assert (left.max_forward_N, left.max_reverse_N) == (30.0, 50.0)
+    # A left-handed rotor pushes the other way as hard: its table is of its own turning.
+    assert (left.max_forward_N, left.max_reverse_N) == (50.0, 30.0)
     assert draft.notes[0].startswith("frame: FRD")
 
 

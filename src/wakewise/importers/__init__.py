@@ -4,7 +4,7 @@ Nothing of a file is executed, and nothing outside what it names is read. What c
 never guessed.
 
 Start reading in `read.py` (`import_vehicle`: which reader takes a file) and `find.py` (a vehicle by library name, by
-path, by format). Readers: `urdf.py`, `sdf.py`, `stonefish.py`, `matrices.py` and `yamls.py` with
+path, by format). Readers: `urdf.py`, `sdf.py`, `stonefish.py` with `stonefish_thrusters.py`, `matrices.py` and `yamls.py` with
 `yaml_parameters.py`; formats from outside are found through the entry points `wakewise.vehicle_formats`. Their
 helpers: `layouts.py` (thrusters in lists, with `angles.py`) and `plausible.py` (what any vehicle must fulfil),
 `xacro*.py`, `expressions.py` and `scopes.py` expand macros, `xml.py` and `packages.py` find files,

@@ -29,10 +29,11 @@ _MOVING = frozenset(
 
 @dataclass(eq=False)
 class Shape:
-    """A collision shape with a known volume, or None for a mesh; `X_LS` is its pose in its link."""
+    """A collision shape; `X_LS` is its pose in its link, `half_m` half the box round it. A mesh has neither measure."""
 
     X_LS: Pose
     volume_m3: float | None
+    half_m: Array | None = None
 
 
 @dataclass(eq=False)
@@ -141,10 +142,29 @@ def shape_volume(tag: str, sizes: dict[str, Array]) -> float | None:
             return None
 
 
-def geometry_volume(geometry: Element | None) -> float | None:
-    """Volume of a `<geometry>` of URDF (attributes) or SDF (elements)."""
+def shape_half(tag: str, sizes: dict[str, Array]) -> Array | None:
+    """Half the sides of the box round a primitive shape, whose axis is z; None for a mesh or anything else."""
+    radius = float(sizes["radius"][0]) if "radius" in sizes else 0.0
+    length = float(sizes["length"][0]) if "length" in sizes else 0.0
+    match tag:
+        case "box" if "size" in sizes:
+            return 0.5 * sizes["size"]
+        case "sphere":
+            return np.full(3, radius)
+        case "cylinder":
+            return np.array([radius, radius, 0.5 * length])
+        case "capsule":
+            return np.array([radius, radius, 0.5 * length + radius])
+        case "ellipsoid" if "radii" in sizes:
+            return sizes["radii"]
+        case _:
+            return None
+
+
+def collision_shape(X_LS: Pose, geometry: Element | None) -> Shape:
+    """Shape of a `<geometry>` of URDF (attributes) or SDF (elements)."""
     if geometry is None or not geometry.children:
-        return None
+        return Shape(X_LS, None)
     shape = geometry.children[0]
     counts = {"size": 3, "radii": 3, "radius": 1, "length": 1}
     sizes: dict[str, Array] = {}
@@ -152,7 +172,7 @@ def geometry_volume(geometry: Element | None) -> float | None:
         text = shape.attributes.get(key) or shape.value(key)
         if text is not None:
             sizes[key] = numbers(text, shape.place, f"{shape.tag} {key}", count)
-    return shape_volume(shape.tag, sizes)
+    return Shape(X_LS, shape_volume(shape.tag, sizes), shape_half(shape.tag, sizes))
 
 
 def read_mass(bodies: Bodies, found: Found) -> None:

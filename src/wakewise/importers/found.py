@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -132,6 +133,7 @@ def make_draft(found: Found, convention: str, thrust: str) -> VehicleDraft:
     notes += found.notes
     if found.p_G_m is not None and found.p_buoyancy_m is not None:
         notes += _stability(found, frame)
+    notes += _unfilled(found)
     thrusters = tuple(_thruster(t, thrust, turn=turn) for t in found.thrusters)
     try:
         draft = VehicleDraft(
@@ -180,6 +182,23 @@ def symmetrised(matrix: Array, notes: list[str], what: str = "added mass") -> Ar
     return 0.5 * (matrix + matrix.T)
 
 
+def _unfilled(found: Found) -> list[str]:
+    """Take substitutions that nothing filled in, such as $(param robot_name), out of names; say which were there."""
+    left: dict[str, None] = {}
+
+    def plain(name: str, otherwise: str) -> str:
+        left.update(dict.fromkeys(_SUBSTITUTION.findall(name)))
+        return _SUBSTITUTION.sub("", name).strip("/_-: ") or otherwise
+
+    found.name = plain(found.name, found.file.stem)
+    for i, thruster in enumerate(found.thrusters):
+        thruster.name = plain(thruster.name, f"thruster{i}")
+    if not left:
+        return []
+    return [f"names: {', '.join(list(left)[:6])} has no value in the file and is left out of names"]
+
+
+_SUBSTITUTION = re.compile(r"\$\([^)]*\)|\$\{[^}]*\}")
 _FRAME_WORDS = {"FLU": "FLU (x forward, y left, z up), turned to FRD", "FRD": "FRD (x forward, y right, z down)"}
 
 

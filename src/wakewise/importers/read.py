@@ -13,6 +13,7 @@ from wakewise.errors import InputError
 from wakewise.importers.bodies import Bodies, read_camera, read_displacement, read_mass
 from wakewise.importers.found import FRAME_CHOICES, THRUST_CHOICES, Found, make_draft, wrench_rows_to_frd
 from wakewise.importers.matrices import read_matrix_only, read_yaml
+from wakewise.importers.outline import read_outline
 from wakewise.importers.packages import Folders
 from wakewise.importers.plausible import question_rank, require_count, require_force_columns
 from wakewise.importers.plugins import read_thrusters, words
@@ -109,7 +110,7 @@ def _read(path: Path, packages: Mapping[str, Path], arguments: Mapping[str, str]
         raise InputError(f"{path}: has no xacro arguments, {', '.join(arguments)} cannot be set")
     if root.tag == "scenario" or (root.tag == "robot" and _is_stonefish(root)):
         found = Found(path.stem, "Stonefish", path, "FRD", "by format: Stonefish worlds are NED and its bodies FRD")
-        read_stonefish(root, folders, arguments, found)
+        read_stonefish(root, folders, arguments, macros, found)
     elif root.tag == "robot":
         if not root.all("link") and macros:
             raise PlacedError(
@@ -126,7 +127,8 @@ def _read(path: Path, packages: Mapping[str, Path], arguments: Mapping[str, str]
         )
     found.notes[:0] = notes
     if not found.thrusters and found.matrix is None and found.mass_kg is None and found.added_mass is None:
-        raise PlacedError(f"{root.place}: holds neither thrusters nor mass nor hydrodynamics{left_out(found.notes)}")
+        why = left_out(found.notes) or next((f" ({note})" for note in found.notes if note.startswith("mass: ")), "")
+        raise PlacedError(f"{root.place}: holds neither thrusters nor mass nor hydrodynamics{why}")
     if not found.thrusters:
         found.notes.append("no thruster was found in the file")
     return found
@@ -151,6 +153,7 @@ def _from_bodies(bodies: Bodies, kind: str, path: Path) -> Found:
     if any("hydrodynamics" in words(p) or "buoyancy" in words(p) for p in bodies.plugins):
         read_displacement(bodies, found)
     read_camera(bodies, found)
+    read_outline(bodies, found)
     return found
 
 

@@ -11,9 +11,8 @@ from wakewise.importers.bodies import (
     Bodies,
     Joint,
     Link,
-    Shape,
     checked_mass,
-    geometry_volume,
+    collision_shape,
     inertia_matrix,
 )
 from wakewise.importers.packages import Folders
@@ -226,7 +225,7 @@ def _link(element: Element, name: str, X_BL: Pose) -> Link:
             link.added_mass = _fluid_added_mass(fluid)
     for collision in element.all("collision"):
         pose, _ = pose_element(collision)
-        link.shapes.append(Shape(pose, geometry_volume(collision.first("geometry"))))
+        link.shapes.append(collision_shape(pose, collision.first("geometry")))
     return link
 
 

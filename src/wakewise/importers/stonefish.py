@@ -5,27 +5,29 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.importers.bodies import Bodies, Joint, Link, checked_mass, read_mass
 from wakewise.importers.expressions import evaluate
-from wakewise.importers.found import Found, FoundThruster
+from wakewise.importers.found import Found
 from wakewise.importers.packages import Folders
-from wakewise.importers.plugins import short
+from wakewise.importers.stonefish_thrusters import count, read_thrusters
 from wakewise.importers.urdf import origin
-from wakewise.importers.xml import Element, PlacedError, number, numbers, parse_xml, read_text
+from wakewise.importers.xml import Element, Place, PlacedError, number, numbers, parse_xml, read_text
 
-RULE = (
-    "a positive setpoint pushes along +x of the thruster's frame, turned round by a left-handed propeller "
-    "and by an inverted setpoint (Stonefish's Thruster)"
-)
 MAX_INCLUDES = 60
+_DEEPEST = 8
 _SUBSTITUTION = re.compile(r"\$\((arg|find|param)\s+([^)\s]+)\s*\)")
 _EXPRESSION = re.compile(r"\$\{([^}]*)\}")
-_THRUSTERS = frozenset({"thruster", "simple_thruster", "simplethruster"})
+_CENTRED = frozenset({"box", "cylinder", "sphere", "torus"})
+"""Shapes whose centre of mass is their origin."""
+_SMALL = 0.02
+"""Share of the mass whose centre or inertia may be unknown."""
 
 
 class Scenario:
@@ -105,8 +107,10 @@ def _evaluated(match: re.Match[str]) -> str:
         return match[0]
 
 
-def read_stonefish(root: Element, folders: Folders, arguments: Mapping[str, str], found: Found) -> None:
-    """Fill in what a scenario says about its robot.
+def read_stonefish(
+    root: Element, folders: Folders, arguments: Mapping[str, str], macros: list[str], found: Found
+) -> None:
+    """Fill in what a scenario says about its robot; `macros` are those of xacro that the file defines.
 
     Raises
     ------
@@ -117,35 +121,41 @@ def read_stonefish(root: Element, folders: Folders, arguments: Mapping[str, str]
     whole = Element("scenario", {}, root.place, [root]) if root.tag == "robot" else root
     robots = scenario.robots(whole, dict(arguments))
     if not robots:
-        left_out = next((note for note in found.notes if note.startswith("include left out")), "")
-        raise PlacedError(f"{root.place}: scenario holds no robot" + (f" ({left_out})" if left_out else ""))
-    robot = max(robots, key=lambda r: sum(a.attributes.get("type") in _THRUSTERS for a in r.all("actuator")))
+        why = next((note for note in found.notes if note.startswith("include left out")), "")
+        if macros:
+            why = f"it defines the macros {', '.join(macros)[:120]} and calls none with one; import the file that does"
+        raise PlacedError(f"{root.place}: scenario holds no robot" + (f" ({why})" if why else ""))
+    robot = max(robots, key=count)
     if len(robots) > 1:
         found.notes.append(f"robot {robot.attributes.get('name')}: taken out of {len(robots)} in the scenario")
     found.name = robot.attributes.get("name", "") or found.name
-    bodies = _bodies(robot)
-    read_mass(bodies, found)
+    weights: dict[str, _Weight] = {}
+    bodies = _bodies(robot, weights)
+    _mass(bodies, weights, found)
     _hydrodynamics(robot, found)
-    for actuator in robot.all("actuator"):
-        if actuator.attributes.get("type") in _THRUSTERS:
-            found.thrusters.append(_thruster(actuator, bodies))
-    found.thrust_rule = RULE
-    if found.thrusters:
-        found.derived["thruster_layout"] = f"{found.kind} {found.file.name}: actuators of type thruster"
+    read_thrusters(robot, bodies, _density(root), found)
     _camera(robot, bodies, found)
     if found.mass_kg is not None and found.inertia_kg_m2 is None:
         found.notes.append("inertia: left to Stonefish, which computes it from meshes; not in the file")
 
 
-def _bodies(robot: Element) -> Bodies:
+def _density(root: Element) -> float | None:
+    """Density of the scenario's water, kg/m^3."""
+    water = next((e for e in root.walk() if e.tag == "water" and "density" in e.attributes), None)
+    return None if water is None else number(water.attributes["density"], water.place, "density of the water")
+
+
+def _bodies(robot: Element, weights: dict[str, _Weight]) -> Bodies:
     base_element = robot.first("base_link")
     elements = [e for e in robot.children if e.tag in {"base_link", "link"}]
     if not elements:
         raise PlacedError(f"{robot.place}: robot holds no link")
     base = (base_element or elements[0]).attributes.get("name", "base_link")
-    links = {
-        e.attributes.get("name", f"link{i}"): _link(e, e.attributes.get("name", "")) for i, e in enumerate(elements)
-    }
+    links: dict[str, Link] = {}
+    for i, element in enumerate(elements):
+        name = element.attributes.get("name", f"link{i}")
+        links[name] = Link(element.attributes.get("name", ""), element.place)
+        weights[name] = _weight(element, name)
     steps: dict[str, tuple[str, Pose]] = {}
     for joint in robot.all("joint"):
         parent, child = joint.first("parent"), joint.first("child")
@@ -163,74 +173,91 @@ def _bodies(robot: Element) -> Bodies:
     return Bodies(robot.attributes.get("name", "robot"), base, links, joints, [], [])
 
 
-def _link(element: Element, name: str) -> Link:
-    link = Link(name, element.place)
+@dataclass(eq=False)
+class _Weight:
+    """What a body or a part of it weighs, in its own frame; None where Stonefish computes it from shape and material.
+
+    `open_kg` is the part of the mass whose centre is not known, `spread_kg` that whose inertia is not, and `unstated`
+    names the parts that state no mass.
+    """
+
+    place: Place
+    mass_kg: float = 0.0
+    centre_m: Array = field(default_factory=lambda: np.zeros(3))
+    inertia_kg_m2: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    open_kg: float = 0.0
+    spread_kg: float = 0.0
+    unstated: list[str] = field(default_factory=list)
+
+
+def _weight(element: Element, name: str, depth: int = 0) -> _Weight:
+    """Weight of one solid; a compound is the sum of its parts, each at its transform, and has no mass of its own."""
+    if element.attributes.get("type") == "compound" and depth < _DEEPEST:
+        return _compound(element, name, depth)
     mass, inertia, centre = element.first("mass"), element.first("inertia"), element.first("cg")
-    if mass is not None:
-        link.place = mass.place
-        link.mass_kg = checked_mass(mass.attributes.get("value"), mass.place, name)
-    at = origin(centre)
-    link.p_LG_m = at.p_m
+    weight = _Weight(element.place if mass is None else mass.place)
+    value = 0.0 if mass is None else checked_mass(mass.attributes.get("value"), mass.place, name)
+    if value == 0.0:
+        weight.unstated.append(name)
+        return weight
+    weight.mass_kg = value
+    if centre is None and element.attributes.get("type") not in _CENTRED:
+        weight.open_kg = value
+    at = origin(element.first("origin") if centre is None and weight.open_kg == 0.0 else centre)
+    weight.centre_m = at.p_m
     if inertia is not None and "xyz" in inertia.attributes:
         moments = numbers(inertia.attributes["xyz"], inertia.place, "inertia", 3)
-        link.inertia_kg_m2 = at.R @ np.diag(moments) @ at.R.T
-    return link
+        weight.inertia_kg_m2 = at.R @ np.diag(moments) @ at.R.T
+    else:
+        weight.spread_kg = value
+    return weight
 
 
-def _thruster(actuator: Element, bodies: Bodies) -> FoundThruster:
-    name = actuator.attributes.get("name", "") or f"line {actuator.place.line}"
-    link_element = actuator.first("link")
-    link = bodies.link(link_element.attributes.get("name", "")) if link_element is not None else None
-    if link is None:
-        raise PlacedError(f"{actuator.place}: thruster {name} is on no link of the robot")
-    X_BT = link.X_BL @ origin(actuator.first("origin"))
-    specs, propeller = actuator.first("specs"), actuator.first("propeller")
-    sign = 1.0
-    if specs is not None and _true(specs.attributes.get("inverted_setpoint") or specs.attributes.get("inverted")):
-        sign = -sign
-    thruster = FoundThruster(short(name), X_BT.p_m, sign * X_BT.R[:, 0], actuator.place, X_BT.R)
-    if propeller is not None:
-        diameter = propeller.attributes.get("diameter")
-        if diameter is not None:
-            thruster.disk_area_m2 = 0.25 * math.pi * number(diameter, propeller.place, "diameter") ** 2
-        model = actuator.first("thrust_model")
-        if not _true(propeller.attributes.get("right", "true")) and (
-            model is None or model.attributes.get("type") != "fluid_dynamics"
-        ):
-            thruster.axis = -thruster.axis
-            sign = -sign
-    _limits(actuator, thruster, flipped=sign < 0.0)
-    return thruster
+def _compound(element: Element, name: str, depth: int) -> _Weight:
+    whole = _Weight(element.place)
+    parts: list[tuple[_Weight, Pose]] = []
+    for i, part in enumerate(e for e in element.children if e.tag in {"external_part", "internal_part"}):
+        one = _weight(part, f"{name}/{part.attributes.get('name', f'part{i}')}", depth + 1)
+        parts.append((one, origin(part.first("compound_transform"))))
+        whole.mass_kg += one.mass_kg
+        whole.open_kg += one.open_kg
+        whole.spread_kg += one.spread_kg
+        whole.unstated += one.unstated
+    if not parts:
+        whole.unstated.append(name)
+    if whole.mass_kg > 0.0:
+        whole.centre_m = sum((w.mass_kg * X.apply(w.centre_m) for w, X in parts), np.zeros(3)) / whole.mass_kg
+    for w, X in parts:
+        arm = X.apply(w.centre_m) - whole.centre_m
+        whole.inertia_kg_m2 += X.R @ w.inertia_kg_m2 @ X.R.T
+        whole.inertia_kg_m2 += w.mass_kg * (float(arm @ arm) * np.eye(3) - np.outer(arm, arm))
+    return whole
 
 
-def _limits(actuator: Element, thruster: FoundThruster, *, flipped: bool) -> None:
-    """Limits from a table of thrust, and from the curve at the largest setpoint; lag from a first-order rotor."""
-    model, specs, rotor = actuator.first("thrust_model"), actuator.first("specs"), actuator.first("rotor_dynamics")
-    if rotor is not None:
-        kind = rotor.attributes.get("type")
-        constant = rotor.first("time_constant")
-        if kind == "zero_order":
-            thruster.time_constant_s = 0.0
-        elif kind == "first_order" and constant is not None:
-            thruster.time_constant_s = number(constant.attributes.get("value", ""), constant.place, "time_constant")
-    if model is None or specs is None:
+def _mass(bodies: Bodies, weights: dict[str, _Weight], found: Found) -> None:
+    """Mass of all links, if all state one: what Stonefish computes from meshes is not guessed from what is stated."""
+    unstated = [part for weight in weights.values() for part in weight.unstated]
+    total = sum(weight.mass_kg for weight in weights.values())
+    if unstated:
+        stated = f"; what is stated adds up to {total:.6g} kg, which is not the vehicle's" if total else ""
+        found.notes.append(
+            f"mass: {', '.join(unstated[:6])}{' ...' if len(unstated) > 6 else ''} states none, Stonefish computes it "
+            f"from volume and material{stated}"
+        )
         return
-    text = specs.attributes.get("max_setpoint")
-    top = None if text is None else abs(number(text, specs.place, "max_setpoint"))
-    table_in, table_out = model.first("input"), model.first("output")
-    forward: float | None = None
-    reverse: float | None = None
-    if table_in is not None and table_out is not None and top is not None:
-        x = numbers(table_in.attributes.get("value", ""), table_in.place, "input")
-        y = numbers(table_out.attributes.get("value", ""), table_out.place, "output", len(x))
-        if len(x) and np.all(np.diff(x) > 0.0):
-            forward, reverse = float(np.interp(top, x, y)), -float(np.interp(-top, x, y))
-    elif model.attributes.get("type") in {"quadratic", "deadband"} and top is not None:
-        coefficients = {e.tag: number(e.attributes.get("value", ""), e.place, e.tag) for e in model.children}
-        if "thrust_coeff" in coefficients:
-            forward = reverse = coefficients["thrust_coeff"] * top**2
-    if forward is not None and reverse is not None and forward >= 0.0 and reverse >= 0.0:
-        thruster.max_forward_N, thruster.max_reverse_N = (reverse, forward) if flipped else (forward, reverse)
+    for name, weight in weights.items():
+        link = bodies.links[name]
+        link.place, link.mass_kg, link.p_LG_m = weight.place, weight.mass_kg, weight.centre_m
+        if weight.spread_kg <= _SMALL * weight.mass_kg:
+            link.inertia_kg_m2 = weight.inertia_kg_m2
+    read_mass(bodies, found)
+    unknown = sum(weight.open_kg for weight in weights.values())
+    if unknown > _SMALL * total and found.p_G_m is not None:
+        found.p_G_m = found.inertia_kg_m2 = None
+        found.derived.pop("inertia", None)
+        found.notes.append(
+            f"centre of gravity: {unknown:.6g} kg of {total:.6g} kg state no cg, Stonefish computes it from meshes"
+        )
 
 
 def _hydrodynamics(robot: Element, found: Found) -> None:
@@ -259,7 +286,3 @@ def _camera(robot: Element, bodies: Bodies, found: Found) -> None:
             found.notes.append(f"camera: {sensor.attributes.get('name', 'camera')}")
             found.derived["camera_mount"] = f"{found.kind} {found.file.name}: sensor"
             return
-
-
-def _true(text: str | None) -> bool:
-    return (text or "").strip().lower() in {"true", "1", "yes"}

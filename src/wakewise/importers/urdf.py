@@ -14,9 +14,8 @@ from wakewise.importers.bodies import (
     Camera,
     Joint,
     Link,
-    Shape,
     checked_mass,
-    geometry_volume,
+    collision_shape,
     inertia_matrix,
     pose_of,
 )
@@ -101,7 +100,7 @@ def _link(element: Element, name: str) -> Link:
             values = {k: number(v, inertia.place, f"inertia {k} of link {name}") for k, v in inertia.attributes.items()}
             link.inertia_kg_m2 = at.R @ inertia_matrix(values) @ at.R.T
     for collision in element.all("collision"):
-        link.shapes.append(Shape(origin(collision.first("origin")), geometry_volume(collision.first("geometry"))))
+        link.shapes.append(collision_shape(origin(collision.first("origin")), collision.first("geometry")))
     return link
 
 
