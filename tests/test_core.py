@@ -1,6 +1,7 @@
 """The core works where none of the extras' packages can be imported, and what needs one says so before it begins."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -23,9 +24,21 @@ sys.meta_path.insert(0, Blocked())
 
 
 def without_extras(script: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run Python lines in a process of their own, in which no package of an extra can be imported."""
+    """Run Python lines in a process of their own, in which no package of an extra can be imported.
+
+    Processes that it starts are as it is.
+    """
+    place = folder / "blocked"
+    place.mkdir()
+    (place / "sitecustomize.py").write_text(_WITHOUT)
     return subprocess.run(
-        [sys.executable, "-c", _WITHOUT + script], cwd=folder, capture_output=True, text=True, timeout=600, check=False
+        [sys.executable, "-c", f"import sys\n{script}"],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(place), os.environ.get("PYTHONPATH", "")])},
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
     )
 
 
@@ -68,6 +81,33 @@ assert steps["target_speed_mean_m_s"].max() > 0.0
         tmp_path,
     )
     assert found.returncode == 0, found.stderr
+
+
+@pytest.mark.slow
+def test_a_campaign_of_flights_is_made_without_extras(tmp_path):
+    """`stages: fly` takes no photograph: its trials are flown, listed and put in a table; `stages: model` is refused."""
+    text = (
+        "name: core\nmethods: [dp]\ntargets: [brain]\nworlds: [still-tank]\nseeds: 1\nretries: 0\n"
+        "scenario: {mission.elevations_deg: [40], mission.views: [3], target.points: 60}\n"
+    )
+    (tmp_path / "fly.yaml").write_text(text + "stages: fly\n")
+    (tmp_path / "model.yaml").write_text(text + "stages: model\n")
+    found = without_extras(
+        """
+from wakewise.cli.main import run
+assert run("campaign run model.yaml --out model".split()) == 2
+assert run("campaign run fly.yaml --out fly".split()) == 0
+assert run("campaign table fly --write fly.csv --json".split()) == 0
+""",
+        tmp_path,
+    )
+    assert found.returncode == 0, found.stderr
+    assert "a campaign of `stages: model` needs" in found.stderr
+    assert not (tmp_path / "model").exists()
+    (trial,) = (tmp_path / "fly" / "trials").glob("[!.]*")
+    assert (trial / "work" / "steps.parquet").is_file()
+    figures = json.loads((trial / "figures.json").read_text())["figures"]
+    assert figures["target_speed_mean_m_s"] > 0.0
 
 
 @pytest.mark.slow
@@ -137,7 +177,7 @@ def test_a_command_says_in_one_line_which_extra_it_needs(words, extras, tmp_path
     assert found.returncode == 2, found.stderr
     (line,) = found.stderr.strip().splitlines()
     assert line.startswith("wakewise: ")
-    assert f"pip install 'wakewise[{extras}]', or from a clone .venv/bin/pip install -e '.[{extras}]'" in line
+    assert f"pip install -e '.[{extras}]' (in the clone's folder)" in line
     assert not (tmp_path / "runs").exists()
 
 

@@ -26,7 +26,7 @@ def test_the_extras_are_those_of_the_project_file():
 
 
 def test_all_that_is_missing_is_said_at_once(monkeypatch):
-    """Each package once, each extra that lacks something, both ways to install."""
+    """Each package once, each extra that lacks something, and how they are installed."""
     monkeypatch.setattr(extras, "_is_here", lambda module: module not in ("cv2", "foxglove"))
     assert not has("photos")
     assert not has("logs")
@@ -34,8 +34,7 @@ def test_all_that_is_missing_is_said_at_once(monkeypatch):
         need("wakewise scan", "photos", "reports", "logs")
     assert str(refusal.value) == (
         "wakewise scan needs opencv-python-headless and foxglove-sdk, which are not installed: "
-        "pip install 'wakewise[photos,reports,logs]', "
-        "or from a clone .venv/bin/pip install -e '.[photos,reports,logs]'"
+        "pip install -e '.[photos,reports,logs]' (in the clone's folder)"
     )
     need("a neural field", "nerf")
     need("a cloud", "photos", only=("embreex",))
@@ -44,7 +43,7 @@ def test_all_that_is_missing_is_said_at_once(monkeypatch):
 def test_a_failed_import_names_the_extra_that_holds_the_module():
     """The preferred one where several do; none for what belongs to no extra."""
     fault = ModuleNotFoundError("No module named 'cv2.aruco'", name="cv2.aruco")
-    assert "wakewise[photos]" in str(missing_extra("x", fault))
-    assert "wakewise[reports]" in str(missing_extra("x", fault, "reports"))
+    assert "'.[photos]'" in str(missing_extra("x", fault))
+    assert "'.[reports]'" in str(missing_extra("x", fault, "reports"))
     assert missing_extra("x", ModuleNotFoundError("No module named 'tank'", name="tank")) is None
     assert missing_extra("x", ImportError("libGL.so.1: cannot open")) is None

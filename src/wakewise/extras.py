@@ -1,4 +1,4 @@
-"""Packages that only some of Wakewise needs, by the name under which pip installs them: `wakewise[photos]`.
+"""Packages that only some of Wakewise needs, by the name under which pip installs them: `.[photos]` in a clone.
 
 The core plans, flies and measures water without them, and runs where some of them have no wheel. What needs one says
 so before it begins (`need`), in one line; rooms say it where they are entered (`wakewise.doors`).
@@ -102,5 +102,5 @@ def _is_here(module: str) -> bool:
 
 
 def how_to_install(extras: str) -> str:
-    """What to type for some of the package's extras, parted by commas."""
-    return f"pip install 'wakewise[{extras}]', or from a clone .venv/bin/pip install -e '.[{extras}]'"
+    """What to type in the clone's folder for some of the package's extras, parted by commas."""
+    return f"pip install -e '.[{extras}]' (in the clone's folder)"

@@ -64,7 +64,7 @@ def test_missing_torch_is_one_line_with_the_remedy(folder, capsys, monkeypatch):
     """Exit code 2, and what to install."""
     monkeypatch.setattr(extras, "_is_here", lambda module: module != "torch")
     line = said(capsys, 2, "nerf", folder)
-    assert line.startswith("wakewise: wakewise nerf needs torch, which is not installed: pip install 'wakewise[nerf]'")
+    assert line.startswith("wakewise: wakewise nerf needs torch, which is not installed: pip install -e '.[nerf]'")
 
 
 def test_what_cannot_be_is_one_line(folder, tmp_path, capsys):

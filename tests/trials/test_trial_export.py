@@ -159,7 +159,7 @@ def test_a_bag_without_rosbags_names_the_extra(capsys: Capsys, trial: Path, monk
     """Exit code 2 and how to install it."""
     monkeypatch.setattr("wakewise.extras._is_here", lambda module: module != "rosbags")
     assert run(["export", str(trial), "--to", "rosbag2"]) == 2
-    assert "pip install 'wakewise[ros]'" in capsys.readouterr().err
+    assert "pip install -e '.[ros]'" in capsys.readouterr().err
     assert not (trial / "export").exists()
 
 
