@@ -89,7 +89,7 @@ def test_bluerov2_xacro_and_sdf_agree(name: str, count: int, rank: int) -> None:
     ratio = np.diag(xacro.quadratic_damping) / np.diag(sdf.quadratic_damping)
     # 998 against 1000 kg/m3 of water.
     np.testing.assert_allclose(ratio, 1.0 if count == 8 else 1000.0 / 998.0, rtol=2e-4)
-    assert xacro.missing == sdf.missing == ("size", "camera mount", "camera field of view", "thruster lag")
+    assert xacro.missing == sdf.missing == ("camera mount", "camera field of view", "thruster lag")
 
 
 def test_heavy_thrusters_push_as_ardusub_expects() -> None:
