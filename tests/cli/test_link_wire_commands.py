@@ -16,6 +16,7 @@ pytest.importorskip("pymavlink", reason="the extra `links` is not installed")
 pytest.importorskip("lupa", reason="the extra `links` is not installed")
 
 from wakewise.cli.main import run
+from wakewise.links.ardusub.protocol import SCRIPT_VERSION
 from wakewise.links.ardusub.script import parameters_text, script_text
 from wakewise.links.autopilot.rim import Embedded, Link
 from wakewise.links.autopilot.rim import run as run_stand_in
@@ -51,7 +52,7 @@ def test_the_script_goes_onto_an_autopilot_and_starts(stand_in: tuple[StandIn, s
     autopilot, where = stand_in
     assert run(["link", "script", "--upload", where, "--start", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
-    assert said == {"version": 1, "uploaded": "/APM/scripts/wakewise.lua", "written": []}
+    assert said == {"version": SCRIPT_VERSION, "uploaded": "/APM/scripts/wakewise.lua", "written": []}
     until = time.monotonic() + 10.0
     while autopilot.parameters.get("WKW_ENABLE") is None and time.monotonic() < until:
         time.sleep(0.05)

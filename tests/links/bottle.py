@@ -10,6 +10,7 @@ import numpy as np
 
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState
+from wakewise.links.ardusub.buttons import BUTTON_PARAMETERS
 from wakewise.links.ardusub.engagement import Limits
 from wakewise.links.ardusub.journal import Journal
 from wakewise.links.ardusub.listening import Said
@@ -71,7 +72,7 @@ class Bottle:
         )
         self.warden.target_W_m = np.array([1.0, 0.0, 2.0])
         self.warden.begin()
-        self.parameter("MOT_1_DIRECTION", 1.0)
+        self.parameters()
         self._step = 0
 
     def say(self, name: str, /, system: int = 1, component: int = 1, **fields: Any) -> None:
@@ -81,6 +82,12 @@ class Bottle:
     def parameter(self, name: str, value: float) -> None:
         """The autopilot says what a parameter is."""
         self.say("PARAM_VALUE", param_id=name, param_value=value, param_type=9, param_count=900, param_index=1)
+
+    def parameters(self) -> None:
+        """All that the warden asks for: the motor as it should be, and no button of the autopilot's."""
+        self.parameter("MOT_1_DIRECTION", 1.0)
+        for name in BUTTON_PARAMETERS:
+            self.parameter(name, 0.0)
 
     def beat(self) -> None:
         """The autopilot's heartbeat."""

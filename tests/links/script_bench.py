@@ -44,6 +44,7 @@ arming = {}
 function arming:is_armed() return bench.armed() end
 vehicle = {}
 function vehicle:get_mode() return bench.mode() end
+function vehicle:set_mode(mode) return bench.set_mode(mode) end
 SRV_Channels = {}
 function SRV_Channels:find_channel(func) return bench.find_channel(func) end
 function SRV_Channels:set_output_pwm_chan_timeout(channel, pwm, ms) bench.override(channel, pwm, ms) end
@@ -67,6 +68,9 @@ class Bench:
     floats: dict[str, float] = field(default_factory=dict)
     inbox: list[bytes] = field(default_factory=list)
     registered: list[int] = field(default_factory=list)
+    modes: list[int] = field(default_factory=list)
+    """Modes that the script set."""
+    refused_modes: tuple[int, ...] = ()
     _update: Any = None
     _wait_ms: int = 0
 
@@ -86,6 +90,7 @@ class Bench:
             "receive": lambda: self.inbox.pop(0).decode("latin-1") if self.inbox else None,
             "armed": lambda: self.armed,
             "mode": lambda: self.mode,
+            "set_mode": self._set_mode,
             "find_channel": self._find,
             "override": self._override,
         }
@@ -98,6 +103,13 @@ class Bench:
 
     def _save(self, name: str, value: float) -> bool:
         self.parameters[name] = float(value)
+        return True
+
+    def _set_mode(self, mode: int) -> bool:
+        self.modes.append(mode)
+        if mode in self.refused_modes:
+            return False
+        self.mode = mode
         return True
 
     def _find(self, function: int) -> int | None:

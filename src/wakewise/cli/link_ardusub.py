@@ -87,7 +87,8 @@ Buttons = Annotated[
         "--buttons",
         metavar="WHAT=N,...",
         help="Buttons of the pilot's sticks, by number from 0: engage (which also releases), capture, scan, hold, "
-        "operator, precise, gain_up, gain_down. Give them no function on the autopilot.",
+        "operator, precise, gain_up, gain_down. Those at which the autopilot itself acts (BTNn_FUNCTION) are refused; "
+        "on a fresh ArduSub 0 and 15 are free.",
     ),
 ]
 Camera = Annotated[
@@ -149,12 +150,13 @@ def ardusub(
         raise InputError("--check, --motor-test: one after the other, give one")
     if motors is not None and not motor_test:
         raise InputError("--motors: goes with --motor-test")
+    meant = _buttons(buttons)
     if params is not None:
-        check_vehicle(connection, vehicle, system, params, motor_results, json=json)
+        check_vehicle(connection, vehicle, system, params, motor_results, buttons=meant, json=json)
         return
     need("wakewise link ardusub", "links", only=("pymavlink",))
     if check:
-        check_vehicle(connection, vehicle, system, None, motor_results, json=json)
+        check_vehicle(connection, vehicle, system, None, motor_results, buttons=meant, json=json)
         return
     if motor_test:
         test_vehicle_motors(connection, vehicle, system, motors, motor_results, json=json)
@@ -177,7 +179,7 @@ def ardusub(
     limits = Limits(depth_m=(low, high), distance_m=fence, battery_V=battery)
     wardens: dict[str, Any] = {
         "limits": limits,
-        "buttons": _buttons(buttons),
+        "buttons": meant,
         "listen_only": listen_only,
         "system": system,
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -52,7 +53,14 @@ _MARKS = {"go": "[green]go[/]", "no-go": "[bold red]no-go[/]", "unknown": "[yell
 
 
 def check_vehicle(
-    connection: str, vehicle: str, system: int, params: Path | None, motor_results: Path, *, json: bool
+    connection: str,
+    vehicle: str,
+    system: int,
+    params: Path | None,
+    motor_results: Path,
+    *,
+    buttons: Mapping[str, int],
+    json: bool,
 ) -> None:
     """Print every row and the verdict; end with 1 unless it is go."""
     from wakewise.importers import any_vehicle
@@ -66,10 +74,11 @@ def check_vehicle(
     if params is not None:
         parameters = read_parameter_file(params)
         own = first_of(parameters, SYSTEM_NAMES)
-        facts = Facts(vehicle=chosen, parameters=parameters, system=round(own[1]) if own else system, results=results)
+        named = round(own[1]) if own else system
+        facts = Facts(vehicle=chosen, parameters=parameters, system=named, results=results, buttons=buttons)
     else:
         with _connected(connection, system, "--check") as link, Bars().stage("asking") as advance:
-            facts = survey(link, chosen, results=results, progress=advance)
+            facts = survey(link, chosen, results=results, buttons=buttons, progress=advance)
     rows = check(facts)
     said = verdict(rows)
     if json:

@@ -55,8 +55,19 @@ def test_the_numbers_in_the_script_are_the_protocols() -> None:
         for names, values in re.findall(r"^local (\w+(?:, \w+)+) = (\d+(?:, \d+)+)", script_text(), re.MULTILINE)
         for pair in zip(names.split(", "), values.split(", "), strict=True)
     )
-    for name in ("THRUST_GROUP", "RELEASE_GROUP", "MIDDLE_US", "FULL_US", "HOLD_MS", "LOOP_MS"):
+    for name in (
+        "THRUST_GROUP",
+        "RELEASE_GROUP",
+        "MIDDLE_US",
+        "FULL_US",
+        "HOLD_MS",
+        "LOOP_MS",
+        "STABILIZE",
+        "ALT_HOLD",
+    ):
         assert int(pairs[name]) == getattr(protocol, name)
+    for name in ("BACKSTOP_MS", "PAUSE_MS"):
+        assert int(said[name]) == getattr(protocol, name)
     assert int(pairs["MOST_AHEAD_US"]) == protocol.MOST_AHEAD_US
     assert int(pairs["MOST_BEHIND_US"]) == protocol.MOST_BEHIND_US
     assert int(said["STATE_MS"]) == 1000 * protocol.STATE_PERIOD_S
@@ -103,30 +114,37 @@ def test_zeros_that_mavlink_leaves_out_are_zeros(bench: Bench) -> None:
 
 
 def test_silence_gives_the_outputs_back_within_the_bound(bench: Bench) -> None:
-    """The last message acts for 250 ms to the millisecond, and the script then says so."""
+    """The last message acts for 250 ms, and the script then ends it and says so; one that has stopped, by itself."""
     bench.step(thrusts(HALF, 10))
     sent_ms = bench.now_ms
-    bench.now_ms = sent_ms + protocol.HOLD_MS - 1
+    while bench.now_ms - sent_ms < protocol.HOLD_MS:
+        assert len(bench.pulses) == 8
+        bench.step()
+    assert not bench.pulses
+    assert bench.why == 4
+    assert bench.now_ms - sent_ms <= protocol.HOLD_MS + protocol.LOOP_MS
+    bench.step(thrusts(HALF, 10 + 20 * TICK))
+    sent_ms = bench.now_ms
+    bench.now_ms = sent_ms + protocol.BACKSTOP_MS - 1
     assert len(bench.pulses) == 8
     bench.now_ms += 1
     assert not bench.pulses
-    bench.step()
-    assert bench.why == 4
-    assert bench.now_ms - sent_ms <= 1000 * protocol.NEUTRAL_WITHIN_S
+    assert 1000 * protocol.NEUTRAL_WITHIN_S >= protocol.BACKSTOP_MS
 
 
 @pytest.mark.parametrize(
     ("change", "why"),
     [
         ({"armed": False}, 2),
-        ({"mode": protocol.ALT_HOLD}, 3),
+        ({"mode": protocol.ALT_HOLD}, 9),
+        ({"mode": protocol.STABILIZE}, 9),
         ({"mode": protocol.POSHOLD}, 3),
         ({"mode": 250}, 3),
         ({"off": True}, 1),
     ],
 )
 def test_what_forbids_it_ends_it_in_one_loop(bench: Bench, change: dict[str, int], why: int) -> None:
-    """Disarmed, in a mode that holds depth or place, or switched off: no override is left, though thrusts stream on."""
+    """Disarmed, in another mode, or switched off: no override is left, though thrusts stream on."""
     bench.step(thrusts(HALF, 10))
     assert bench.pulses
     for name, value in change.items():
@@ -139,6 +157,74 @@ def test_what_forbids_it_ends_it_in_one_loop(bench: Bench, change: dict[str, int
         assert not bench.pulses
     assert bench.why == why
     assert bench.texts[-1][1] == f"{protocol.STATUS_PREFIX}{protocol.REASONS[why]}"
+
+
+def test_after_a_change_of_mode_it_waits_for_a_pause(bench: Bench) -> None:
+    """Who streams on is not obeyed; who was silent for half a second is."""
+    bench.step(thrusts(HALF, 10))
+    bench.mode = protocol.STABILIZE
+    bench.step(*(thrusts(HALF, 10 + i * TICK) for i in range(1, 3)), times=2)
+    silent = 0
+    while bench.why == 9:
+        silent += protocol.LOOP_MS
+        bench.step()
+    assert abs(silent - protocol.PAUSE_MS) <= 2 * protocol.LOOP_MS
+    bench.step(thrusts(HALF, 10 + 100 * TICK))
+    assert len(bench.pulses) == 8
+
+
+ENDINGS = {
+    "let go": lambda bench: bench.step(thrusts(HALF, 20 * TICK, group=protocol.RELEASE_GROUP)),
+    "silent": lambda bench: bench.step(times=protocol.HOLD_MS // protocol.LOOP_MS + 1),
+    "switched off": lambda bench: (bench.parameters.update({protocol.ENABLE_PARAMETER: 0.0}), bench.step()),
+    "not a number": lambda bench: bench.step(thrusts([math.nan] * 8, 20 * TICK)),
+    "two senders": lambda bench: bench.step(thrusts(HALF, 2**40)),
+    "a time that cannot be": lambda bench: bench.step(thrusts(HALF, 2**48)),
+}
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_alt_hold_is_entered_anew_at_every_hand_back(bench: Bench, ending: str) -> None:
+    """However it ends: out of ALT_HOLD in the turn in which the outputs are the autopilot's, and back in the next."""
+    bench.mode = protocol.ALT_HOLD
+    bench.step(thrusts(HALF, 10))
+    assert len(bench.pulses) == 8
+    assert not bench.modes
+    ENDINGS[ending](bench)
+    assert not bench.pulses
+    assert bench.modes == [protocol.STABILIZE]
+    bench.step(thrusts(HALF, 2**41))
+    assert bench.modes == [protocol.STABILIZE, protocol.ALT_HOLD]
+    bench.step(times=50)
+    assert len(bench.modes) == 2
+
+
+def test_the_mode_stays_the_pilots(bench: Bench) -> None:
+    """None is set disarmed, nor in MANUAL or STABILIZE, nor after the pilot's own; a refusal is said."""
+    for mode in (protocol.MANUAL, protocol.STABILIZE):
+        bench.mode = mode
+        bench.step(thrusts(HALF, 10 + mode * TICK))
+        assert bench.pulses
+        bench.step(times=60)
+    bench.mode = protocol.ALT_HOLD
+    bench.step(thrusts(HALF, 100 * TICK))
+    assert bench.pulses
+    bench.armed = False
+    bench.step(times=2)
+    assert not bench.pulses
+    assert not bench.modes
+    bench.armed = True
+    bench.step(thrusts(HALF, 200 * TICK))
+    bench.step(thrusts(HALF, 201 * TICK, group=protocol.RELEASE_GROUP))
+    bench.mode = protocol.MANUAL
+    bench.step(times=3)
+    assert bench.modes == [protocol.STABILIZE]
+    assert bench.mode == protocol.MANUAL
+    bench.mode, bench.refused_modes = protocol.ALT_HOLD, (protocol.ALT_HOLD,)
+    bench.step(times=60)
+    bench.step(thrusts(HALF, 400 * TICK))
+    bench.step(thrusts(HALF, 401 * TICK, group=protocol.RELEASE_GROUP), times=2)
+    assert bench.texts[-1][1] == "Wakewise: ALT_HOLD refused, now STABILIZE"
 
 
 def test_it_is_off_after_every_start() -> None:
@@ -264,8 +350,8 @@ def test_a_time_that_cannot_be_is_refused(bench: Bench) -> None:
 
 def test_the_pilot_may_allow_other_modes(bench: Bench) -> None:
     """WKW_MODES is a sum of powers of two, and what is no sum allows nothing."""
-    bench.mode = protocol.ALT_HOLD
-    bench.parameters[protocol.MODES_PARAMETER] = float(protocol.DEFAULT_MODES + (1 << protocol.ALT_HOLD))
+    bench.mode = protocol.POSHOLD
+    bench.parameters[protocol.MODES_PARAMETER] = float(protocol.DEFAULT_MODES + (1 << protocol.POSHOLD))
     bench.step(thrusts(HALF, 10))
     assert len(bench.pulses) == 8
     bench.parameters[protocol.MODES_PARAMETER] = 0.0

@@ -90,7 +90,7 @@ def test_a_vehicle_on_which_all_is_right_goes() -> None:
         (_with(FRAME_CONFIG=1.0), "frame (FRAME_CONFIG)", "not what is flown"),
         (_with(FRAME_CONFIG=7.0), "frame (FRAME_CONFIG)", "--motor-test"),
         (_with(FRAME_CONFIG=None), "frame (FRAME_CONFIG)", ""),
-        (_with(WKW_MODES=0.0), "modes (WKW_MODES)", "524289"),
+        (_with(WKW_MODES=0.0), "modes (WKW_MODES)", str(protocol.DEFAULT_MODES)),
         (_heard(kind="PX4"), "autopilot", "vehicle's autopilot"),
         (_heard(firmware=(4, 4, 9)), "firmware", "update ArduSub to 4.5.0"),
         (_heard(firmware=None), "firmware", ""),
@@ -117,11 +117,11 @@ def test_a_vehicle_file_of_another_vehicle_is_no_go() -> None:
 
 
 def test_modes_that_jump_are_said() -> None:
-    """A pilot may allow ALT_HOLD; it stays go, with what may happen."""
-    facts = _with(WKW_MODES=float(protocol.DEFAULT_MODES + (1 << protocol.ALT_HOLD)))
+    """A pilot may allow POSHOLD; it stays go, with what may happen."""
+    facts = _with(WKW_MODES=float(protocol.DEFAULT_MODES + (1 << protocol.POSHOLD)))
     (row,) = [row for row in check(facts) if row.what == "modes (WKW_MODES)"]
     assert row.verdict == "go"
-    assert row.do == "ALT_HOLD: depth or place may jump when the sticks come back"
+    assert row.do == "POSHOLD: depth or place may jump when the sticks come back"
 
 
 def test_what_somebody_saw_counts() -> None:
@@ -175,7 +175,7 @@ def test_a_survey_finds_what_there_is() -> None:
 
     def answer_version(heard: object) -> None:
         talk._command(heard)
-        talk.say("named_value_float", time_boot_ms=1, name=b"WKW_VER", value=1.0)
+        talk.say("named_value_float", time_boot_ms=1, name=b"WKW_VER", value=float(protocol.SCRIPT_VERSION))
         talk.say("named_value_float", component=191, time_boot_ms=1, name=b"WW_D", value=7.0)
         talk.say("manual_control", system=255, component=190, target=1, x=0, y=0, z=500, r=0, buttons=0)
         talk.say("manual_control", system=255, component=190, target=9, x=0, y=0, z=500, r=0, buttons=0)
@@ -186,7 +186,7 @@ def test_a_survey_finds_what_there_is() -> None:
     assert facts.heard == Heard(
         seconds=0.05,
         firmware=(4, 5, 3),
-        script=1.0,
+        script=float(protocol.SCRIPT_VERSION),
         sticks={255: 1},
         poses={"LOCAL_POSITION_NED": 1},
     )

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wakewise.links.ardusub.engagement import FAULTS, REST_S, Engagement, Facts, Limits, faults
+from wakewise.links.ardusub.protocol import SCRIPT_VERSION
 
 LIMITS = Limits(battery_V=13.0)
 WELL = Facts(
@@ -23,7 +24,7 @@ WELL = Facts(
     operator_s=0.04,
     script_s=0.3,
     loop_s=0.05,
-    script_version=1,
+    script_version=SCRIPT_VERSION,
     acts=False,
     acts_s=0.3,
     depth_m=2.0,
@@ -37,7 +38,7 @@ AMISS = {
     "clock": {"clock": "it jumped"},
     "stopped": {"standstill_s": 0.4},
     "disarmed": {"armed": False},
-    "mode": {"mode": 2, "mode_name": "ALT_HOLD"},
+    "mode": {"mode": 16, "mode_name": "POSHOLD"},
     "takeover": {"takeover": "system 254 set the mode"},
     "heartbeat": {"heartbeat_s": 2.6},
     "telemetry": {"telemetry_s": 0.21},
@@ -114,8 +115,8 @@ def test_what_was_never_heard_is_amiss():
 
 def test_a_script_of_another_version_is_refused():
     """The companion drives only the script that it was made with."""
-    found = faults(replace(WELL, script_version=2), LIMITS, engaged=False)
-    assert [fault.text for fault in found] == ["script of version 2, this program needs 1"]
+    found = faults(replace(WELL, script_version=1), LIMITS, engaged=False)
+    assert [fault.text for fault in found] == [f"script of version 1, this program needs {SCRIPT_VERSION}"]
 
 
 def test_a_script_that_does_not_act_ends_the_engagement():
@@ -139,13 +140,14 @@ ANY = st.builds(
     Facts,
     now_s=st.just(0.0),
     armed=st.sampled_from([True, True, True, False, None]),
-    mode=st.sampled_from([19, 19, 0, 0, 2, 16, None]),
+    mode=st.sampled_from([19, 19, 0, 0, 2, 2, 16, None]),
+    mode_before=st.sampled_from(["", "", "", "MANUAL"]),
     heartbeat_s=AGES,
     telemetry_s=st.floats(0.0, 0.3),
     pose_s=st.floats(0.0, 0.3),
     operator_s=st.floats(0.0, 0.3),
     script_s=st.floats(0.0, 2.0),
-    script_version=st.sampled_from([1, 1, 1, 2, None]),
+    script_version=st.sampled_from([SCRIPT_VERSION] * 3 + [1, None]),
     acts=st.sampled_from([True, False, None]),
     acts_s=st.floats(0.0, 2.0),
     loop_s=st.floats(0.0, 0.6),

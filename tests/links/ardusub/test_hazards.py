@@ -10,7 +10,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from wakewise.links.ardusub.drive import VehicleDrive
 from wakewise.links.ardusub.engagement import Limits
-from wakewise.links.ardusub.protocol import ALT_HOLD, MANUAL
+from wakewise.links.ardusub.protocol import ALLOWED_MODES, ALT_HOLD, POSHOLD
+from wakewise.links.ardusub.script import script_text
 from wakewise.links.autopilot.aboard import FAULTS_ABOARD
 from wakewise.links.autopilot.own_parameters import own_parameters
 from wakewise.links.autopilot.rehearsal import Rehearsal
@@ -44,11 +45,10 @@ def test_a_vehicle_of_another_number_of_motors_is_refused():
     assert bottle.engage() == "not engaged: MOT_1_DIRECTION must be 1 or -1"
 
 
-def back_up_m(mode: int) -> float:
+def risen_m(mode: int, script: str, seconds: float = 10.0) -> float:
     """How far the vehicle rises after thrusts have pushed it down for 15 s in a mode, and it was handed back."""
-    flight = Rehearsal(load_vehicle("bluerov2-heavy"), loop_hz=50.0)
+    flight = Rehearsal(load_vehicle("bluerov2-heavy"), loop_hz=50.0, scripts={"wakewise.lua": script})
     flight.run(0.2)
-    flight.set("WKW_MODES", float((1 << ALT_HOLD) + (1 << MANUAL)))
     flight.set_mode(mode)
     flight.arm(True)
     flight.run(3.0)
@@ -59,18 +59,35 @@ def back_up_m(mode: int) -> float:
     flight.streams = False
     flight.station.say(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
     flight.run(0.3)
+    assert not flight.moments[-1].overridden
     deepest = float(flight.stand_in.motion.p_WB_m[2])
     least = deepest
-    for _ in range(100):
+    for _ in range(round(10.0 * seconds)):
         flight.run(0.1)
         least = min(least, float(flight.stand_in.motion.p_WB_m[2]))
+    assert flight.stand_in.mode == mode
+    assert not flight.stand_in.script_faults
     return deepest - least
 
 
-def test_hand_back_jumps_in_alt_hold_and_not_in_manual():
-    """ALT_HOLD goes back to the depth that it held beneath the override; so neither script nor warden drives in it."""
-    assert back_up_m(ALT_HOLD) > 0.5
-    assert back_up_m(MANUAL) < 0.05
-    assert ALT_HOLD not in Limits().modes
-    bottle = Bottle(mode=ALT_HOLD)
-    assert bottle.engage() == "not engaged: mode ALT_HOLD, allowed are MANUAL and STABILIZE"
+def test_hand_back_does_not_jump_in_any_mode_that_is_allowed():
+    """In ALT_HOLD because the script has the autopilot enter it anew, after a turn in STABILIZE.
+
+    Without that it goes back to the depth that it held beneath the override; entered anew in the same turn it takes the
+    depth of now and the throttle that it had summed up.
+    """
+    shipped = script_text()
+    for mode in ALLOWED_MODES:
+        assert risen_m(mode, shipped) < 0.05, mode
+    left = "stepped_out = vehicle:set_mode(STABILIZE)"
+    assert shipped.count(left) == 1
+    assert risen_m(ALT_HOLD, shipped.replace(left, "stepped_out = false")) > 0.5
+    at_once = shipped.replace(left, "vehicle:set_mode(STABILIZE) vehicle:set_mode(ALT_HOLD)")
+    assert risen_m(ALT_HOLD, at_once) > 0.1
+
+
+def test_modes_that_hold_a_place_are_not_allowed():
+    """POSHOLD would go back to its place, so neither script nor warden drives in it."""
+    assert POSHOLD not in Limits().modes
+    bottle = Bottle(mode=POSHOLD)
+    assert bottle.engage() == "not engaged: mode POSHOLD, allowed are MANUAL, ALT_HOLD, STABILIZE"

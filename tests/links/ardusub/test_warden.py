@@ -95,7 +95,8 @@ LOSSES = {
     "operator": lambda b: b.silent.add("sticks"),
     "link": lambda b: b.silent.update(SOURCES),
     "disarmed": lambda b: (setattr(b, "armed", False), b.beat()),
-    "mode": lambda b: (setattr(b, "mode", 2), b.beat()),
+    "mode": lambda b: (setattr(b, "mode", 16), b.beat()),
+    "another allowed mode": lambda b: (setattr(b, "mode", 2), b.beat()),
     "rival thrusts": lambda b: b.say("SET_ACTUATOR_CONTROL_TARGET", component=191, time_usec=5, group_mlx=0),
     "rival heartbeat": lambda b: b.say("HEARTBEAT", component=191, custom_mode=SESSION + 1, type=18),
     "second ground station": lambda b: b.stick(system=254),
@@ -114,6 +115,7 @@ LOSSES = {
     "too far": lambda b: setattr(b, "at", (0.0, 20.0, 2.0)),
     "tilted": lambda b: setattr(b, "roll_rad", 1.2),
     "parameter": lambda b: b.parameter("MOT_1_DIRECTION", -1.0),
+    "button": lambda b: b.parameter("BTN3_FUNCTION", 4.0),
     "operator takes over": lambda b: b.warden.press(),
     "end": lambda b: b.warden.end("Ctrl-C"),
 }
@@ -239,7 +241,7 @@ def test_what_is_missing_is_asked_for():
     assert names.count("param_request_read") >= 5
     assert names.count("command_long") >= 6
     bottle.silent.clear()
-    bottle.parameter("MOT_1_DIRECTION", 1.0)
+    bottle.parameters()
     bottle.run(4.0)
     asked = len(bottle.sent)
     bottle.run(5.0)

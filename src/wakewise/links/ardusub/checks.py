@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from wakewise.links.ardusub.buttons import conflict, free_buttons, free_words, parameters_of
 from wakewise.links.ardusub.frames import FRAMES, match_motors
 from wakewise.links.ardusub.motor_results import MotorResults
 from wakewise.links.ardusub.parameters import GROUND_NAMES, SYSTEM_NAMES, first_of
@@ -61,13 +62,17 @@ class Heard:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Facts:
-    """All that is looked at; `heard` is None without a connection, `results` where no motor was tested."""
+    """All that is looked at; `heard` is None without a connection, `results` where no motor was tested.
+
+    `buttons` are those of the pilot's sticks that are to mean something here, as of `Warden`.
+    """
 
     vehicle: Vehicle
     parameters: Mapping[str, float]
     system: int
     heard: Heard | None = None
     results: MotorResults | None = None
+    buttons: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -230,6 +235,23 @@ def _tested(facts: Facts) -> Iterator[Row]:
             yield _row(what, asked, found, direction == right, f"set MOT_{motor}_DIRECTION to {right:g}")
 
 
+def _buttons(facts: Facts) -> Iterator[Row]:
+    free = free_buttons(facts.parameters)
+    if not facts.buttons:
+        if free:
+            found = ", ".join(map(str, free))
+            yield Row(what="buttons without a function", asked="any of them for --buttons", found=found, verdict="go")
+        return
+    for what, button in facts.buttons.items():
+        row, asked = f"button {button} ({what})", "no function of the autopilot"
+        missing = next((name for name in parameters_of(button) if name not in facts.parameters), None)
+        if missing:
+            yield _unknown(row, asked, facts, f"{missing} is not known", needed=True)
+            continue
+        words = conflict(button, what, facts.parameters)
+        yield _row(row, asked, words or "none", not words, free_words(facts.parameters, facts.buttons))
+
+
 def _failsafes(facts: Facts) -> Iterator[Row]:
     yield _parameter(
         facts, "FS_GCS_ENABLE", {2.0, 3.0, 4.0}, "set FS_GCS_ENABLE to 2: a lost ground station disarms, and ends it"
@@ -277,6 +299,7 @@ _PARTS: tuple[Callable[[Facts], Iterator[Row]], ...] = (
     _motors,
     _mixing,
     _tested,
+    _buttons,
     _failsafes,
     _hearing,
 )

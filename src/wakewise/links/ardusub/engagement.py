@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from wakewise.links.ardusub.protocol import ALLOWED_MODES, SCRIPT_VERSION, STATE_FRESH_S
+from wakewise.links.logs.gather import MODES
 
 State = Literal["off", "listening", "ready", "engaged", "refused"]
 Kind = Literal[
@@ -70,7 +71,7 @@ class Facts:
         On a clock that never goes back.
     armed : bool or None
     mode : int or None
-        ArduSub's number, and in `mode_name` its name.
+        ArduSub's number, and in `mode_name` its name; `mode_before` is the name of another in which it was engaged.
     heartbeat_s, telemetry_s, pose_s, operator_s, script_s : float
         Ages of what was last heard from autopilot, its attitude, a position, the pilot's sticks and the script.
     script_version : int or None
@@ -95,6 +96,7 @@ class Facts:
     armed: bool | None = None
     mode: int | None = None
     mode_name: str = ""
+    mode_before: str = ""
     heartbeat_s: float = math.inf
     telemetry_s: float = math.inf
     pose_s: float = math.inf
@@ -147,7 +149,7 @@ def faults(facts: Facts, limits: Limits, *, engaged: bool) -> tuple[Fault, ...]:
     if not f.armed:
         found["disarmed"] = "disarmed" if f.armed is False else "nothing is known of arming"
     if f.mode not in m.modes:
-        allowed = "MANUAL and STABILIZE" if m.modes == ALLOWED_MODES else ", ".join(map(str, sorted(m.modes)))
+        allowed = ", ".join(MODES.get(mode, str(mode)) for mode in sorted(m.modes, reverse=True))
         found["mode"] = f"mode {f.mode_name or f.mode or 'unknown'}, allowed are {allowed}"
     ages: tuple[tuple[Kind, float, float, str], ...] = (
         ("heartbeat", f.heartbeat_s, m.heartbeat_s, "heartbeat of the autopilot"),
@@ -164,6 +166,8 @@ def faults(facts: Facts, limits: Limits, *, engaged: bool) -> tuple[Fault, ...]:
     if not f.loop_s <= m.loop_s:
         found["late"] = "the controller is not running" + (f", since {f.loop_s:.2f} s" if f.loop_s < math.inf else "")
     if engaged:
+        if f.mode_before and "mode" not in found:
+            found["mode"] = f"the mode changed from {f.mode_before} to {f.mode_name}"
         if not f.thrusts_s <= m.thrusts_s:
             found["late"] = f"no thrusts from the controller for {f.thrusts_s:.2f} s"
         if not f.standstill_s <= m.standstill_s:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from wakewise.errors import EnvironmentFailure, InputError
+from wakewise.links.ardusub.buttons import BUTTON_PARAMETERS
 from wakewise.links.ardusub.connection import Talk
 from wakewise.links.ardusub.protocol import AUTOPILOT_COMPONENT
 
@@ -24,6 +25,7 @@ WANTED = (
     "FS_PILOT_TIMEOUT", "ARMING_CHECK", "ARMING_SKIPCHK", "MOT_PWM_TYPE",
     *(f"MOT_{i}_DIRECTION" for i in range(1, 13)),
     *(f"SERVO{i}_FUNCTION" for i in range(1, 17)),
+    *BUTTON_PARAMETERS,
 )  # fmt: skip
 """Those that `checks.py` looks at; which of them there are depends on the firmware."""
 ROUNDS = 6

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Final
 
-SCRIPT_VERSION: Final = 1
+SCRIPT_VERSION: Final = 2
 """Of wire and script together: the script says it as `VERSION_NAME`, and the companion drives only its own."""
 
 # Who speaks.
@@ -43,6 +43,10 @@ SEND_PERIOD_S: Final = 0.05
 # Times.
 HOLD_MS: Final = 250
 """How long one message acts; after that the outputs are the autopilot's, and so the pilot's."""
+BACKSTOP_MS: Final = 290
+"""When an override ends by itself, should the script have stopped: `HOLD_MS` and two loops."""
+PAUSE_MS: Final = 500
+"""For how long nothing may be sent after the mode changed under thrusts, before any act again."""
 LOOP_MS: Final = 20
 """Period of the script."""
 NEUTRAL_WITHIN_S: Final = 0.3
@@ -79,6 +83,7 @@ REASONS: Final[dict[int, str]] = {
     6: "thrusts refused: their slots are not the motors",
     7: "two senders",
     8: "thrusts refused: not from the companion",
+    9: "mode changed, waits for a pause",
 }
 """Why the script acts or does not, the first that holds: the words of its STATUSTEXT at a change."""
 
@@ -95,8 +100,9 @@ STABILIZE: Final = 0
 ALT_HOLD: Final = 2
 POSHOLD: Final = 16
 MANUAL: Final = 19
-ALLOWED_MODES: Final = frozenset({STABILIZE, MANUAL})
-"""Those without an integrator of depth or place that goes on beneath the override and would jump when it ends."""
+ALLOWED_MODES: Final = frozenset({STABILIZE, ALT_HOLD, MANUAL})
+"""Those in which nothing jumps when the override ends. ALT_HOLD's controllers go on beneath it, so the script has the
+autopilot enter that mode anew at hand-back; POSHOLD would need its place taken anew as well."""
 DEFAULT_MODES: Final = sum(1 << mode for mode in sorted(ALLOWED_MODES))
 
 # The pilot.

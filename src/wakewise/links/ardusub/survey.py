@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from wakewise.errors import EnvironmentFailure
@@ -31,6 +31,7 @@ def survey(
     vehicle: Vehicle,
     *,
     results: MotorResults | None = None,
+    buttons: Mapping[str, int] | None = None,
     seconds: float = LISTEN_S,
     progress: Progress | None = None,
 ) -> Facts:
@@ -45,7 +46,14 @@ def survey(
     kind = "ArduSub" if (beat.autopilot, beat.type) == (_ARDUPILOT, _SUBMARINE) else _kind(beat)
     heard = _listened(talk, seconds, kind, mavlink_2=bytes(beat.get_msgbuf()[:1]) == b"\xfd")
     parameters = read_parameters(talk, progress=progress)
-    return Facts(vehicle=vehicle, parameters=parameters, system=talk.system, heard=heard, results=results)
+    return Facts(
+        vehicle=vehicle,
+        parameters=parameters,
+        system=talk.system,
+        heard=heard,
+        results=results,
+        buttons=buttons or {},
+    )
 
 
 def await_autopilot(talk: Talk, patience_s: float | None = None) -> Any:

@@ -22,6 +22,7 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.interfaces import BodyState, Measurement
 from wakewise.links.ardusub import protocol
+from wakewise.links.ardusub.buttons import BUTTON_PARAMETERS, buttons_amiss
 from wakewise.links.ardusub.engagement import Engagement, Facts, Limits, faults
 from wakewise.links.ardusub.journal import Journal
 from wakewise.links.ardusub.listening import REMEMBERED_S, Known, Said, heard, tilt_of
@@ -78,7 +79,8 @@ class Warden:
     session : int
         Number that tells this program's heartbeats, and the times of its thrusts, from a rival's.
     buttons : mapping
-        What buttons of the pilot's sticks mean: "engage", which also releases, and actions of `wakewise.pilot`.
+        What buttons of the pilot's sticks mean: "engage", which also releases, and actions of `wakewise.pilot`. While
+        the autopilot acts at one of them as well (`buttons.py`), nothing engages.
     listen_only : bool
         Never engages, and sends no thrust whatever happens.
     clock : callable
@@ -101,6 +103,7 @@ class Warden:
         self.limits, self.journal, self.clock = limits or Limits(), journal, clock
         self._send, self._drive, self._listen_only = send, drive, listen_only
         self._buttons = dict(buttons or {})
+        self._needs = (*drive.needs, *(BUTTON_PARAMETERS if self._buttons else ()))
         self._lock = threading.RLock()
         self.known, self._telemetry, self.engagement = Known(system=system, session=session), Telemetry(), Engagement()
         self.target_W_m: Array | None = None
@@ -114,7 +117,7 @@ class Warden:
         self._measurements: deque[Measurement] = deque(maxlen=_KEPT)
         self._news = News(journal, clock)
         self._judged_for: Mapping[str, float] | None = None
-        self._amiss, self._engaged_with = "", dict[str, float]()
+        self._amiss, self._engaged_with, self._engaged_mode = "", dict[str, float](), ""
         self._releases_left = 0
         self.thrusts_sent = self.releases_sent = self.unsent = 0
 
@@ -127,6 +130,14 @@ class Warden:
         """Still the thrusters, if they are driven, and let nothing out any more."""
         with self._lock:
             self._told(self.engagement.ended(self.clock(), why))
+
+    @property
+    def buttons_amiss(self) -> str | None:
+        """At which of its buttons the autopilot acts as well, in words, empty for none; None before that is known."""
+        parameters = self.known.parameters
+        if self._buttons and any(name not in parameters for name in BUTTON_PARAMETERS):
+            return None
+        return buttons_amiss(self._buttons, parameters)
 
     @property
     def entry(self) -> int | None:
@@ -154,6 +165,7 @@ class Warden:
                 armed=known.armed,
                 mode=known.mode,
                 mode_name=known.mode_name,
+                mode_before=self._engaged_mode if engaged and self._engaged_mode != known.mode_name else "",
                 heartbeat_s=now_s - known.heartbeat_s,
                 telemetry_s=now_s - known.attitude_s,
                 pose_s=now_s - known.pose_s,
@@ -181,9 +193,10 @@ class Warden:
         """What is amiss about the autopilot's parameters, in words."""
         parameters = self.known.parameters
         if parameters is not self._judged_for:
-            missing = next((name for name in self._drive.needs if name not in parameters), None)
+            missing = next((name for name in self._needs if name not in parameters), None)
             words = f"parameters of the autopilot are not known yet: {missing}" if missing else ""
-            self._judged_for, self._amiss = parameters, words or self._drive.amiss(parameters)
+            words = words or buttons_amiss(self._buttons, parameters) or self._drive.amiss(parameters)
+            self._judged_for, self._amiss = parameters, words
         changed = [name for name, value in self._engaged_with.items() if parameters.get(name) != value]
         return self._amiss or (f"{changed[0]} was changed" if changed else "")
 
@@ -239,7 +252,7 @@ class Warden:
                     self._post(name, fields)
 
     def _ask_for_parameters(self, now_s: float) -> None:
-        missing = [name for name in self._drive.needs if name not in self.known.parameters]
+        missing = [name for name in self._needs if name not in self.known.parameters]
         if missing and now_s - self._asked_parameters_s >= PARAMETERS_S and math.isfinite(self.known.heartbeat_s):
             self._asked_parameters_s = now_s
             for name in missing[:MOST_PARAMETERS]:
@@ -329,7 +342,8 @@ class Warden:
             self._let_go(self.clock())
         elif after.state == "engaged" and before.state != "engaged":
             self._slots, self._releases_left, self._decided_s = None, 0, self.clock()
-            self._engaged_with = {name: self.known.parameters[name] for name in self._drive.needs}
+            self._engaged_mode = self.known.mode_name
+            self._engaged_with = {name: self.known.parameters[name] for name in self._needs}
             self._pressed.clear()
         for t in after.told:
             self._write("state", before=t.before, after=t.after, reason=t.reason, kind=t.kind)

@@ -63,6 +63,7 @@ function arming.is_armed() return host.is_armed() end
 
 vehicle = {}
 function vehicle.get_mode() return host.get_mode() end
+function vehicle.set_mode(_, mode) return host.set_mode(integer(mode, 1, 0, 255)) end
 
 SRV_Channels = {}
 function SRV_Channels.find_channel(_, wanted) return host.find_channel(integer(wanted, 1, -1, 300)) end

@@ -87,6 +87,7 @@ def _manual_control(board: StandIn, message: Any) -> None:
             throttle=board.parameters.value("JS_THR_GAIN", otherwise=1.0),
         )
     )
+    board.joystick.take(board, message.buttons)
 
 
 def _set_mode(board: StandIn, message: Any) -> None:

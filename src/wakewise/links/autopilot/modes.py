@@ -4,7 +4,8 @@ MANUAL hands the demands on. STABILIZE holds roll and pitch at the angles asked 
 is let go: the angle's error times ATC_ANG_*_P is a rate, its error in a PID (ATC_RAT_*) a demand. ALT_HOLD holds the
 depth as well while the throttle is let go: the depth's error times PSC_POSZ_P is a velocity, its error times PSC_VELZ_P
 an acceleration, and a PI of what is missing of that the throttle. Those loops go on while a script overrides the
-outputs, which is why what they have summed up jumps out when the override ends.
+outputs, so what they have summed up jumps out when the override ends, unless the mode was entered anew: then depth and
+heading are those of that moment, and the sum is what gives the throttle of the mode before, as in ArduSub.
 """
 
 from __future__ import annotations
@@ -32,13 +33,21 @@ _PER_MILLE, _CM = 1e-3, 1e2
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Loops:
-    """Memory of the loops; `heading_rad` and `depth_m` are held, None until there is something to hold."""
+    """Memory of the loops; `heading_rad` and `depth_m` are held, None until there is something to hold.
+
+    `throttle` is what was last asked of the attitude's loops; MANUAL goes past them and leaves it as it was.
+    """
 
     rate_sum: Array = field(default_factory=lambda: np.zeros(3))
     rate_error: Array | None = None
     heading_rad: float | None = None
     depth_m: float | None = None
     climb_sum: float = 0.0
+    throttle: float = 0.0
+
+    def entered(self, mode: int) -> Loops:
+        """Afresh in a mode; ALT_HOLD goes on with the throttle of before."""
+        return Loops(throttle=self.throttle, climb_sum=-self.throttle if mode == ALT_HOLD else 0.0)
 
 
 def fly(
@@ -46,13 +55,13 @@ def fly(
 ) -> tuple[Loops, Demands]:
     """Demands on the mixer in a mode, and the loops after it."""
     if mode == MANUAL:
-        return Loops(), demands
+        return Loops(throttle=loops.throttle), demands
     loops, turns = _attitude(loops, demands, motion, parameters, dt_s)
     after = replace(demands, roll=turns[0], pitch=turns[1], yaw=turns[2])
     if mode == ALT_HOLD:
         loops, throttle = _depth(loops, demands.throttle, motion, parameters, dt_s)
         after = replace(after, throttle=throttle)
-    return loops, after
+    return replace(loops, throttle=after.throttle), after
 
 
 def _attitude(

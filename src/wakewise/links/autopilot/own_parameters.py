@@ -10,6 +10,7 @@ import math
 from pathlib import Path
 
 from wakewise.errors import InputError
+from wakewise.links.ardusub.buttons import DEFAULT, parameters_of
 
 FRAME_VECTORED, FRAME_VECTORED_6DOF = 1, 2
 """FRAME_CONFIG of six and of eight motors."""
@@ -70,6 +71,8 @@ def own_parameters(motors: int = 8) -> dict[str, float]:
     }
     for i in range(1, motors + 1):
         values[f"MOT_{i}_DIRECTION"] = 1
+    for button, functions in enumerate(DEFAULT):
+        values |= dict(zip(parameters_of(button), functions, strict=True))
     for i in range(1, 17):
         values[f"SERVO{i}_FUNCTION"] = 32 + i if i <= motors else 0
         values |= {f"SERVO{i}_MIN": 1100, f"SERVO{i}_MAX": 1900, f"SERVO{i}_TRIM": 1500, f"SERVO{i}_REVERSED": 0}

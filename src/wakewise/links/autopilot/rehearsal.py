@@ -91,6 +91,7 @@ class Rehearsal:
     scripts: Mapping[str, str] | None = None
     beats: bool = True
     sticks: tuple[int, int, int, int] | None = STICKS_MIDDLE
+    buttons: int = 0
     streams: bool = False
     thrusts: tuple[float, ...] = THRUSTS
     moments: list[Moment] = field(default_factory=list)
@@ -206,7 +207,8 @@ class Rehearsal:
         if self.beats and self._is_due("beat", 1.0):
             self.station.say(mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
         if self.sticks is not None and self._is_due("sticks", 0.05):
-            self.station.say(mavlink.MAVLink_manual_control_message(self.stand_in.system, *self.sticks, 0))
+            sticks = mavlink.MAVLink_manual_control_message(self.stand_in.system, *self.sticks, self.buttons)
+            self.station.say(sticks)
         if self.streams and self._is_due("stream", SEND_PERIOD_S):
             self.send_thrusts(self.thrusts)
 

@@ -45,6 +45,10 @@ class Board(Protocol):
         """Time since the start."""
         ...
 
+    def set_mode(self, mode: int) -> bool:
+        """Change the mode; False where that is refused."""
+        ...
+
     def find_channel(self, function: int) -> int | None:
         """First output, numbered from 0, with a function."""
         ...
@@ -162,6 +166,7 @@ class Script:
             "receive": receive,
             "is_armed": lambda: board.armed,
             "get_mode": lambda: board.mode,
+            "set_mode": board.set_mode,
             "find_channel": board.find_channel,
             "get_output": board.output_us,
             "override": board.override,

@@ -24,6 +24,7 @@ from wakewise.links.ardusub.protocol import (
 from wakewise.links.autopilot.failsafes import Action, ground_station, pilot_input
 from wakewise.links.autopilot.files import Files
 from wakewise.links.autopilot.hearing import hear
+from wakewise.links.autopilot.joystick import Joystick, can_disarm
 from wakewise.links.autopilot.modes import MODES, Loops, fly
 from wakewise.links.autopilot.motor_tests import MotorTest
 from wakewise.links.autopilot.motors import directions_of, factors_of, motor_pulses_us
@@ -45,7 +46,7 @@ _LISTED_PER_LOOP = 10
 _MOST_WAITING = 4000
 TEXT_LETTERS = 50
 _MOST_TEXT_ID = 65535
-_ERROR, _WARNING, _INFO = 3, 4, 6
+_CRITICAL, _ERROR, _WARNING, _INFO = 2, 3, 4, 6
 _AT_REST = Motion(
     time_s=0.0,
     omega_B_rad_s=np.zeros(3),
@@ -85,6 +86,7 @@ class StandIn:
     armed: bool
     mode: int
     timetable: Timetable
+    joystick: Joystick
     motor_test: MotorTest
     _loops: Loops
     _demands: Demands
@@ -223,7 +225,7 @@ class StandIn:
         self._loops, self._demands = Loops(), Demands()
         self._servos = Servos(self.loop_hz)
         self.motor_test = MotorTest(len(factors_of(self.parameters)))
-        self.timetable = Timetable()
+        self.timetable, self.joystick = Timetable(), Joystick()
         self._station_s = None
         self._sticks_s = None
         self._to_list = deque()
@@ -249,8 +251,11 @@ class StandIn:
             script.hear(raw, message, self.boot_ms)
 
     def arm(self) -> bool:
-        """Arm the motors; False in a mode that is not flown."""
+        """Arm the motors; False in a mode that is not flown, or where no button of the sticks disarms."""
         if self.mode not in MODES:
+            return False
+        if not can_disarm(self.parameters):
+            self.say(_CRITICAL, "Arm: Must assign a disarm or arm_toggle button")
             return False
         if not self.armed:
             self.armed, self._loops = True, Loops()
@@ -272,7 +277,7 @@ class StandIn:
             self.say(_WARNING, f"Mode change failed: no mode {mode} here")
             return False
         if mode != self.mode:
-            self.mode, self._loops = mode, Loops()
+            self.mode, self._loops = mode, self._loops.entered(mode)
         return True
 
     def set_parameter(self, name: str, value: float) -> bool:

@@ -172,12 +172,15 @@ class SeaSession:
         warden = self.warden
         warm(FLIGHT_JOBS, self._warming)
         while not self._over.wait(LOOK_S):
-            facts = warden.facts()
+            facts, buttons = warden.facts(), warden.buttons_amiss
+            if buttons:
+                raise InputError(buttons)
             lacking = [
                 what
                 for what, age_s in (
                     ("heartbeat", facts.heartbeat_s), ("attitude", facts.telemetry_s), ("position", facts.pose_s),
                     ("depth", 0.0 if math.isfinite(facts.depth_m) else math.inf),
+                    ("BTNn_FUNCTION", math.inf if buttons is None else 0.0),
                 )
                 if not age_s < warden.limits.heartbeat_s
             ]  # fmt: skip

@@ -5,10 +5,11 @@
 -- comes from this vehicle's own system id and component 191; its numbers are in range and there is one for each motor.
 -- A message acts for 250 ms. Then, or at once when the vehicle is disarmed, switched off or put in another mode, the
 -- outputs are the autopilot's again, that is, the pilot's. WKW_ENABLE is set to 0 at every start.
+-- ALT_HOLD is handed back at the depth and heading of that moment: see step_out.
 --
 -- This Lua has 32-bit integers and 32-bit floats: nothing here needs more.
 
-local VERSION = 1
+local VERSION = 2
 local THRUST_MESSAGE = 139
 local THRUST_BYTES = 43
 local HEADER_BYTES = 12 -- mavlink_message_t: checksum 2, magic, length, flags 2, sequence, system, component, id 3
@@ -19,14 +20,18 @@ local SLOTS = 8
 local FIRST_FUNCTION = 33
 local MIDDLE_US, FULL_US = 1500, 400
 local HOLD_MS, LOOP_MS = 250, 20
+local BACKSTOP_MS = 290 -- when an override ends by itself, should this script have stopped: HOLD_MS and two loops
+local PAUSE_MS = 500
 local MOST_AHEAD_US, MOST_BEHIND_US = 5000000, 250000
 local RIVAL_MS = 1000
 local STATE_MS = 500
 local PARAMETER_TABLE = 87
-local DEFAULT_MODES = 524289 -- 2^19 MANUAL + 2^0 STABILIZE
+local DEFAULT_MODES = 524293 -- 2^19 MANUAL + 2^2 ALT_HOLD + 2^0 STABILIZE
+local STABILIZE, ALT_HOLD = 0, 2
 local QUEUE = 10
 
 local ACTING, OFF, DISARMED, MODE, SILENT, BAD_VALUE, BAD_SLOTS, TWO_SENDERS, STRANGER = 0, 1, 2, 3, 4, 5, 6, 7, 8
+local CHANGED = 9
 local WORDS = {
   [ACTING] = "acting",
   [OFF] = "not enabled",
@@ -37,6 +42,7 @@ local WORDS = {
   [BAD_SLOTS] = "thrusts refused: their slots are not the motors",
   [TWO_SENDERS] = "two senders",
   [STRANGER] = "thrusts refused: not from the companion",
+  [CHANGED] = "mode changed, waits for a pause",
 }
 local INFO, WARNING = 6, 4
 
@@ -57,6 +63,9 @@ mavlink:register_rx_msgid(THRUST_MESSAGE)
 
 local own_system = nil
 local acted_ms = nil -- when thrusts were last put on the motors; nil when none are on them
+local acted_mode = nil -- the mode in which they were put there first
+local stepped_out = false -- whether ALT_HOLD was left for a turn
+local changed_ms = nil -- when the mode changed under thrusts, or the last message came since
 local last_high, last_low = nil, nil -- time_usec of the last message in its turn: above and below 2^24 us
 local last_ms = nil -- when that came
 local rival_ms = nil -- when two senders were last noticed
@@ -86,17 +95,34 @@ local function closed()
   if enable:get() ~= 1 then return OFF end
   if not arming:is_armed() then return DISARMED end
   if not mode_allowed() then return MODE end
+  if acted_ms ~= nil and vehicle:get_mode() ~= acted_mode then changed_ms = millis() end
+  if within(changed_ms, PAUSE_MS) then return CHANGED end
   return nil
+end
+
+-- ALT_HOLD goes on beneath an override: it keeps the depth and heading of before, and adds up what it misses. ArduSub
+-- takes the present ones only as it enters the mode, its sum from the throttle of before. So it is left for STABILIZE,
+-- whose throttle is the stick's, and entered again in the next turn. The sticks act all the while.
+local function step_out()
+  if arming:is_armed() and vehicle:get_mode() == ALT_HOLD then stepped_out = vehicle:set_mode(STABILIZE) end
+end
+
+local function step_back()
+  if not stepped_out then return end
+  stepped_out = false
+  if vehicle:get_mode() ~= STABILIZE then return end -- the pilot was quicker
+  if not vehicle:set_mode(ALT_HOLD) then gcs:send_text(WARNING, "Wakewise: ALT_HOLD refused, now STABILIZE") end
 end
 
 -- Give the outputs back at once: an override of 0 ms ends one that runs.
 local function release()
   if acted_ms == nil then return end
+  step_out()
   for i = 0, SLOTS - 1 do
     local channel = SRV_Channels:find_channel(FIRST_FUNCTION + i)
     if channel then SRV_Channels:set_output_pwm_chan_timeout(channel, MIDDLE_US, 0) end
   end
-  acted_ms = nil
+  acted_ms, acted_mode = nil, nil
 end
 
 local function refuse(why)
@@ -136,9 +162,9 @@ local function drive(payload)
     end
   end
   for i = 1, #channels do
-    SRV_Channels:set_output_pwm_chan_timeout(channels[i], pulses[i], HOLD_MS)
+    SRV_Channels:set_output_pwm_chan_timeout(channels[i], pulses[i], BACKSTOP_MS)
   end
-  acted_ms = millis()
+  acted_ms, acted_mode = millis(), acted_mode or vehicle:get_mode()
   return nil
 end
 
@@ -161,7 +187,7 @@ local function take(bytes)
     release()
     return
   end
-  if not in_turn(high, low) then return end
+  if not in_turn(high, low) or stepped_out then return end
   if group == RELEASE_GROUP then
     release()
     return
@@ -190,11 +216,13 @@ end
 
 local function update()
   own_system = system_id()
+  step_back()
   local why = closed()
   if why then release() end
   for _ = 1, QUEUE do
     local bytes = mavlink:receive_chan()
     if not bytes then break end
+    if why == CHANGED then changed_ms = millis() end
     if not why then take(bytes) end
   end
   if why then
@@ -204,7 +232,7 @@ local function update()
   elseif within(acted_ms, HOLD_MS) then
     why = ACTING
   else
-    acted_ms = nil
+    release()
     why = within(refused_ms, RIVAL_MS) and refused_why or SILENT
   end
   tell(why)
