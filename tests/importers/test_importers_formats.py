@@ -305,7 +305,7 @@ def test_a_matrix_without_a_frame_is_read_as_the_geometry_agrees(tmp_path: Path)
     for geometry, frame in ((stated, "FRD"), (wrench_rows_to_frd(stated), "FLU")):
         matrix, notes = read_matrix(path, "auto", geometry)
         np.testing.assert_array_equal(matrix, geometry)
-        assert f"frame of the matrix: {frame} (inferred: 12 of 12" in notes[-1]
+        assert f"matrix read as six rows, forces first, {frame}: 12 of 12 entries agree so" in notes[-1]
 
 
 @pytest.mark.parametrize(

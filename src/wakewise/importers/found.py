@@ -51,7 +51,11 @@ class FoundThruster:
 
 @dataclass(eq=False)
 class Found:
-    """Everything a reader found; None where the file says nothing. Axes are the file's own."""
+    """Everything a reader found; None where the file says nothing. Axes are the file's own.
+
+    `guessed` says how the thrusters were told if no rule of the format tells them; `raw_matrix` holds a matrix as it
+    stands in the file if nothing states what its rows are.
+    """
 
     name: str
     kind: str
@@ -59,6 +63,7 @@ class Found:
     frame: Frame
     frame_why: str
     thrust_rule: str = ""
+    guessed: str = ""
     size_m: Array | None = None
     mass_kg: float | None = None
     inertia_kg_m2: Array | None = None
@@ -71,6 +76,7 @@ class Found:
     thrusters: list[FoundThruster] = field(default_factory=list)
     matrix: Array | None = None
     matrix_name: str = ""
+    raw_matrix: Array | None = None
     claims: list[tuple[int, str, Place, bool]] = field(default_factory=list)
     X_BC: Pose | None = None
     camera_fov_rad: float | None = None

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.geometry import Pose
 from wakewise.importers.angles import read_angles, unit_of
 from wakewise.importers.bodies import pose_of
 from wakewise.importers.found import QUESTION, Found, FoundThruster
 from wakewise.importers.plausible import is_unit, require_count
+from wakewise.importers.thruster_lists import (
+    POSES,
+    TURN_RULE,
+    read_list,
+    require_direction,
+    unit_axis,
+)
 from wakewise.importers.xml import PlacedError
-from wakewise.importers.yaml_parameters import Entries, find, three
+from wakewise.importers.yaml_parameters import Entries, find
 from wakewise.importers.yamls import Item
 
 _POSITIONS = ("thruster_position", "thruster_positions", "positions", "thruster_locations", "locations")
@@ -25,17 +30,6 @@ _DIRECTIONS = (
 _ANGLES = re.compile(
     r"^(thrusters?_)?(rpys?|eulers?|euler_angles|angles|rotations?|orientations?)(_(deg|rad)\w*)?$", re.I
 )
-_POSES = re.compile(r"^(thrusters?_)?poses?(_(deg|rad)\w*)?$", re.IGNORECASE)
-_BARE = re.compile(r"^thrusters?(_list)?$", re.IGNORECASE)
-_NUMBERED = re.compile(r"^thruster_?\d+$", re.IGNORECASE)
-_POSITION_KEYS = ("position", "xyz", "pos", "location", "p", "translation")
-_DIRECTION_KEYS = ("direction", "axis", "force_direction", "thrust_direction", "dir")
-_ANGLE_KEY = re.compile(r"^(rpy|euler|euler_angles|angles|orientation|rotation)(_(deg|rad)\w*)?$", re.IGNORECASE)
-_SCALAR_ANGLE = re.compile(r"^(roll|pitch|yaw)(_(deg|rad)\w*)?$", re.IGNORECASE)
-_MAYBE_DIRECTION = re.compile(r"orientation|rotation|angles", re.IGNORECASE)
-_TURN_RULE = "inferred: positive thrust pushes along +x of each thruster's frame"
-_SLACK = 1e-3
-_TWELFTH = np.pi / 12.0
 
 
 def read_geometry(entries: Entries, found: Found) -> bool:
@@ -48,15 +42,16 @@ def read_geometry(entries: Entries, found: Found) -> bool:
     """
     positions = find(entries, _POSITIONS)
     directions, key = _direction_matrix(entries)
+    within: tuple[str, ...] = ()
     if positions is not None and directions is not None:
         _from_matrices(positions, directions, key, entries, found)
     elif not _from_poses(entries, found):
-        _listed([*entries, *_numbered(entries)], found)
+        within = read_list(entries, found)
     if not found.thrusters:
         if positions is not None:
             raise PlacedError(f"{positions.place}: thruster positions without directions, which are needed too")
         return False
-    _limits(entries, found)
+    _limits(entries, within, found)
     found.derived["thruster_layout"] = f"{found.kind} {found.file.name}: thruster positions and directions"
     return True
 
@@ -87,35 +82,15 @@ def _from_matrices(positions: Item, directions: Item, key: str, entries: Entries
     if turned:
         rows, note = read_angles([(axes[:, i], directions.place) for i in range(n)], key, key)
         found.notes += [f"{key}: roll, pitch and yaw of each thruster", *([note] if note else [])]
-        found.thrust_rule = _TURN_RULE
+        found.thrust_rule = TURN_RULE
         Rs = [pose_of(np.zeros(3), row).R for row in rows]
         axes = np.stack([R[:, 0] for R in Rs if R is not None], axis=1)
     for i in range(n):
         name = f"thruster{i}"
-        axis = _axis(axes[:, i], directions, name)
+        axis = unit_axis(axes[:, i], directions, name)
         if not turned:
-            _require_direction(axes[:, i], directions, name)
+            require_direction(axes[:, i], directions, name)
         found.thrusters.append(FoundThruster(name, places[:, i], axis, directions.place, Rs[i]))
-
-
-def _axis(axis: Array, item: Item, name: str) -> Array:
-    length = float(np.linalg.norm(axis))
-    if length < 1e-6:
-        raise PlacedError(f"{item.place}: {name}: axis {axis.tolist()} has length {length:g}, it must not be zero")
-    return axis / length
-
-
-def _require_direction(row: Array, item: Item, name: str) -> None:
-    """Refuse what stands as a direction and can only be angles: entries of a twelfth of a half turn, or of degrees."""
-    length = float(np.linalg.norm(row))
-    twelfths = np.abs(row) / _TWELFTH
-    odd = (np.abs(row) > 0.1) & (np.abs(twelfths - np.round(twelfths)) < 4e-3)
-    if is_unit(length) or (length <= 10.0 and not odd.any()):
-        return
-    raise PlacedError(
-        f"{item.place}: {name}: direction {np.round(row, 6).tolist()} has length {length:g} and looks like angles; "
-        f"call the key thruster_rpy (radians) or thruster_rpy_deg, or give directions of length 1"
-    )
 
 
 def _columns(positions: Item, directions: Item, key: str, found: Found) -> tuple[Array, Array, bool]:
@@ -200,7 +175,7 @@ def _ways(item: Item, what: str) -> list[Array]:
 def _from_poses(entries: Entries, found: Found) -> bool:
     """Thrusters as rows of x, y, z, roll, pitch, yaw."""
     for path, item in entries:
-        if not (_POSES.match(path[-1]) and any("thruster" in key.lower() for key in path) and item.is_matrix()):
+        if not (POSES.match(path[-1]) and any("thruster" in key.lower() for key in path) and item.is_matrix()):
             continue
         rows = item.rows(path[-1])
         require_count(len(rows), f"{item.place}: ")
@@ -213,174 +188,16 @@ def _from_poses(entries: Entries, found: Found) -> bool:
         for i, (row, rpy) in enumerate(zip(rows, angles, strict=True)):
             R = pose_of(np.zeros(3), rpy).R
             found.thrusters.append(FoundThruster(f"thruster{i}", row[:3], R[:, 0], item.place, R))
-        found.thrust_rule = _TURN_RULE
+        found.thrust_rule = TURN_RULE
         return True
     return False
 
 
-@dataclass(eq=False)
-class _Placed:
-    """A thruster of a list: where, and its direction or its angles (with the key that they stand under)."""
-
-    name: str
-    item: Item
-    p_m: Array
-    axis: Array | None = None
-    R: Array | None = None
-    angles: Array | None = None
-    key: str = ""
-
-
-def _listed(entries: Entries, found: Found) -> None:
-    """Thrusters as a list or table of tables, each with a position and a direction or angles, or with a pose."""
-    for path, item in entries:
-        if "thruster" not in path[-1].lower():
-            continue
-        members = (
-            [(f"thruster{i}", member) for i, member in enumerate(item.items())]
-            if item.items()
-            else [(key, member) for key, member in item.table().items()]
-        )
-        tables = [(name, member) for name, member in members if member.table()]
-        if _BARE.match(path[-1]) and item.is_matrix() and {len(row.items()) for row in item.items()} <= {6, 7}:
-            raise PlacedError(
-                f"{item.place}: {path[-1]} are rows of {len(item.items()[0].items())} numbers: poses or columns of a "
-                f"matrix? call them thruster_poses or tam"
-            )
-        placed = [_placed(name, member) for name, member in tables]
-        located = [p for p in placed if p is not None]
-        if not located:
-            continue
-        _require_all_placed(members, placed, tables, listed=bool(item.items()), found=found)
-        require_count(len(located), f"{item.place}: ")
-        _turn(located, found)
-        for p in located:
-            if p.axis is None:
-                raise PlacedError(f"{p.item.place}: {p.name} has a position but no direction, which is needed too")
-            given = p.item.get("name", "id")
-            label = given.value if given is not None and isinstance(given.value, str) else p.name
-            axis = _axis(p.axis, p.item, p.name)
-            if p.R is None:
-                _require_direction(p.axis, p.item, p.name)
-            found.thrusters.append(FoundThruster(label, p.p_m, axis, p.item.place, p.R))
-        if any(t.R_BT is not None for t in found.thrusters):
-            found.thrust_rule = _TURN_RULE
-        return
-
-
-def _numbered(entries: Entries) -> Entries:
-    """Tables `thruster_1`, `thruster_2` ... beside one another, as if they stood below `thrusters`."""
-    groups: dict[tuple[str, ...], dict[str, Item]] = {}
-    for path, item in entries:
-        if _NUMBERED.match(path[-1]) and item.table():
-            groups.setdefault(path[:-1], {})[path[-1]] = item
-    return [((*path, "thrusters"), Item(group, next(iter(group.values())).place)) for path, group in groups.items()]
-
-
-def _require_all_placed(
-    members: list[tuple[str, Item]],
-    placed: list[_Placed | None],
-    tables: list[tuple[str, Item]],
-    *,
-    listed: bool,
-    found: Found,
-) -> None:
-    """Refuse a list that places some thrusters and not others: none is dropped."""
-    if listed and len(tables) != len(members):
-        name, member = next((n, m) for n, m in members if not m.table())
-        raise PlacedError(f"{member.place}: {name} is not a table with a position, as the other thrusters are")
-    for (name, member), p in zip(tables, placed, strict=True):
-        if p is not None:
-            continue
-        keys = [key for key in member.table() if key in _DIRECTION_KEYS or _ANGLE_KEY.match(key)]
-        if listed or keys:
-            raise PlacedError(f"{member.place}: {name} has no position that can be read, the other thrusters have one")
-        found.notes.append(f"{QUESTION}entry {name} beside the thrusters has no position; it is not taken for one")
-
-
-def _turn(located: list[_Placed], found: Found) -> None:
-    """Turn angles into frames; thrusters whose angles stand under one key share a unit."""
-    for key in dict.fromkeys(p.key for p in located if p.angles is not None):
-        group = [p for p in located if p.key == key and p.angles is not None]
-        for p in group:
-            # The angles (1, 0, 0) are nobody's; as a direction they are.
-            unit = p.angles is not None and abs(float(np.linalg.norm(p.angles)) - 1.0) < _SLACK
-            if unit and _MAYBE_DIRECTION.search(key) and unit_of(key) == "":
-                raise PlacedError(
-                    f"{p.item.place}: {p.name}: {key} has length 1: direction or angles? say direction or rpy"
-                )
-        what = f"{key} of {group[0].name}" if len(group) == 1 else f"{key} of the thrusters"
-        rows, note = read_angles([(p.angles, p.item.place) for p in group if p.angles is not None], what, key)
-        found.notes += [note] if note else []
-        for p, row in zip(group, rows, strict=True):
-            p.R = pose_of(np.zeros(3), row).R
-            p.axis = p.R[:, 0]
-
-
-def _placed(name: str, member: Item) -> _Placed | None:
-    pose_key = next((key for key in member.table() if _POSES.match(key)), None)
-    if pose_key is not None:
-        pose = member.table()[pose_key]
-        if pose.table():
-            inner = _placed(name, pose)
-            if inner is None:
-                raise PlacedError(f"{pose.place}: {pose_key} of {name} has no position that can be read")
-            inner.item = member
-            return inner
-        values = pose.numbers(f"{pose_key} of {name}", 6)
-        return _with_direction(_Placed(name, member, values[:3], angles=values[3:], key=pose_key), member)
-    item = member.get(*_POSITION_KEYS)
-    if item is not None:
-        place = three(item, "position")
-    elif all(key in member.table() for key in "xyz"):
-        place = np.array([member.table()[key].scalar(key) for key in "xyz"])
-    else:
-        return None
-    return _with_direction(_Placed(name, member, place), member)
-
-
-def _with_direction(placed: _Placed, member: Item) -> _Placed:
-    item = member.get(*_DIRECTION_KEYS)
-    if item is not None:
-        placed.axis, placed.angles, placed.key = three(item, "direction"), None, ""
-        return placed
-    for key, value in member.table().items():
-        if _ANGLE_KEY.match(key):
-            if all(part in value.table() for part in "xyzw"):
-                placed.R = _quaternion(value, placed.name)
-                placed.axis, placed.angles = placed.R[:, 0], None
-            elif len(value.items()) == 4:
-                raise PlacedError(
-                    f"{value.place}: {key} of {placed.name} has 4 numbers: a quaternion's order is not known, write "
-                    f"{{x: ., y: ., z: ., w: .}}"
-                )
-            else:
-                placed.angles, placed.key = three(value, "angles"), key
-            return placed
-    scalars = [key for key in member.table() if _SCALAR_ANGLE.match(key)]
-    if scalars and placed.angles is None:
-        units = {unit_of(key) for key in scalars}
-        if len(units) > 1:
-            raise PlacedError(f"{member.place}: {placed.name}: {', '.join(scalars)} are of different units")
-        angles = np.zeros(3)
-        for key in scalars:
-            angles["rpy".index(key[0].lower())] = member.table()[key].scalar(f"{key} of {placed.name}")
-        placed.angles = angles
-        placed.key = {"degrees": "rpy_deg", "radians": "rpy_rad", "": "roll, pitch, yaw"}[units.pop()]
-    return placed
-
-
-def _quaternion(item: Item, name: str) -> Array:
-    w, x, y, z = (item.table()[part].scalar(f"{part} of {name}") for part in "wxyz")
-    length = float(np.linalg.norm([w, x, y, z]))
-    if abs(length - 1.0) > 0.01:
-        raise PlacedError(f"{item.place}: quaternion of {name} has length {length:g}, must be 1")
-    return Pose(np.zeros(3), np.array([w, x, y, z]) / length).R
-
-
-def _limits(entries: Entries, found: Found) -> None:
-    high, low = find(entries, ("max_force", "max_thrust")), find(entries, ("min_force", "min_thrust"))
-    if high is None or low is None:
+def _limits(entries: Entries, within: tuple[str, ...], found: Found) -> None:
+    # A thruster's own limits are read with it; here are those of all.
+    common = [(path, item) for path, item in entries if not within or path[: len(within)] != within]
+    high, low = find(common, ("max_force", "max_thrust")), find(common, ("min_force", "min_thrust"))
+    if high is None or low is None or any(t.max_forward_N is not None for t in found.thrusters):
         return
     forward, reverse = high.scalar("max_force"), -low.scalar("min_force")
     if forward < 0.0 or reverse < 0.0:

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 
+from wakewise.arrays import Array
 from wakewise.importers.found import QUESTION, Found, Frame
 from wakewise.importers.layouts import read_geometry
-from wakewise.importers.plausible import claims_in, require_count, require_same_count, upright
+from wakewise.importers.names import vote
+from wakewise.importers.plausible import claims_in, require_count, require_same_count
+from wakewise.importers.thruster_lists import LOOKS_LIKE_THRUSTERS
+from wakewise.importers.wrench_rows import Order, component_in_comment, order_in_comment, order_of, settle
 from wakewise.importers.xml import PlacedError
 from wakewise.importers.yaml_parameters import Entries, read_parameters
 from wakewise.importers.yamls import Item
@@ -18,13 +23,12 @@ _MATRIX_KEY = re.compile(
     re.IGNORECASE,
 )
 _NOT_MATRIX = re.compile(r"weight|controller|update|rate|slack|topic|solver", re.IGNORECASE)
-_ROW_NAMES = (("x", "y", "z", "rx", "ry", "rz"), ("fx", "fy", "fz", "mx", "my", "mz"), ("X", "Y", "Z", "K", "M", "N"))
 _DOWN_WORDS = re.compile(r"(^|[^a-z])(ned|frd|fsd)([^a-z]|$)", re.IGNORECASE)
 _UP_WORDS = re.compile(r"(^|[^a-z])(enu|flu|nwu)([^a-z]|$)", re.IGNORECASE)
 
 
-def read_yaml(root: Item, name: str, found: Found) -> None:
-    """Fill in what a YAML file says about a vehicle.
+def read_yaml(root: Item, name: str, found: Found, rows: Order | None = None) -> None:
+    """Fill in what a YAML file says about a vehicle; `rows` is what the user says the rows of a matrix are.
 
     Raises
     ------
@@ -32,26 +36,39 @@ def read_yaml(root: Item, name: str, found: Found) -> None:
         If it holds no matrix, no thruster geometry and no vehicle parameters, or a matrix of the wrong shape.
     """
     if not root.table():
-        raise PlacedError(f"{root.place}: holds no table of values (neither XML nor a vehicle's YAML)")
+        raise PlacedError(
+            f"{root.place}: holds no table of values; vehicles are read from URDF, xacro, SDF, Stonefish (.scn), YAML"
+        )
     if "thruster_layout" in root.table() and root.get("does_not_claim") is not None:
         raise PlacedError(f"{root.place}: is already a Wakewise vehicle file; use it where a vehicle is asked for")
     entries = list(root.walk())
     geometry = read_geometry(entries, found)
-    matrix = _matrix(entries, found)
+    matrix = _matrix(root, entries, found, rows, flown=not geometry)
     require_same_count(entries, found)
     found.claims += claims_in(entries)
     parameters = read_parameters(entries, found)
+    alike = [(path, item) for path, item in root.unread() if LOOKS_LIKE_THRUSTERS.search(path[-1]) and item.items()]
     if not (geometry or matrix or parameters):
+        said = f"; {_title(alike[0][0])} ({alike[0][1].place.line}) is of a form that is not known" if alike else ""
         raise PlacedError(
             f"{root.place}: {name} holds no allocation matrix, no thruster positions with directions, "
-            f"and no vehicle parameters under a key that is known"
+            f"and no vehicle parameters under a key that is known{said}"
         )
-    found.frame, found.frame_why = _frame(entries, geometry=geometry)
+    if alike and not (geometry or matrix):
+        where = f"{alike[0][1].place.file.name}:{alike[0][1].place.line}"
+        names = ", ".join(_title(path) for path, _ in alike[:4])
+        found.notes.append(
+            f"{QUESTION}not read: {names}, which look like thrusters in a form that is not known ({where})"
+        )
+        for _, item in alike:
+            item.seen = True
+    found.frame, found.frame_why = _frame(root, entries, found, geometry=geometry)
     if geometry and not found.thrust_rule:
         found.thrust_rule = "positive thrust pushes along the directions that the file lists"
+    found.notes += _not_read(root)
 
 
-def read_matrix_only(root: Item, found: Found) -> None:
+def read_matrix_only(root: Item, found: Found, rows: Order | None = None) -> None:
     """Find the allocation matrix of a YAML file, for comparison with a geometry.
 
     Raises
@@ -60,69 +77,148 @@ def read_matrix_only(root: Item, found: Found) -> None:
         If there is none.
     """
     entries = list(root.walk())
-    if not _matrix(entries, found):
+    if not _matrix(root, entries, found, rows, flown=False):
         raise PlacedError(f"{root.place}: holds no allocation matrix under a key that is known")
-    found.frame, found.frame_why = _frame(entries, geometry=False)
+    found.frame, found.frame_why = _frame(root, entries, found, geometry=False)
 
 
-def _frame(entries: Entries, *, geometry: bool) -> tuple[Frame, str]:
-    """FRD or FLU from the names of frames in the file; else what its kind of file uses."""
+_TURNING = re.compile(r"flip|revers|invert|(^|_)sign|polarity|spin", re.IGNORECASE)
+
+
+def _title(path: tuple[str, ...]) -> str:
+    return ".".join(key for key in path if key)[:80]
+
+
+def _not_read(root: Item) -> list[str]:
+    """Keys that no reader took, each once; those that may turn a thrust are questioned."""
+    count: dict[str, list[tuple[tuple[str, ...], Item]]] = {}
+    for path, item in root.unread():
+        count.setdefault(path[-1], []).append((path, item))
+    plain: list[str] = []
+    doubts: list[str] = []
+    for key, places in count.items():
+        said = _title(places[0][0]) if len(places) == 1 else f"{key[:60]} ({len(places)} times)"
+        among = any(LOOKS_LIKE_THRUSTERS.search(part) for part in places[0][0][:-1])
+        turning = _TURNING.search(key) and any(item.value not in ("false", "False", "0", "") for _, item in places)
+        (doubts if among and turning else plain).append(said)
+    notes = [f"{QUESTION}not read: {key}, which may turn the thrust round" for key in doubts[:6]]
+    if plain:
+        more = f" and {len(plain) - 20} more" if len(plain) > 20 else ""
+        notes.append(f"not read: {', '.join(plain[:20])}{more}")
+    return notes
+
+
+def _frame(root: Item, entries: Entries, found: Found, *, geometry: bool) -> tuple[Frame, str]:
+    """FRD or FLU from the file's own frames, names of thrusters, or a comment; else a guess that is questioned."""
+    if found.frame_why:
+        return found.frame, found.frame_why
     for path, item in entries:
         if isinstance(item.value, str):
             for pattern, frame in ((_DOWN_WORDS, "FRD"), (_UP_WORDS, "FLU")):
-                # Only names of frames tell; a comment or a topic may mention either.
+                # Only names of frames tell; a topic may mention either.
                 if re.search(r"frame|tf", " ".join(path), re.IGNORECASE) and pattern.search(item.value):
+                    item.seen = True
                     said = f"detected: {path[-1]} is {item.value} ({item.place.file.name}:{item.place.line})"
                     return ("FRD", said) if frame == "FRD" else ("FLU", said)
+    spoken = {
+        frame: place
+        for text, place in root.comments
+        for pattern, frame in ((_DOWN_WORDS, "FRD"), (_UP_WORDS, "FLU"))
+        if pattern.search(text)
+    }
+    votes = vote([t.name for t in found.thrusters], *_geometry(found)) if found.thrusters else None
+    if votes is not None and votes.frame:
+        if spoken and votes.frame not in spoken:
+            found.notes.append(f"{QUESTION}a comment speaks of {next(iter(spoken))}, the names of the thrusters do not")
+        return ("FLU" if votes.frame == "FLU" else "FRD"), f"inferred: {votes.words}"
+    if len(spoken) == 1:
+        frame, place = next(iter(spoken.items()))
+        why = f"inferred: a comment says so, no key does ({place.file.name}:{place.line})"
+        return ("FRD", why) if frame == "FRD" else ("FLU", why)
+    what = "thruster positions" if geometry else "the matrix"
+    if found.thrusters or found.matrix is not None:
+        found.notes.append(
+            f"{QUESTION}the frame of {what} is a guess: no key, name of a thruster or comment says it; "
+            f"--frame FLU or --frame FRD does"
+        )
     if geometry:
-        return "FRD", "inferred: lists of thruster positions in this form are FRD; nothing in the file says so"
-    return "FLU", "inferred: ROS files state matrices in base_link, which is FLU; nothing in the file says so"
+        return "FRD", "inferred: lists of thruster positions in this form are FRD; no key says so"
+    return "FLU", "inferred: ROS files state matrices in base_link, which is FLU; no key says so"
 
 
-def _matrix(entries: Entries, found: Found) -> bool:
+def _geometry(found: Found) -> tuple[Array, Array]:
+    return np.array([t.p_m for t in found.thrusters]), np.array([t.axis for t in found.thrusters])
+
+
+def _matrix(root: Item, entries: Entries, found: Found, rows: Order | None, *, flown: bool) -> bool:
     for path, item in entries:
         key = path[-1]
         if not _MATRIX_KEY.search(key) or _NOT_MATRIX.search(key):
             continue
-        named = next((names for names in _ROW_NAMES if all(name in item.table() for name in names)), None)
-        if named is not None:
-            rows = [item.table()[row].numbers(f"row {row} of {key}") for row in named]
-            lengths = {len(row) for row in rows}
-            if len(lengths) != 1 or 0 in lengths:
-                raise PlacedError(
-                    f"{item.place}: {key} has rows of {sorted(lengths)} numbers, all must be of one length"
-                )
-            matrix = np.stack(rows)
-        elif item.is_matrix():
-            matrix = item.rows(key)
-            if matrix.shape == (6, 6):
-                matrix = upright(matrix, matrix.T, key, found.notes)
-        elif item.is_numbers():
-            flat = item.numbers(key)
-            if len(flat) % 6:
-                raise PlacedError(f"{item.place}: {key} has {len(flat)} numbers, must be 6 rows")
-            matrix = upright(flat.reshape(6, -1), flat.reshape(-1, 6).T, key, found.notes)
-        elif item.table() and all(len(column.items()) == 6 and column.is_numbers() for column in item.table().values()):
-            matrix = np.stack([column.numbers(f"{name} of {key}", 6) for name, column in item.table().items()], axis=1)
-            found.notes.append(f"{key}: a column for each of {', '.join(item.table())[:120]}")
-        else:
-            if item.items():
-                found.notes.append(
-                    f"{QUESTION}{key} is not read, neither rows nor columns of numbers ({item.place.file.name}:"
-                    f"{item.place.line})"
-                )
+        raw, order = _numbers(key, item, found)
+        if raw is None:
             continue
-        if matrix.shape[0] != 6 and matrix.shape[1] == 6:
-            found.notes.append(f"{key}: {matrix.shape[0]} rows of 6 are taken for its transpose")
-            matrix = matrix.T
-        if matrix.shape[0] != 6:
-            raise PlacedError(f"{item.place}: {key} has shape {matrix.shape}, must be (6, n), a column per thruster")
-        if matrix.shape[1] == 0:
+        if raw.ndim == 2 and 6 not in raw.shape:
+            raise PlacedError(f"{item.place}: {key} has shape {raw.shape}, must be (6, n), a column per thruster")
+        if 0 in raw.shape:
             raise PlacedError(f"{item.place}: {key} has no columns, must have one per thruster")
-        require_count(matrix.shape[1], f"{item.place}: {key}: ")
-        found.matrix, found.matrix_name = matrix, key
-        found.notes.append(
-            f"allocation matrix: {key}, 6 x {matrix.shape[1]} ({item.place.file.name}:{item.place.line})"
-        )
+        n = raw.size // 6
+        require_count(n, f"{item.place}: {key}: ")
+        order = rows or order or _stated_order(root, path, item, entries)
+        found.matrix, stated = settle(raw, order, key, item.place if flown else None, found.notes)
+        found.matrix_name, found.raw_matrix = key, None if stated else raw
+        if order is not None and order.throttle:
+            how = "inferred" if order.why.startswith("inferred") else "detected"
+            found.frame, found.frame_why = "FRD", f"{how}: {key} is of throttle, up, and lateral, to the right"
+        found.notes.append(f"allocation matrix: {key}, 6 x {n} ({item.place.file.name}:{item.place.line})")
         return True
     return False
+
+
+def _numbers(key: str, item: Item, found: Found) -> tuple[Array | None, Order | None]:
+    """Numbers of a matrix as they stand, and their order where each row has a name; None if these are none."""
+    named = order_of(list(item.table()), f"names of the rows of {key}") if len(item.table()) == 6 else None
+    if named is not None:
+        rows = [row.numbers(f"row {name} of {key}") for name, row in item.table().items()]
+        lengths = {len(row) for row in rows}
+        if len(lengths) != 1 or 0 in lengths:
+            raise PlacedError(f"{item.place}: {key} has rows of {sorted(lengths)} numbers, all must be of one length")
+        return np.stack(rows), named
+    if item.is_matrix():
+        return item.rows(key), None
+    if item.is_numbers():
+        flat = item.numbers(key)
+        if len(flat) % 6:
+            raise PlacedError(f"{item.place}: {key} has {len(flat)} numbers, must be 6 rows")
+        return flat, None
+    if item.table() and all(len(column.items()) == 6 and column.is_numbers() for column in item.table().values()):
+        found.notes.append(f"{key}: six numbers for each of {', '.join(item.table())[:120]}")
+        return np.stack([column.numbers(f"{name} of {key}", 6) for name, column in item.table().items()]), None
+    if item.items():
+        found.notes.append(
+            f"{QUESTION}{key} is not read, neither rows nor columns of numbers ({item.place.file.name}:"
+            f"{item.place.line})"
+        )
+    return None, None
+
+
+def _stated_order(root: Item, path: tuple[str, ...], item: Item, entries: Entries) -> Order | None:
+    """Order that a list of six names beside the matrix states, or a comment; None if none does, or several differ."""
+    beside = [(p, e) for p, e in entries if p[:-1] == path[:-1]] or entries
+    for key, entry in [*beside, *entries]:
+        labels = [member.value for member in entry.items() if isinstance(member.value, str)]
+        order = order_of(labels, f"{key[-1]} says so") if len(labels) == len(entry.items()) == 6 else None
+        if order is not None:
+            entry.seen = True
+            return order
+    at = {place.line: text for text, place in root.comments}
+    if len(item.items()) == 6 and item.is_matrix():
+        labels = [component_in_comment(at.get(row.place.line, "")) for row in item.items()]
+        order = order_of(labels, "comments beside the rows say so")
+        if order is not None:
+            return order
+    spoken = {order.words.lower(): (order, place) for text, place in root.comments if (order := order_in_comment(text))}
+    if len(spoken) != 1:
+        return None
+    order, place = next(iter(spoken.values()))
+    return replace(order, why=f"inferred: a comment says so, {place.file.name}:{place.line}")

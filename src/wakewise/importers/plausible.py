@@ -9,11 +9,12 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.importers.found import QUESTION, Found
+from wakewise.importers.names import contradictions, lying
 from wakewise.importers.xml import Place, PlacedError
 from wakewise.importers.yaml_parameters import Entries
 from wakewise.importers.yamls import Item
 from wakewise.vehicles.check import directions
-from wakewise.vehicles.draft import MAX_THRUSTERS
+from wakewise.vehicles.draft import MAX_THRUSTERS, VehicleDraft
 
 UNIT_SLACK = 0.02
 """How far a force column may be from length 1: entries of two digits, such as 0.7 for cos 45 deg, pass."""
@@ -25,6 +26,7 @@ _LIST = re.compile(
 _LAYOUT_KEY = re.compile(r"frame|layout|config|mixer|type|dofs?$|degrees_of_freedom|actuation", re.IGNORECASE)
 _DOF_WORDS = re.compile(r"(?<![0-9.])([3-6])[ _-]?dofs?(?![a-z])", re.IGNORECASE)
 _FULL_WORDS = re.compile(r"(fully|over)[ _-]?actuated|holonomic", re.IGNORECASE)
+_MANY = 6
 _DOF_KEY = re.compile(r"^(dofs?|num_dofs?|degrees_of_freedom)$", re.IGNORECASE)
 
 
@@ -43,30 +45,6 @@ def require_count(n: int, where: str = "") -> None:
     """
     if n > MAX_THRUSTERS:
         raise PlacedError(f"{where}{n} thrusters, at most {MAX_THRUSTERS} are read")
-
-
-def upright(matrix: Array, other: Array, key: str, notes: list[str]) -> Array:
-    """Of two ways of reading one matrix, each (6, n), the one whose force columns have length 1.
-
-    Where both have, a moment at right angles to its force decides, as every thruster without swirl has; where neither
-    has, or nothing tells, the first is kept.
-    """
-    if matrix.shape == other.shape and np.array_equal(matrix, other):
-        return matrix
-    first, second = (bool(is_unit(np.linalg.norm(m[:3], axis=0)).all()) for m in (matrix, other))
-    if first and second:
-        crossed = [
-            bool((np.abs(np.sum(m[:3] * m[3:], axis=0)) <= UNIT_SLACK * (1.0 + np.abs(m[3:]).max(axis=0))).all())
-            for m in (matrix, other)
-        ]
-        if crossed == [False, True]:
-            first = False
-        elif crossed[0] == crossed[1]:
-            notes.append(f"{QUESTION}{key} reads as six rows and as a row per thruster; taken as six rows")
-    if second and not first:
-        notes.append(f"{key}: a row of 6 per thruster, since only so every force has length 1")
-        return other
-    return matrix
 
 
 def require_force_columns(matrix: Array, what: str) -> None:
@@ -106,6 +84,7 @@ def require_same_count(entries: Entries, found: Found) -> None:
         raise PlacedError(f"{found.file}: {found.matrix_name} has {columns} columns, but the file places {n} thrusters")
     for path, item in entries:
         said = _said_count(path, item)
+        item.seen = item.seen or said is not None
         if said is not None and said != n:
             what = f"{found.matrix_name} has" if not found.thrusters else "the file places"
             raise PlacedError(f"{item.place}: {path[-1]} says {said} thrusters, but {what} {n}")
@@ -136,10 +115,12 @@ def claims_in(entries: Entries) -> list[tuple[int, str, Place, bool]]:
         if (_DOF_KEY.match(key) or (inside and key.lower() in {"num", "count"})) and item.value.strip() in set(
             "123456"
         ):
+            item.seen = True
             said.append((int(item.value), f"{'.'.join(path[-2:])}: {item.value}", item.place, True))
         elif _LAYOUT_KEY.search(key):
             axes = claimed(item.value)
             if axes:
+                item.seen = True
                 said.append((axes, f"{key}: {item.value[:60]}", item.place, True))
     return said
 
@@ -178,3 +159,46 @@ def question_rank(found: Found, matrix: Array, name: str) -> list[str]:
         if rank < axes:
             notes.append(f"{QUESTION}{words} claims {axes} axes, but the thrusters make only {rank} (rank {rank})")
     return notes
+
+
+def question_names(found: Found, draft: VehicleDraft, *, told: bool) -> list[str]:
+    """Hold places and axes against the thrusters' own names, and a guess of axes against what any vehicle can do.
+
+    Parameters
+    ----------
+    found : Found
+    draft : VehicleDraft
+        In FRD.
+    told : bool
+        Whether the user said along which axis thrusters push.
+
+    Returns
+    -------
+    list of str
+        Notes that question the places.
+
+    Raises
+    ------
+    InputError
+        If nothing but a guess says which way thrusters push, and the vehicle it makes is none.
+    """
+    if not draft.thrusters:
+        return []
+    places = np.array([t.p_BT_m for t in draft.thrusters])
+    axes = np.array([t.axis_B for t in draft.thrusters])
+    names = [t.name for t in draft.thrusters]
+    against = lying(names, axes)
+    n, rank = len(axes), directions(draft.allocation_matrix).rank
+    if found.guessed and not told:
+        if n >= 3 and bool((np.abs(axes[:, 2]) > 0.99).all()):
+            against.append(f"all {n} push up or down")
+        elif n >= _MANY and rank <= n // 2:
+            against.append(f"{n} of them make only {rank} axes (rank {rank})")
+        if against:
+            rule = found.thrust_rule.removeprefix("inferred from names: ")
+            raise PlacedError(
+                f"{found.file}: {found.guessed}, {rule}, and that is wrong: {against[0]}; "
+                f"say how they push with --thrust-direction (+x, -x, +y, -y, +z or -z)"
+            )
+    against += contradictions(names, places, axes)
+    return [f"{QUESTION}{words}: the frame, the places or the names are wrong" for words in against]

@@ -10,12 +10,28 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.importers.bodies import THRUSTER_NAME, Bodies, Joint
 from wakewise.importers.found import QUESTION, Found, FoundThruster
+from wakewise.importers.urdf import origin
 from wakewise.importers.xml import Element, PlacedError, number, numbers
 
 GZ_RULE = "positive thrust pushes along the joint axis, whatever the sign of thrust_coefficient (gz-sim's Thruster)"
 UUV_RULE = "positive thrust pushes along the joint axis, +x of the thruster where none is given (UUV Simulator)"
 NAME_RULE = "inferred from names: positive thrust pushes along the axis of each joint that is called a thruster"
 
+HIPPO_RULE = (
+    "positive thrust pushes along +x of the thruster's link, turned round by a clockwise propeller (HippoCampus)"
+)
+ORCA_RULE = "positive thrust pushes along +z of each thruster's origin, turned round by a negative pos_force (orca2)"
+
+_DRIVES = re.compile(r"thrust|propel|propuls|rotor|motor", re.IGNORECASE)
+_READ = frozenset(
+    {
+        *("joint_name", "thrust_coefficient", "propeller_diameter", "use_angvel_cmd", "max_thrust_cmd"),
+        *("min_thrust_cmd", "linkName", "jointName", "thrusterID", "dynamics", "thrustMax", "thrustMin", "conversion"),
+        *("clampMax", "clampMin", "gain", "thrust_efficiency", "link", "joint", "propeller_direction", "link_name"),
+        *("turning_direction", "thruster", "pos_force", "neg_force", "origin"),
+    }
+)
+"""What is read of the plugins above; their hands, coefficients and topics change no direction."""
 _PROPELLER = re.compile(r"prop|rotor|blade", re.IGNORECASE)
 _NUMBERED = re.compile(r"\d+")
 _HAND_M = 0.15
@@ -36,27 +52,105 @@ def read_thrusters(bodies: Bodies, found: Found) -> None:
     """
     rules: list[str] = []
     order: list[float] = []
+    known: list[Element] = []
+    unknown: list[Element] = []
     for plugin in bodies.plugins:
-        if "thruster" not in words(plugin) or "manager" in words(plugin):
+        if not _drives(plugin):
             continue
-        if plugin.first("joint_name") is not None:
-            found.thrusters.append(_gz(plugin, bodies))
-            rules.append(GZ_RULE)
-            order.append(math.inf)
-        elif plugin.first("linkName") is not None or plugin.first("jointName") is not None:
-            found.thrusters.append(_uuv(plugin, bodies))
-            rules.append(UUV_RULE)
-            identity = plugin.value("thrusterID")
-            order.append(number(identity, plugin.place, "thrusterID") if identity else math.inf)
+        read = _plugin_thrusters(plugin, bodies, found)
+        (unknown if read is None else known).append(plugin)
+        for thruster, rule, identity in read or ():
+            found.thrusters.append(thruster)
+            rules.append(rule)
+            order.append(identity)
     _drop_repeats(found, order)
+    for plugin in unknown:
+        inner = len(plugin.all("thruster"))
+        found.notes.append(
+            f"{QUESTION}not read: plugin {_title(plugin)}, of a form that is not known"
+            + (f", with {inner} thrusters in it" if inner else "")
+            + f" ({plugin.place.file.name}:{plugin.place.line})"
+        )
     if found.thrusters:
         found.thrusters = [t for _, t in sorted(zip(order, found.thrusters, strict=True), key=lambda pair: pair[0])]
         found.thrust_rule = "; ".join(dict.fromkeys(rules))
         found.derived["thruster_layout"] = f"{found.kind} {found.file.name}: thruster plugins and their joints"
         _question_undriven(bodies, found)
     elif not _freefloating(bodies, found):
-        _by_name(bodies, found)
+        _by_name(bodies, unknown, found)
+    tags = dict.fromkeys(child.tag for plugin in known for child in plugin.children if child.tag not in _READ)
+    if tags:
+        found.notes.append(f"not read of the thruster plugins: {', '.join(tags)[:400]}")
     _ardupilot(bodies, found)
+
+
+def _drives(plugin: Element) -> bool:
+    """Whether a plugin seems to push: by its name, or by thrusters inside it; a manager allocates only."""
+    if "manager" in words(plugin) or "freefloating" in words(plugin):
+        return False
+    return _DRIVES.search(words(plugin)) is not None or plugin.first("thruster") is not None
+
+
+def _title(plugin: Element) -> str:
+    return (plugin.attributes.get("name") or plugin.attributes.get("filename") or "without a name")[:80]
+
+
+def _plugin_thrusters(plugin: Element, bodies: Bodies, found: Found) -> list[tuple[FoundThruster, str, float]] | None:
+    """Thrusters of one plugin with its rule and their order; None if its form is not known."""
+    if "thruster" in words(plugin):
+        if plugin.first("joint_name") is not None:
+            return [(_gz(plugin, bodies), GZ_RULE, math.inf)]
+        if plugin.first("linkName") is not None or plugin.first("jointName") is not None:
+            identity = plugin.value("thrusterID")
+            place = number(identity, plugin.place, "thrusterID") if identity else math.inf
+            return [(_uuv(plugin, bodies), UUV_RULE, place)]
+        if plugin.first("link") is not None and plugin.first("propeller_direction") is not None:
+            return [(_hippo(plugin, bodies), HIPPO_RULE, math.inf)]
+    inner = plugin.all("thruster")
+    if inner and all(t.first("origin") is not None and t.first("map") is None for t in inner):
+        return [(t, ORCA_RULE, math.inf) for t in _orca(plugin, bodies, found)]
+    return None
+
+
+def _hippo(plugin: Element, bodies: Bodies) -> FoundThruster:
+    name = plugin.value("link") or ""
+    link = bodies.link(name)
+    if link is None:
+        raise PlacedError(f"{plugin.place}: thruster plugin: link {name} is not in the file")
+    sign = -1.0 if (plugin.value("propeller_direction") or "").lower() == "cw" else 1.0
+    # The force acts at the link's centre of mass (gz-sim's AddWorldForce).
+    p_m = link.X_BL.apply(link.p_LG_m)
+    return FoundThruster(short(link.name), p_m, sign * link.X_BL.R[:, 0], plugin.place, link.X_BL.R)
+
+
+def _orca(plugin: Element, bodies: Bodies, found: Found) -> list[FoundThruster]:
+    """Thrusters that stand in the plugin itself, each an origin in one link with its forces at full command."""
+    name = plugin.value("link_name") or bodies.base
+    link = bodies.link(name)
+    if link is None:
+        raise PlacedError(f"{plugin.place}: thruster plugin: link {name} is not in the file")
+    thrusters: list[FoundThruster] = []
+    for i, element in enumerate(plugin.all("thruster")):
+        X_BT = link.X_BL @ origin(element.first("origin"))
+        ahead, astern = _number(element, "pos_force"), _number(element, "neg_force")
+        ahead, astern = 50.0 if ahead is None else ahead, 40.0 if astern is None else astern
+        label = element.attributes.get("name") or f"thruster{i}"
+        if ahead * astern <= 0.0:
+            raise PlacedError(
+                f"{element.place}: thruster {label}: pos_force {ahead:g} and neg_force {astern:g} must be of one sign, "
+                f"or it pushes one way only"
+            )
+        sign = math.copysign(1.0, ahead)
+        thruster = FoundThruster(label, X_BT.p_m, sign * X_BT.R[:, 2], element.place, X_BT.R)
+        thruster.max_forward_N, thruster.max_reverse_N = abs(ahead), abs(astern)
+        thrusters.append(thruster)
+    if np.any(np.abs(link.p_LG_m) > 1e-9):
+        found.notes.append(
+            f"{QUESTION}places of thrusters are from the origin of link {short(link.name)}, as the plugin's text says; "
+            f"Gazebo counts them from its centre of mass, {np.round(link.p_LG_m, 4).tolist()} m away"
+        )
+    found.derived["thruster_limits"] = f"{found.kind} {found.file.name}: pos_force and neg_force of the plugin"
+    return thrusters
 
 
 def _question_undriven(bodies: Bodies, found: Found) -> None:
@@ -67,7 +161,7 @@ def _question_undriven(bodies: Bodies, found: Found) -> None:
         for j in bodies.joints.values()
         if j.kind in {"continuous", "revolute"}
         and THRUSTER_NAME.search(short(j.child) + " " + short(j.name))
-        and not any(float(np.linalg.norm(j.X_BJ.p_m - p)) < _HAND_M for p in driven)
+        and not any(float(np.linalg.norm(_where(j, bodies) - p)) < _HAND_M for p in driven)
     ]
     if idle:
         found.notes.append(
@@ -104,7 +198,7 @@ def _gz(plugin: Element, bodies: Bodies) -> FoundThruster:
     if joint is None or joint.axis is None:
         what = "is not in the file" if joint is None else "has no axis"
         raise PlacedError(f"{plugin.place}: thruster plugin: joint {name} {what}")
-    thruster = _on_joint(joint)
+    thruster = _on_joint(joint, bodies)
     diameter = _number(plugin, "propeller_diameter")
     if diameter is not None:
         thruster.disk_area_m2 = 0.25 * math.pi * diameter**2
@@ -115,11 +209,17 @@ def _gz(plugin: Element, bodies: Bodies) -> FoundThruster:
     return thruster
 
 
-def _on_joint(joint: Joint) -> FoundThruster:
+def _where(joint: Joint, bodies: Bodies) -> Array:
+    """Where a thruster on a joint pushes: at the origin of the link that turns, wherever the joint itself is placed."""
+    link = bodies.link(joint.child)
+    return joint.X_BJ.p_m if link is None else link.X_BL.p_m
+
+
+def _on_joint(joint: Joint, bodies: Bodies) -> FoundThruster:
     axis = joint.axis if joint.axis is not None else joint.X_BJ.R[:, 0]
     where = f"{joint.place}: joint {joint.name}"
     name = short(joint.child)
-    return FoundThruster(name, joint.X_BJ.p_m, _checked_axis(axis, where), joint.place, joint.X_BJ.R)
+    return FoundThruster(name, _where(joint, bodies), _checked_axis(axis, where), joint.place, joint.X_BJ.R)
 
 
 def short(name: str) -> str:
@@ -132,7 +232,7 @@ def _uuv(plugin: Element, bodies: Bodies) -> FoundThruster:
     joint = bodies.joint(joint_name) if joint_name else None
     link = bodies.link(link_name) if link_name else None
     if joint is not None:
-        thruster = _on_joint(joint)
+        thruster = _on_joint(joint, bodies)
         if link is not None:
             thruster.name = short(link.name)
     elif link is not None:
@@ -178,13 +278,13 @@ def _number(element: Element, tag: str) -> float | None:
     return None if text is None or child is None else number(text, child.place, tag)
 
 
-def _by_name(bodies: Bodies, found: Found) -> None:
+def _by_name(bodies: Bodies, unknown: list[Element], found: Found) -> None:
     joints = [j for j in bodies.joints.values() if THRUSTER_NAME.search(short(j.child) + " " + short(j.name))]
     turning = [j for j in joints if j.axis is not None and j.kind in {"continuous", "revolute"}]
     fixed = [j for j in joints if j.kind == "fixed"]
     turning, fixed = _one_each(turning, bodies, found), _one_each(fixed, bodies, found) if not turning else []
     for joint in turning or fixed:
-        found.thrusters.append(_on_joint(joint))
+        found.thrusters.append(_on_joint(joint, bodies))
     if turning:
         found.thrust_rule = NAME_RULE
     elif fixed:
@@ -192,7 +292,9 @@ def _by_name(bodies: Bodies, found: Found) -> None:
             "inferred from names: positive thrust pushes along +x of each fixed link that is called a thruster"
         )
     if found.thrusters:
-        found.notes.append("no thruster plugin in the file: links were taken for thrusters by their names")
+        found.guessed = "links were taken for thrusters by their names"
+        why = "the file's thruster plugin is not read" if unknown else "no thruster plugin in the file"
+        found.notes.append(f"{QUESTION if unknown else ''}{why}: {found.guessed}, and which way they push is a guess")
         found.thrusters.sort(key=lambda t: [int(n) for n in _NUMBERED.findall(t.name)])
         found.derived["thruster_layout"] = f"{found.kind} {found.file.name}: joints with thruster names"
 

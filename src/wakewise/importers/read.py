@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,23 +12,22 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.importers.bodies import Bodies, read_camera, read_displacement, read_mass
-from wakewise.importers.found import FRAME_CHOICES, THRUST_CHOICES, Found, make_draft, wrench_rows_to_frd
+from wakewise.importers.found import FRAME_CHOICES, QUESTION, THRUST_CHOICES, Found, make_draft, wrench_rows_to_frd
 from wakewise.importers.matrices import read_matrix_only, read_yaml
 from wakewise.importers.outline import read_outline
 from wakewise.importers.packages import Folders
-from wakewise.importers.plausible import question_rank, require_count, require_force_columns
+from wakewise.importers.plausible import question_names, question_rank, require_count, require_force_columns
 from wakewise.importers.plugins import read_thrusters, words
 from wakewise.importers.sdf import left_out, read_sdf
 from wakewise.importers.stonefish import read_stonefish
 from wakewise.importers.urdf import read_urdf
 from wakewise.importers.water import read_water
+from wakewise.importers.wrench_rows import ARDUSUB, FORCES_FIRST, MOMENTS_FIRST, Order, agreeing, nearest, told_order
 from wakewise.importers.xacro import Xacro
 from wakewise.importers.xml import Element, PlacedError, parse_xml, read_text
 from wakewise.importers.yamls import parse_yaml
 from wakewise.vehicles.draft import VehicleDraft
 from wakewise.vehicles.vehicle import Provenance
-
-_AGREE = 1e-3
 
 
 def import_vehicle(
@@ -39,6 +39,7 @@ def import_vehicle(
     packages: Mapping[str, Path] | None = None,
     arguments: Mapping[str, str] | None = None,
     skip_missing: bool = False,
+    rows: str | None = None,
 ) -> VehicleDraft:
     """Read a vehicle description of another project.
 
@@ -59,6 +60,9 @@ def import_vehicle(
         Values of xacro and Stonefish arguments.
     skip_missing : bool
         Leave out xacro includes that are not there, with a note, instead of refusing the file.
+    rows : str, optional
+        What the six rows of a matrix are, in the file's order: names parted by commas, such as
+        "roll,pitch,yaw,x,y,z".
 
     Returns
     -------
@@ -77,27 +81,41 @@ def import_vehicle(
     try:
         # Overflow in numbers of absurd size shows as an infinity, which the record refuses; it needs no warning.
         with np.errstate(all="ignore"):
-            found = _read(path, packages or {}, arguments or {}, skip_missing=skip_missing)
+            order = told_order(rows)
+            found = _read(path, packages or {}, arguments or {}, order, skip_missing=skip_missing)
             require_count(len(found.thrusters), f"{path}: ")
             draft = make_draft(found, convention, thrust)
-            draft = draft if matrix is None else _with_matrix(draft, matrix, convention)
+            draft = draft if matrix is None else _with_matrix(draft, matrix, convention, rows)
             if not draft.thrusters and draft.shipped_matrix is not None:
                 named = found.matrix_name or "matrix"
                 require_force_columns(draft.shipped_matrix, f"{path if matrix is None else matrix}: {named}")
             if not draft.thrusters and draft.shipped_matrix is None:
                 return draft
-            doubts = question_rank(found, draft.allocation_matrix, found.name)
+            doubts = [
+                *question_rank(found, draft.allocation_matrix, found.name),
+                *question_names(found, draft, told=thrust != "auto"),
+            ]
             return replace(draft, notes=(*draft.notes, *doubts)) if doubts else draft
     except (RecursionError, ArithmeticError, np.linalg.LinAlgError) as fault:
         raise InputError(f"{path}: cannot be read ({type(fault).__name__})") from fault
 
 
-def _read(path: Path, packages: Mapping[str, Path], arguments: Mapping[str, str], *, skip_missing: bool) -> Found:
+def _read(
+    path: Path,
+    packages: Mapping[str, Path],
+    arguments: Mapping[str, str],
+    order: Order | None,
+    *,
+    skip_missing: bool,
+) -> Found:
     text = read_text(path)
     if not text.lstrip().startswith("<"):
+        _refuse_toml(text, path)
         found = Found(path.stem, "YAML", path, "FLU", "")
-        read_yaml(parse_yaml(text, path), path.name, found)
+        read_yaml(parse_yaml(text, path), path.name, found, order)
         return found
+    if order is not None:
+        raise InputError(f"{path}: holds no matrix, so rows {order.words} say nothing; they are for YAML files")
     root = parse_xml(text, path)
     folders = Folders(path, packages)
     notes: list[str] = []
@@ -132,6 +150,18 @@ def _read(path: Path, packages: Mapping[str, Path], arguments: Mapping[str, str]
     if not found.thrusters:
         found.notes.append("no thruster was found in the file")
     return found
+
+
+def _refuse_toml(text: str, path: Path) -> None:
+    if path.suffix.lower() == ".toml" or _TOML.search(text):
+        line = next((i for i, row in enumerate(text.splitlines(), 1) if _TOML.match(row)), 1)
+        raise PlacedError(
+            f"{path}:{line}: is {'TOML' if path.suffix.lower() == '.toml' else 'TOML or INI'}, which is not read; "
+            f"vehicles are read from URDF, xacro, SDF, Stonefish (.scn) and YAML"
+        )
+
+
+_TOML = re.compile(r"^(\[\[?[A-Za-z_][\w.-]*\]\]?\s*(#.*)?|[A-Za-z_][\w.-]*\s*=\s*\S.*)$", re.MULTILINE)
 
 
 def _is_xacro(root: Element) -> bool:
@@ -187,11 +217,14 @@ def float_or_nan(text: str) -> float:
         return float("nan")
 
 
-def read_matrix(path: Path, convention: str = "auto", geometry: Array | None = None) -> tuple[Array, list[str]]:
+def read_matrix(
+    path: Path, convention: str = "auto", geometry: Array | None = None, rows: str | None = None
+) -> tuple[Array, list[str]]:
     """Allocation matrix of a YAML file, shape (6, n), in FRD, and notes on how it was read.
 
-    Names of frames in the file decide its axes; else `convention`; else the `geometry`, shape (6, n), by which axes
-    make more entries agree; else they are FLU as in ROS.
+    What the file or `rows` state of its rows and its frame is taken, and `convention`; what they leave open, the
+    `geometry`, shape (6, n), settles by the way of reading in which most entries agree; without it forces come first
+    and the frame is FLU as in ROS.
 
     Raises
     ------
@@ -199,29 +232,29 @@ def read_matrix(path: Path, convention: str = "auto", geometry: Array | None = N
         If the file holds none or it has the wrong shape.
     """
     found = Found(path.stem, "YAML", path, "FLU", "")
-    read_matrix_only(parse_yaml(read_text(path), path), found)
+    read_matrix_only(parse_yaml(read_text(path), path), found, told_order(rows))
     if found.matrix is None:
         raise InputError(f"{path}: holds no allocation matrix")
     frame, why = found.frame, found.frame_why
-    turned = wrench_rows_to_frd(found.matrix)
-    if not why.startswith("detected"):
-        if convention != "auto":
-            frame, why = ("FRD" if convention == "FRD" else "FLU"), "told"
-        elif geometry is not None and geometry.shape == turned.shape:
-            agree = {
-                name: int(np.sum(np.abs(stated - geometry) <= _AGREE))
-                for name, stated in (("FLU", turned), ("FRD", found.matrix))
-            }
-            frame = "FRD" if agree["FRD"] > agree["FLU"] else "FLU"
-            why = f"inferred: {agree[frame]} of {geometry.size} entries agree with the geometry so read"
-            why += f", {agree['FLU' if frame == 'FRD' else 'FRD']} the other way"
-    return turned if frame == "FLU" else found.matrix, [*found.notes, f"frame of the matrix: {frame} ({why})"]
+    known = why.startswith("detected") or convention != "auto"
+    if convention != "auto" and not why.startswith("detected"):
+        frame, why = ("FRD" if convention == "FRD" else "FLU"), "told"
+    stated = wrench_rows_to_frd(found.matrix) if frame == "FLU" else found.matrix
+    if geometry is not None and geometry.shape == stated.shape:
+        raws = [found.matrix] if found.raw_matrix is None else [found.raw_matrix]
+        orders = [FORCES_FIRST] if found.raw_matrix is None else [FORCES_FIRST, MOMENTS_FIRST, ARDUSUB]
+        best, words = nearest(raws, geometry, orders, [frame] if known else ["FLU", "FRD"])
+        if agreeing(best, geometry) > agreeing(stated, geometry) or not known:
+            doubts = [note for note in found.notes if note.startswith(QUESTION)]
+            found.notes = [note for note in found.notes if note not in doubts]
+            return best, [*found.notes, f"matrix read as {words}"]
+    return stated, [*found.notes, f"frame of the matrix: {frame} ({why})"]
 
 
-def _with_matrix(draft: VehicleDraft, path: Path, convention: str) -> VehicleDraft:
+def _with_matrix(draft: VehicleDraft, path: Path, convention: str, rows: str | None) -> VehicleDraft:
     """Keep a shipped matrix beside the geometry."""
     n = len(draft.thrusters)
-    matrix, notes = read_matrix(path, convention, draft.allocation_matrix if n else None)
+    matrix, notes = read_matrix(path, convention, draft.allocation_matrix if n else None, rows)
     if n and matrix.shape[1] != n:
         raise InputError(f"{path}: allocation matrix has {matrix.shape[1]} columns, the vehicle has {n} thrusters")
     origin = Provenance(group="shipped_matrix", source=f"YAML {path.name}", estimate=False)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -15,16 +16,22 @@ from wakewise.importers.xml import Place, PlacedError, number
 
 MAX_TEXT = 600_000
 """Longest YAML text that is read; parsing it takes a few seconds."""
+_COMMENT = re.compile(r"(?:^|\s)#+(.*)")
 MAX_NODES = 100_000
 MAX_DEPTH = 40
 
 
 @dataclass(eq=False)
 class Item:
-    """A value in a YAML file: text, a list of items, or a table of items."""
+    """A value in a YAML file: text, a list of items, or a table of items.
+
+    `seen` is set where a reader takes the value; `comments` are those of the whole file, at its root only.
+    """
 
     value: str | list[Item] | dict[str, Item]
     place: Place
+    seen: bool = False
+    comments: list[tuple[str, Place]] = field(default_factory=list)
 
     def table(self) -> dict[str, Item]:
         """The table; empty if this is something else."""
@@ -44,14 +51,38 @@ class Item:
             yield (*path, key), item
             yield from item.walk((*path, key))
 
+    def words(self) -> str:
+        """The text; "" if this is something else."""
+        self.seen = True
+        return self.value if isinstance(self.value, str) else ""
+
+    def unread(self, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Item]]:
+        """The outermost keys below this of which no reader took anything, with what leads to them."""
+        members = list(self.table().items()) or [("", item) for item in self.items() if item.table()]
+        for key, item in members:
+            if item.seen:
+                continue
+            if any(below.seen for _, below in item.walk_all()):
+                yield from item.unread((*path, key))
+            else:
+                yield (*path, key), item
+
+    def walk_all(self) -> Iterator[tuple[tuple[str, ...], Item]]:
+        """Every item below this one, in tables and in lists."""
+        for key, item in [*self.table().items(), *(("", item) for item in self.items())]:
+            yield (key,), item
+            yield from item.walk_all()
+
     def scalar(self, what: str) -> float:
         """The number; refuses anything else."""
+        self.seen = True
         if not isinstance(self.value, str):
             raise PlacedError(f"{self.place}: {what} must be a number")
         return number(self.value, self.place, what)
 
     def numbers(self, what: str, count: int | None = None) -> Array:
         """A flat list of numbers; lists within lists are joined."""
+        self.seen = True
         flat = list(self._flat(what))
         if count is not None and len(flat) != count:
             raise PlacedError(f"{self.place}: {what} has {len(flat)} numbers, must have {count}")
@@ -59,6 +90,7 @@ class Item:
 
     def rows(self, what: str) -> Array:
         """A list of lists of numbers, all of one length, as a matrix."""
+        self.seen = True
         rows = [row.numbers(f"a row of {what}") for row in self.items()]
         lengths = {len(row) for row in rows}
         if not rows or len(lengths) != 1:
@@ -104,7 +136,7 @@ def parse_yaml(text: str, path: Path) -> Item:
         root = yaml.compose(text, Loader=yaml.BaseLoader)
         if root is None:
             raise InputError(f"{path}: holds nothing")
-        return _Converter(path).item(root, 0)
+        item = _Converter(path).item(root, 0)
     except yaml.MarkedYAMLError as fault:
         line = fault.problem_mark.line + 1 if fault.problem_mark else 1
         raise PlacedError(f"{path}:{line}: neither XML nor YAML ({fault.problem})") from fault
@@ -112,6 +144,12 @@ def parse_yaml(text: str, path: Path) -> Item:
         raise InputError(f"{path}: neither XML nor YAML ({type(fault).__name__})") from fault
     except RecursionError as fault:
         raise InputError(f"{path}: lists nested too deeply") from fault
+    item.comments = [
+        (match[1].strip(), Place(path, i))
+        for i, line in enumerate(text.splitlines(), 1)
+        if (match := _COMMENT.search(line))
+    ]
+    return item
 
 
 class _Converter:
