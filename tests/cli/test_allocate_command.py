@@ -83,13 +83,18 @@ def test_d_is_the_printed_formula_and_the_wrench_is_made(capsys: Capsys, points:
 
 def test_no_thrusts_of_a_coarse_grid_cost_less(capsys: Capsys, points: Path) -> None:
     """A grid over both null vectors, evaluated from the formula, finds nothing below the answer."""
-    found = answer(capsys, points, "--wake-model", "paper", "--w-effort", "1e-3")
+    found = answer(capsys, points, "--wake-model", "paper")
     T, null = np.array(found["thrusts_N"]), np.array(found["null_space"])
-    ours = printed_disturbance(T, True) + 1e-3 * T @ T
+
+    def cost(thrusts: np.ndarray) -> float:
+        """With the weights of a flight: 150 times the mean square speed (weights add up to 4.5), 1e-3 a newton^2."""
+        return 150.0 / 4.5 * printed_disturbance(thrusts, True) + 1e-3 * float(thrusts @ thrusts)
+
+    ours = cost(T)
     for a in np.linspace(-6.0, 6.0, 13):
         for b in np.linspace(-6.0, 6.0, 13):
             other = T + a * null[0] + b * null[1]
-            assert ours <= (printed_disturbance(other, True) + 1e-3 * other @ other) * (1.0 + 1e-4)
+            assert ours <= cost(other) * (1.0 + 1e-4)
 
 
 def test_a_failed_thruster_rests_and_what_is_lost_is_said(capsys: Capsys, points: Path) -> None:
@@ -130,7 +135,9 @@ def test_people_see_both_allocations(capsys: Capsys, points: Path) -> None:
         (["--previous", "1,2"], "2 numbers, allowed: 8"),
         (["--previous", "1,2,x"], "not numbers"),
         (["--priority", "QX"], "unknown"),
-        (["--w-effort", "-1"], "must be finite and not negative"),
+        (["--w-effort", "-1"], "must be finite and more than 0"),
+        (["--w-effort", "0"], "must be finite and more than 0"),
+        (["--w-disturbance", "-1"], "must be finite and at least 0"),
         (["--pose", "0", "0", "0.6", "0", "90", "0"], "radians"),
         (["--pose", "0", "0", "nan", "0", "0", "0"], "finite"),
         (["--wrench", "1", "1", "1", "1", "1", "inf"], "finite"),

@@ -18,6 +18,7 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64, Float64MultiArray, MultiArrayDimension, String
 
 from wakewise.allocation import Weights
+from wakewise.defaults import CHANGE_WEIGHT, DISTURBANCE_WEIGHT, EFFORT_WEIGHT
 from wakewise.errors import WakewiseError
 from wakewise.geometry import Pose
 from wakewise.links.ros import (
@@ -42,8 +43,9 @@ DEFAULTS = {
     "frame": "flu",
     "stamped": False,
     "wake_model": "jet",
-    "w_effort": 1e-6,
-    "w_previous": 0.0,
+    "w_disturbance": DISTURBANCE_WEIGHT,
+    "w_effort": EFFORT_WEIGHT,
+    "w_previous": CHANGE_WEIGHT,
     "priority": "",
     "limit_share": 1.0,
     "failed": "",
@@ -74,7 +76,9 @@ class AllocatorNode(Node):
         self._make = {
             "vehicle": vehicle,
             "wake": wake_model(told["wake_model"]),
-            "weights": Weights(disturbance=1.0, effort=told["w_effort"], previous=told["w_previous"]),
+            "weights": Weights(
+                disturbance=told["w_disturbance"], effort=told["w_effort"], previous=told["w_previous"]
+            ),
             "priority": told["priority"] or None,
             "share": float(told["limit_share"]),
         }

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from wakewise.cli.console import print_json, print_table, shown
 from wakewise.cli.options import Json
 from wakewise.cli.points import read_points
+from wakewise.defaults import BUDGET, CHANGE_WEIGHT, DISTURBANCE_WEIGHT, EFFORT_WEIGHT
 
 if TYPE_CHECKING:
     from wakewise.allocation import Allocation
@@ -22,7 +23,7 @@ _STILL_M2_S2 = 1e-12
 
 Six = tuple[float, float, float, float, float, float]
 
-VehicleName = Annotated[str, typer.Option("--vehicle", help="Library name or vehicle YAML file.")]
+VehicleName = Annotated[str, typer.Option("--vehicle", help="Library name or vehicle file.")]
 PoseNumbers = Annotated[
     Six,
     typer.Option(
@@ -41,12 +42,20 @@ Points = Annotated[
     Path, typer.Option("--points", help="CSV with x_m, y_m, z_m in the world (NED) and weight: what to spare.")
 ]
 WakeModelName = Annotated[
-    str, typer.Option("--wake-model", help="paper, paper-calibrated, fitted, linear, jet or jet-fitted.")
+    str,
+    typer.Option(
+        "--wake-model",
+        help="paper, paper-calibrated, fitted, linear, jet, jet-fitted, learned, or package.module:make.",
+    ),
 ]
 Sum = Annotated[str, typer.Option("--sum", help="How jets that meet add up: coherent or incoherent.")]
 Failed = Annotated[
     list[str] | None,
-    typer.Option("--failed", metavar="NAME|INDEX", help="A thruster that gives nothing; may be repeated."),
+    typer.Option(
+        "--failed",
+        metavar="NAME|NUMBER",
+        help="A thruster that gives nothing: its name, or its number in the table, from 1; may be repeated.",
+    ),
 ]
 Priority = Annotated[
     str | None,
@@ -56,8 +65,12 @@ Priority = Annotated[
         show_default=False,
     ),
 ]
-Effort = Annotated[float, typer.Option("--w-effort", help="Weight of squared thrust beside D, (m/s)^2 per N^2.")]
-Change = Annotated[float, typer.Option("--w-previous", help="Weight of squared change, (m/s)^2 per N^2.")]
+Wash = Annotated[
+    float,
+    typer.Option("--w-disturbance", help="Weight of the mean square speed, D over the sum of weights, per (m/s)^2."),
+]
+Effort = Annotated[float, typer.Option("--w-effort", help="Weight of squared thrusts, per N^2; more than 0.")]
+Change = Annotated[float, typer.Option("--w-previous", help="Weight of squared change from --previous, per N^2.")]
 Previous = Annotated[
     str | None,
     typer.Option(metavar="T1,T2,...", help="Thrusts of the step before (N), for --w-previous.", show_default=False),
@@ -74,50 +87,67 @@ def allocate(
     sum_: Sum = "coherent",
     failed: Failed = None,
     priority: Priority = None,
-    w_effort: Effort = 1e-6,
-    w_previous: Change = 0.0,
+    w_disturbance: Wash = DISTURBANCE_WEIGHT,
+    w_effort: Effort = EFFORT_WEIGHT,
+    w_previous: Change = CHANGE_WEIGHT,
     previous: Previous = None,
-    budget: Boxes = 50_000,
+    budget: Boxes = BUDGET,
     json: Json = False,
 ) -> None:
-    """Give the thrusts that make a wrench and disturb weighted points least: D + w_effort |T|^2 at its global minimum.
+    """Give the thrusts that make a wrench and disturb weighted points least, by the weights of a flight.
 
-    D is the weighted sum of squared water speeds at the points, (m/s)^2. Beside it stand the least thrusts of the same
-    wrench (pseudo-inverse). The gap is proven: how far the cost may lie above its minimum, relative.
+    The cost, at its global minimum, is w_disturbance D / (sum of weights) + w_effort |T|^2, where D is the weighted sum
+    of squared water speeds at the points, (m/s)^2. The first two weights are a scenario's control.w_disturbance and
+    control.w_effort. Beside it stand the least thrusts of the same wrench (pseudo-inverse). The gap is proven: how far
+    the cost may lie above its minimum, relative. From Python: wakewise.allocate.
     """
     import numpy as np
 
-    from wakewise import allocation, wake
+    from wakewise import api
+    from wakewise.allocation import least_thrusts
+    from wakewise.api.thrusts import layout_of, pose_of, view_of
     from wakewise.errors import InputError
+    from wakewise.importers import any_vehicle
     from wakewise.targets import Region
-    from wakewise.vehicles import load_vehicle
+    from wakewise.wake import SUPERPOSITIONS
 
-    chosen = load_vehicle(vehicle)
-    X_WB = _pose(pose)
+    chosen = any_vehicle(vehicle)
+    X_WB = pose_of(pose, "--pose")
     if not np.all(np.isfinite(wrench)):
         raise InputError(f"--wrench: {_words(wrench)}, all six must be finite")
-    if sum_ not in ("coherent", "incoherent"):
-        raise InputError(f"--sum {sum_}: unknown, allowed: coherent, incoherent")
-    superposition: Literal["coherent", "incoherent"] = "coherent" if sum_ == "coherent" else "incoherent"
-    model = wake.wake_model(wake_model)
+    superposition = next((known for known in SUPERPOSITIONS if known == sum_), None)
+    if superposition is None:
+        raise InputError(f"--sum {sum_}: unknown, allowed: {', '.join(SUPERPOSITIONS)}")
     places, weights = read_points(points, chosen, X_WB)
-    before = None if previous is None else _thrusts(previous, len(chosen.thrusters))
-    lower, upper = chosen.thrust_lower_N.copy(), chosen.thrust_upper_N.copy()
-    dead = sorted({_thruster(name, chosen) for name in failed or []})
-    lower[dead] = upper[dead] = 0.0
-    layout = allocation.compile_layout(chosen.allocation_matrix, lower, upper)
     region = Region(points_W_m=places, weights=weights, distance_m=np.zeros(len(places)))
-    G = wake.WakeView.of(chosen, region, model, superposition).gram(X_WB)
-    cost = allocation.Weights(disturbance=1.0, effort=w_effort, previous=w_previous)
+    before = None if previous is None else _thrusts(previous, len(chosen.thrusters))
+    dead = sorted({_thruster(name, chosen) for name in failed or []})
+    names = [t.name for t in chosen.thrusters]
+    view = view_of(chosen, region, wake_model, superposition)
     wanted = np.array(wrench)
-    gentle = allocation.gentle_allocation(layout, wanted, G, cost, before, priority, budget)
-    least = allocation.least_thrusts(layout, wanted, G, priority)
+    gentle = api.allocate(
+        chosen,
+        wanted,
+        X_WB,
+        region,
+        view.wake,
+        w_disturbance=w_disturbance,
+        w_effort=w_effort,
+        w_previous=w_previous,
+        previous_N=before,
+        failed=dead,
+        superposition=superposition,
+        priority=priority,
+        budget=budget,
+    )
+    layout = layout_of(chosen, dead)
+    least = least_thrusts(layout, wanted, view.gram(X_WB), priority)
     size = float(np.linalg.norm(wanted))
     figures: dict[str, Any] = {
         "vehicle": chosen.name,
-        "thrusters": [t.name for t in chosen.thrusters],
-        "failed": [chosen.thrusters[i].name for i in dead],
-        "wake_model": model.name,
+        "thrusters": names,
+        "failed": [names[i] for i in dead],
+        "wake_model": view.wake.name,
         "sum": sum_,
         "thrusts_N": gentle.thrusts_N.tolist(),
         "wrench_made": gentle.wrench_B.tolist(),
@@ -131,6 +161,7 @@ def allocate(
         "gap": gentle.gap,
         "null_space": layout.null.T.tolist() if not len(layout.lines) else layout.lines.tolist(),
         "rank": layout.rank,
+        "w_disturbance": w_disturbance,
         "w_effort": w_effort,
         "w_previous": w_previous,
     }
@@ -152,7 +183,7 @@ def _show(vehicle: Vehicle, gentle: Allocation, least: Allocation, figures: dict
     for i, thruster in enumerate(vehicle.thrusters):
         name = f"{i + 1} {thruster.name}" + (" (failed)" if thruster.name in figures["failed"] else "")
         old, new = float(least.thrusts_N[i]), float(gentle.thrusts_N[i])
-        table.add_row(name, f"{old:.2f} N", _bar(old, most), f"{new:.2f} N", _bar(new, most))
+        table.add_row(name, _newton(old), _bar(old, most), _newton(new), _bar(new, most))
     print_table(table)
     before, after = figures["disturbance_pinv"], figures["disturbance"]
     typer.echo(f"\ndisturbance D   {shown(before)} (m/s)^2 before, {shown(after)} after" + _saved(before, after))
@@ -187,6 +218,10 @@ def _saved(before: float, after: float) -> str:
     return f": {100.0 * (1.0 - after / before):.1f} % less" if before > 0.0 else ""
 
 
+def _newton(thrust_N: float) -> str:
+    return f"{round(thrust_N, 2) + 0.0:.2f} N"  # no -0.00
+
+
 def _bar(thrust_N: float, most_N: float) -> str:
     """Ten cells to each side of zero."""
     cells = round(10 * abs(thrust_N) / most_N)
@@ -196,21 +231,6 @@ def _bar(thrust_N: float, most_N: float) -> str:
 
 def _words(numbers: tuple[float, ...]) -> str:
     return " ".join(f"{number:g}" for number in numbers)
-
-
-def _pose(numbers: Six) -> Pose:
-    import math
-
-    import numpy as np
-
-    from wakewise.errors import InputError
-    from wakewise.geometry import Pose, quat_from_euler
-
-    if not all(math.isfinite(number) for number in numbers):
-        raise InputError(f"--pose: {_words(numbers)}, all six must be finite")
-    if max(abs(angle) for angle in numbers[3:]) > 2 * math.pi:
-        raise InputError(f"--pose: angles {_words(numbers[3:])}, radians up to 2 pi are allowed")
-    return Pose(np.array(numbers[:3]), quat_from_euler(*numbers[3:]))
 
 
 def _thruster(name: str, vehicle: Vehicle) -> int:

@@ -13,6 +13,7 @@ from types import TracebackType
 from typing import Any
 
 import typer
+from typer.core import TyperGroup
 
 from wakewise import __version__, numba_cache
 from wakewise.cli import (
@@ -40,47 +41,78 @@ from wakewise.cli import (
     world,
 )
 from wakewise.cli.console import INTERRUPTED
-from wakewise.errors import InputError, MissingExtra, WakewiseError
+from wakewise.errors import InputError, MissingExtra, WakewiseError, environment_failure
+
+_FLY, _PHOTOGRAPHS, _VEHICLES, _REAL, _STUDIES = (
+    "Fly in the simulated tank",
+    "Photographs and models",
+    "Vehicles and thrusts",
+    "A real vehicle",
+    "Studies and benchmarks",
+)
+
+
+_COMMANDS: tuple[tuple[str, str, Any], ...] = (
+    (_FLY, "scan", scan.scan),
+    (_FLY, "compare", compare.compare),
+    (_FLY, "cockpit", cockpit.cockpit),
+    (_FLY, "film", film.film),
+    (_FLY, "export", export.export),
+    (_FLY, "world", world.app),
+    (_FLY, "tank", tank.app),
+    (_FLY, "target", target.app),
+    (_PHOTOGRAPHS, "reconstruct", reconstruct.reconstruct_photos),
+    (_PHOTOGRAPHS, "evaluate", evaluate.evaluate),
+    (_PHOTOGRAPHS, "calibrate", calibrate.calibrate),
+    (_PHOTOGRAPHS, "colour", colour.colour),
+    (_PHOTOGRAPHS, "degrade", degrade.degrade),
+    (_PHOTOGRAPHS, "nerf", nerf.nerf),
+    (_VEHICLES, "vehicle", vehicle.app),
+    (_VEHICLES, "allocate", allocate.allocate),
+    (_VEHICLES, "wake", wake.app),
+    (_REAL, "link", link.app),
+    (_STUDIES, "campaign", campaign.app),
+    (_STUDIES, "bench", bench.bench),
+    (_STUDIES, "reproduce", reproduce.reproduce),
+    (_STUDIES, "warm", warm.warm),
+)
+
+
+class _Panels(TyperGroup):
+    """A group whose help lists its commands by panel, in the order of `_COMMANDS`."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002  (its base passes it)
+        """Write a section for each panel."""
+        width = max(len(name) for _, name, _ in _COMMANDS)
+        for panel in dict.fromkeys(panel for panel, _, _ in _COMMANDS):
+            names = [name for of, name, _ in _COMMANDS if of == panel]
+            with formatter.section(panel):
+                formatter.write_dl(
+                    [
+                        (f"{name:<{width}}", self.commands[name].get_short_help_str(formatter.width - 6 - width))
+                        for name in names
+                    ]
+                )
+
 
 app = typer.Typer(
     name="wakewise",
+    cls=_Panels,
     help="Fly over-actuated underwater vehicles so gently that what they photograph stays undisturbed.",
     invoke_without_command=True,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-app.command("scan")(scan.scan)
-app.command("cockpit")(cockpit.cockpit)
-app.command("compare")(compare.compare)
-app.command("reconstruct")(reconstruct.reconstruct_photos)
-app.command("evaluate")(evaluate.evaluate)
-app.command("calibrate")(calibrate.calibrate)
-app.command("degrade")(degrade.degrade)
-app.command("film")(film.film)
-app.command("export")(export.export)
-app.command("colour")(colour.colour)
-app.command("nerf")(nerf.nerf)
-app.command("allocate")(allocate.allocate)
-app.command("bench")(bench.bench)
-app.command("reproduce")(reproduce.reproduce)
-app.command("warm")(warm.warm)
-app.add_typer(vehicle.app, name="vehicle")
-app.add_typer(tank.app, name="tank")
-app.add_typer(target.app, name="target")
-app.add_typer(wake.app, name="wake")
-app.add_typer(world.app, name="world")
-app.add_typer(link.app, name="link")
-app.add_typer(campaign.app, name="campaign")
+for _panel, _name, _run in _COMMANDS:
+    if isinstance(_run, typer.Typer):
+        app.add_typer(_run, name=_name, rich_help_panel=_panel)
+    else:
+        app.command(_name, rich_help_panel=_panel)(_run)
 
 _INTERRUPTED = 130
 _TERMINATED = 143
 _terminated = False
-# Libraries tell of the computer's faults in exceptions of their own: by their words, and what to say instead.
-_COMPUTER = {
-    "No space left on device": "the disk is full",
-    "no locator available": "compiled code can be kept nowhere; set NUMBA_CACHE_DIR to a folder that can be written",
-}
 _STOPPED = "stopped; what was finished is kept, run the same command again to go on"
 
 
@@ -143,7 +175,7 @@ def _refused(fault: Exception) -> int | None:
     """Say an error that is foreseen in one line and give its exit code; None where it is not."""
     match fault:
         case typer.TyperException():
-            _say(fault.format_message())
+            _say(_how_many(fault) or fault.format_message())
             return 2
         case InputError() | MissingExtra():
             _say(str(fault))
@@ -159,18 +191,23 @@ def _refused(fault: Exception) -> int | None:
             _say(str(fault))
         case BrokenPipeError():  # nobody reads on, as after `| head`
             _close_output()
-        case OSError():
-            where = "cannot write: " if fault.filename is None else f"{fault.filename}: "
-            _say(f"{where}{fault.strerror or fault}")
-            _close_output()
-        case MemoryError():
-            _say(f"out of memory ({fault})" if str(fault) else "out of memory")
         case _:
-            told = next((said for words, said in _COMPUTER.items() if words in str(fault)), None)
-            if told is None:
+            failure = environment_failure(fault)
+            if failure is None:
                 return None
-            _say(told)
+            _say(f"cannot write: {failure}" if isinstance(fault, OSError) and fault.filename is None else str(failure))
+            if isinstance(fault, OSError):
+                _close_output()
     return 1
+
+
+def _how_many(fault: typer.TyperException) -> str | None:
+    """What an option of several values lacks: of too few, the next option is taken for one and told of as no number."""
+    option = getattr(fault, "param", None)
+    count = getattr(option, "nargs", 1)
+    if option is None or count < 2:
+        return None
+    return f"{option.opts[0]}: needs {count} numbers, {option.metavar}; one of those given is none"
 
 
 def _say(message: str) -> None:

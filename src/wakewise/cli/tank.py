@@ -13,7 +13,6 @@ from wakewise.physics import TRIM_WATER_KG_M3
 
 if TYPE_CHECKING:
     from wakewise.arrays import Array
-    from wakewise.geometry import Pose
     from wakewise.targets import Target
 
 app = typer.Typer(
@@ -96,6 +95,7 @@ def probe_command(
     """
     import numpy as np
 
+    from wakewise.api.thrusts import pose_of
     from wakewise.errors import InputError
     from wakewise.tank import TankSettings
     from wakewise.tank.probe import probe
@@ -108,7 +108,7 @@ def probe_command(
     history, columns = read_thrusts(thrusts, chosen)
     result = probe(
         chosen,
-        _pose(pose),
+        pose_of(pose, "--pose"),
         history,
         read_points(points),
         times_s=None if every is None else regular_times(history, every),
@@ -173,21 +173,6 @@ def _summary(speeds_m_s: Array) -> str:
     if not len(speeds_m_s):
         return "not known at any of the points"
     return f"mean {speeds_m_s.mean():.4f} m/s   95th percentile {np.quantile(speeds_m_s, 0.95):.4f} m/s"
-
-
-def _pose(numbers: tuple[float, float, float, float, float, float]) -> Pose:
-    import math
-
-    import numpy as np
-
-    from wakewise.errors import InputError
-    from wakewise.geometry import Pose, quat_from_euler
-
-    if not all(math.isfinite(number) for number in numbers):
-        raise InputError(f"--pose: {' '.join(f'{n:g}' for n in numbers)}, all six must be finite")
-    if max(abs(angle) for angle in numbers[3:]) > 2 * math.pi:
-        raise InputError(f"--pose: angles {' '.join(f'{n:g}' for n in numbers[3:])}, radians up to 2 pi are allowed")
-    return Pose(np.array(numbers[:3]), quat_from_euler(*numbers[3:]))
 
 
 def _target(name: str | None, floor_z_m: float | None) -> Target | None:

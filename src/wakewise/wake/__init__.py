@@ -9,7 +9,8 @@ of a model), `carried.py` and `floor_carried.py` (both in a current), `families.
 with `network.py` (a trained rival that remembers). Sums: `sums.py` and `floor_sums.py` with `kernels.py` (compiled),
 `gradients.py` with `stage.py` (derivatives of D), `numeric.py` (the same for models that bring none), `checks.py` (what
 is refused), `table.py` and `plan_disturbance.py` (D and derivatives over a planner's stage), `view.py` (D from a
-vehicle's pose). `calibration.py`, `samples.py`, `scores.py` and `fit_file.py` fit a model to measured velocities.
+vehicle's pose). `point_files.py` reads measured velocities, `calibration.py`, `samples.py`, `scores.py` and
+`fit_file.py` fit a model to them, `momentum.py` holds them against the law that they must obey.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from wakewise.wake.disturbance import disturbance, gram, incoherent, point_disturbance, split_roots, velocity
     from wakewise.wake.floor import FloorJet
     from wakewise.wake.gradients import (
+        SUPERPOSITIONS,
         Superposition,
         disturbance_slopes,
         gauss_newton,
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
     from wakewise.wake.view import WakeView
 
 __all__ = [
+    "SUPERPOSITIONS",
     "AxialJet",
     "FloorJet",
     "GaussianJet",

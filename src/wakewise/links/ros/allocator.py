@@ -6,13 +6,14 @@ that have failed, and a target whose water is to be left alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from wakewise.allocation import Layout, Weights, compile_layout, gentle_allocation, least_thrusts
 from wakewise.arrays import Array, freeze
+from wakewise.defaults import BUDGET, DISTURBANCE_WEIGHT
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.interfaces import WakeModel
@@ -82,6 +83,7 @@ class ThrustAllocator:
     vehicle : Vehicle
     wake : WakeModel
     weights : Weights
+        Of the mean square speed, D over the sum of the target's weights, of squared thrusts and of their change.
     priority : str or None
         Axes in the order in which limits give them up last, such as "ZKMN,XY"; None keeps the wrench's direction.
     share : float
@@ -99,11 +101,11 @@ class ThrustAllocator:
 
     vehicle: Vehicle
     wake: WakeModel
-    weights: Weights = field(default_factory=lambda: Weights(disturbance=1.0, effort=1e-6))
+    weights: Weights = field(default_factory=lambda: Weights(disturbance=DISTURBANCE_WEIGHT))
     priority: str | None = None
     share: float = 1.0
     failed: tuple[int, ...] = ()
-    budget: int = 2000
+    budget: int = BUDGET
 
     def __post_init__(self) -> None:
         if not 0.0 < self.share <= 1.0:
@@ -121,13 +123,12 @@ class ThrustAllocator:
         self, wrench_B: Array, target: Target = NO_TARGET, X_WB: Pose | None = None, previous_N: Array | None = None
     ) -> Answer:
         """Thrusts for a wrench, shape (6,), in FRD."""
-        gram, way = self._gram(target, X_WB)
+        gram, total_weight, way = self._gram(target, X_WB)
         least = least_thrusts(self.layout, wrench_B, gram, self.priority)
         chosen = least
         if gram is not None:
-            chosen = gentle_allocation(
-                self.layout, wrench_B, gram, self.weights, previous_N, self.priority, self.budget
-            )
+            weights = replace(self.weights, disturbance=self.weights.disturbance / total_weight)
+            chosen = gentle_allocation(self.layout, wrench_B, gram, weights, previous_N, self.priority, self.budget)
         return Answer(
             thrusts_N=chosen.thrusts_N,
             wrench_B=chosen.wrench_B,
@@ -138,20 +139,21 @@ class ThrustAllocator:
             way=way,
         )
 
-    def _gram(self, target: Target, X_WB: Pose | None) -> tuple[Array | None, str]:
+    def _gram(self, target: Target, X_WB: Pose | None) -> tuple[Array | None, float, str]:
         if target.is_empty:
-            return None, "least thrusts: no target"
+            return None, 1.0, "least thrusts: no target"
         if X_WB is None and not target.on_body:
-            return None, "least thrusts: the target is fixed to the world and there is no fresh pose"
+            return None, 1.0, "least thrusts: the target is fixed to the world and there is no fresh pose"
         placed = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])) if target.on_body or X_WB is None else X_WB
         inside = np.all(np.abs(placed.inverse().apply(target.points_m)) < 0.5 * self.vehicle.size_m, axis=1)
         points, weights = target.points_m[~inside], target.weights[~inside]
         every = -(-len(points) // MOST_POINTS) or 1
         points, weights = points[::every], every * weights[::every]
         if not np.sum(weights) > 0.0:
-            return None, "least thrusts: all points of the target lie within the vehicle"
+            return None, 1.0, "least thrusts: all points of the target lie within the vehicle"
         region = Region(points_W_m=points, weights=weights, distance_m=np.zeros(len(points)))
-        return WakeView.of(self.vehicle, region, self.wake).gram(placed), "gentle"
+        view = WakeView.of(self.vehicle, region, self.wake)
+        return view.gram(placed), view.total_weight, "gentle"
 
 
 def failed_thrusters(text: str, names: tuple[str, ...]) -> tuple[int, ...]:
