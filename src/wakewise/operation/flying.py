@@ -135,7 +135,7 @@ def fly(
     (50, 'dp')
     """
     parts = flight if isinstance(flight, Parts) else flight.parts()
-    route = parts.route
+    route, _ = parts.route, parts.vehicle  # what cannot be used is refused before minutes of compiling
     warm(FLIGHT_JOBS, progress)
     if checked:
         _ = parts.preflight

@@ -108,8 +108,9 @@ def run_trial(
     scenario = as_flown(parts)
     check_place(folder, scenario)
     if not is_warm(JOBS):
+        _ = parts.vehicle  # a file that cannot be used is refused before minutes of compiling
         if scenario.target.kind not in coral_kinds():
-            _ = parts.target  # a file that cannot be read is refused before minutes of compiling
+            _ = parts.target
         with watch.stage("compile") as progress:
             warm(JOBS, progress)
     with Darkroom(parts, folder) as darkroom:
