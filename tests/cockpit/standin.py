@@ -131,7 +131,14 @@ class StandIn:
         self._stop = asyncio.Event()
         self.started_s = time.monotonic()
         async with serve(
-            self._talk, "127.0.0.1", 0, process_request=self._static, compression=None, close_timeout=0.3, logger=QUIET
+            self._talk,
+            "127.0.0.1",
+            0,
+            process_request=self._static,
+            compression=None,
+            close_timeout=0.3,
+            logger=QUIET,
+            select_subprotocol=lambda _, offered: "wakewise" if "wakewise" in offered else None,
         ) as server:
             self.port = next(iter(server.sockets)).getsockname()[1]
             ticking = [asyncio.create_task(self._states()), asyncio.create_task(self._pictures())]

@@ -83,14 +83,37 @@ def test_sticks_that_were_long_on_their_way_are_zero() -> None:
     assert not helm.axes(0.95).any()
 
 
+def test_after_a_pause_sticks_count_once_they_were_let_go() -> None:
+    """A page that froze, a laptop that slept, a link that was gone: what is held when it is back was not meant."""
+    for pause_s in (STALE_S + 0.01, LAPSE_S + 0.5, FORGET_S - 0.1):
+        helm, _ = held_by("a").moved("a", "L", 1, 0.0, FULL, 0.0)
+        assert helm.axes(0.0).any()
+        for k in range(5):
+            now_s = pause_s + 0.04 * k
+            helm, took = helm.moved("a", "L", 2 + k, 1e3 * now_s, FULL, now_s)
+            assert took
+            assert not helm.armed
+            assert not helm.axes(now_s).any()
+        now_s = pause_s + 0.2
+        helm, _ = helm.moved("a", "L", 7, 1e3 * now_s, 0.0 * FULL, now_s)
+        helm, _ = helm.moved("a", "L", 8, 1e3 * now_s + 40.0, FULL, now_s + 0.04)
+        np.testing.assert_array_equal(helm.axes(now_s + 0.04), FULL)
+    helm, _ = held_by("a").moved("a", "L", 1, 0.0, FULL, 0.0)
+    helm, _ = helm.moved("a", "L", 2, 290.0, FULL, STALE_S - 0.01)
+    assert helm.axes(STALE_S - 0.01).any(), "a hiccup within what is fresh is none"
+
+
 def test_a_clock_that_stood_still_is_believed_again() -> None:
-    """After a laptop slept for some seconds its sticks fly again, within the messages that clocks are compared over."""
+    """After a laptop slept for some seconds its sticks fly again, within the messages that clocks are compared over.
+
+    They were let go in between, as they must be after a pause.
+    """
     helm = held_by("a")
     for k in range(10):
         helm, _ = helm.moved("a", "L", k, 40.0 * k, FULL, 0.04 * k)
     flown = []
     for k in range(10, 600):
-        helm, _ = helm.moved("a", "L", k, 40.0 * k, FULL, 5.0 + 0.04 * k)
+        helm, _ = helm.moved("a", "L", k, 40.0 * k, 0.0 * FULL if k == 20 else FULL, 5.0 + 0.04 * k)
         flown.append(bool(helm.axes(5.0 + 0.04 * k).any()))
     assert not flown[0]
     assert flown[-1]
@@ -173,6 +196,8 @@ class AnyHelm(RuleBasedStateMachine):
             assert number > before.hands.seq
             self.quickest = min(self.quickest, late_s)
             self.sent = {0: (client, sent_s)}
+            if self.now_s - before.renewed_s > STALE_S:
+                assert not self.helm.axes(self.now_s).any()
         else:
             np.testing.assert_array_equal(self.helm.axes(self.now_s), before.axes(self.now_s))
 

@@ -53,21 +53,40 @@ def test_an_axis_counts_once_it_was_seen_at_rest(standin: StandIn, fly: Any) -> 
     settled(standin, [1, 0, 0, 0, 0])
 
 
-def test_buttons_press_once_and_those_of_an_unknown_pad_never(standin: StandIn, fly: Any) -> None:
-    """Held down is one press; B stops; a pad without a standard mapping has no buttons that could be trusted."""
+def test_buttons_press_once_and_stop_takes_all_out_of_the_hand(standin: StandIn, fly: Any) -> None:
+    """Held down is one press; B stops, after which even the tilt that is held counts only when pressed anew."""
     page = fly()
     plug(page)
     page.js("pad.buttons[0].pressed = true; 1")
     until(lambda: [m["what"] for m in standin.of("press")] == ["operator", "capture"], "a capture")
-    page.js("pad.buttons[12].pressed = true; pad.buttons[1].pressed = true; 1")
-    until(lambda: standin.desk["mode"] == "hold", "hold")
+    page.js("pad.buttons[12].pressed = true; 1")
     settled(standin, [0, 0, 0, 0, 1])
+    page.js("pad.buttons[1].pressed = true; 1")
+    until(lambda: standin.desk["mode"] == "hold", "hold")
+    settled(standin, [0, 0, 0, 0, 0])
     assert [m["what"] for m in standin.of("press")] == ["operator", "capture", "hold"]
-    page.js("plugged = [{...pad, index: 1, mapping: '', buttons: pad.buttons.map(() => ({pressed: false}))}]; 1")
-    page.until("document.getElementById('notes').innerText.includes('no standard mapping')")
-    page.js("plugged[0].buttons[9].pressed = true; 1")
-    time.sleep(0.3)
-    assert len(standin.of("press")) == 3
+    page.js("pad.buttons[12].pressed = false; 1")
+    time.sleep(0.2)
+    page.js("pad.buttons[12].pressed = true; 1")
+    settled(standin, [0, 0, 0, 0, 1])
+
+
+def test_a_pad_that_nobody_has_mapped_is_not_flown(standin: StandIn, fly: Any) -> None:
+    """Neither sticks nor buttons of a pad without the standard mapping; one that has it is taken before it."""
+    page = fly()
+    page.js(PLUG.replace("mapping: 'standard'", "mapping: ''"))
+    page.until("document.getElementById('notes').innerText.includes('This gamepad is not flown')")
+    page.js("pad.axes = [-1, -1, 1, 1]; pad.buttons[9].pressed = pad.buttons[12].pressed = true; 1")
+    since_s = time.monotonic()
+    until(lambda: len(standin.sticks_since(since_s)) > 8, "sticks")
+    assert not any(any(axes) for axes in standin.sticks_since(since_s))
+    assert [m["what"] for m in standin.of("press")] == ["operator"]
+    page.js(
+        "plugged.push({...pad, index: 1, id: 'Known pad', mapping: 'standard', axes: [0, 0, 0, 0], buttons: []}); 1"
+    )
+    page.until("document.getElementById('notes').innerText.includes('Gamepad: Known pad')")
+    page.js("plugged[1].axes = [0, -1, 0, 0]; 1")
+    settled(standin, [1, 0, 0, 0, 0])
 
 
 def test_thumbs_fly_and_letting_go_is_zero(standin: StandIn, fly: Any) -> None:

@@ -119,3 +119,39 @@ def test_a_server_that_restarts_is_found_again(rehearsal: Rehearsal, page: Page,
         page.until("document.body.dataset.link === 'up' && document.body.dataset.helm === 'free'")
     finally:
         again.stop()
+
+
+def test_a_pause_of_the_link_must_be_answered_by_letting_go(rehearsal: Rehearsal, page: Page) -> None:
+    """Sticks that did not arrive for a while do not go on by themselves: the page says so, and what to do."""
+    page.down("KeyW")
+    flies(rehearsal, 0, 1.0)
+    page.js(
+        "(() => { const send = WebSocket.prototype.send; WebSocket.prototype.send = () => {};"
+        " setTimeout(() => { WebSocket.prototype.send = send; }, 600); })()"
+    )
+    flies(rehearsal, 0, 0.0)
+    page.until("document.getElementById('banner-more').innerText.includes('let go of them once')")
+    time.sleep(0.3)
+    assert not rehearsal.flown[-1][1].any()
+    page.up("KeyW")
+    page.until("document.getElementById('banner-what').innerText === 'You have the helm'")
+    page.down("KeyW")
+    flies(rehearsal, 0, 1.0)
+
+
+@pytest.mark.parametrize(("fragment", "words"), [("", "a token is needed"), ("#token=guess", "the token is wrong")])
+def test_who_has_no_token_is_told_in_words(rehearsal: Rehearsal, browser: Browser, fragment: str, words: str) -> None:
+    """The socket is refused at its handshake, of which a browser tells nothing: the page asks why."""
+    served = Server(rehearsal, files=page_files(), origins=("http://127.0.0.1:1",))
+    served.start()
+    try:
+        opened = browser.open(f"http://127.0.0.1:{served.port}/{fragment}")
+        opened.until("document.body.dataset.link === 'refused'")
+        assert opened.text("#banner-what") == "Not let in"
+        assert words in opened.text("#banner-more")
+        opened.close()
+        opened = browser.open(f"http://127.0.0.1:{served.port}/#token={served.token}")
+        opened.until("document.body.dataset.link === 'up'")
+        opened.close()
+    finally:
+        served.stop()

@@ -99,6 +99,41 @@ def test_a_window_left_sends_zeros_at_once_and_then_nothing(standin: StandIn, fl
     forward(standin, back_s, 1)
 
 
+def test_a_page_that_froze_flies_nothing_until_pressed_anew(standin: StandIn, fly: Any) -> None:
+    """A key, a thumb and a gamepad that were held through a pause of the page are zero after it, repeats or not."""
+    page = fly("?touch=1")
+    page.js(
+        "navigator.getGamepads = () => [window.pad]; window.pad = {id: 'Pad', index: 0, connected: true,"
+        " mapping: 'standard', axes: [0, 0, 0, 0], buttons: []}; 1"
+    )
+    page.until("document.getElementById('notes').innerText.includes('Gamepad: Pad')")
+    start_s = time.monotonic()
+    page.down("KeyW")
+    page.js("pad.axes = [0, 0, 1, 0]; 1")
+    x, y = page.place("[data-stick=right]", 0.0, -0.9)
+    page.call("Input.dispatchMouseEvent", type="mousePressed", x=x, y=y, button="left", clickCount=1)
+    until(lambda: [1, 0, -1, 1, 0] in standin.sticks_since(start_s), "all three")
+    page.js("(() => { const end = performance.now() + 600; while (performance.now() < end); })()")
+    thawed_s = time.monotonic()
+    page.down("KeyW", repeat=True)
+    until(lambda: len(standin.sticks_since(thawed_s)) > 10, "sticks")
+    assert not any(any(axes) for axes in standin.sticks_since(thawed_s)[1:])
+    page.up("KeyW")
+    page.down("KeyW")
+    forward(standin, thawed_s, 1)
+
+
+def test_a_lost_connection_is_known_again_by_its_last_lease(standin: StandIn, fly: Any) -> None:
+    """After a reload, too, the page tells which helm it had; a page that had none tells nothing."""
+    page = fly()
+    lease = standin.lease
+    standin.drop()
+    until(lambda: len(standin.of("hello")) == 2, "to be back")
+    page.call("Page.reload")
+    until(lambda: len(standin.of("hello")) == 3, "to be loaded")
+    assert [m.get("lease") for m in standin.of("hello")] == [None, lease, lease]
+
+
 def test_a_closed_tab_says_zero_and_gives_the_helm_up(standin: StandIn, fly: Any) -> None:
     """The last sticks are zeros, and the vehicle's server knows that nobody is there."""
     page = fly()

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import http.client
 import json
+import socket
+import threading
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
+from contextlib import ExitStack
 from typing import Any
 
 import pytest
 from test_cockpit_extras import EXTRAS, SERVICE, WIDGET, fits
 
 from wakewise.errors import InputError
-from wakewise.meter.server import OFFER, PAGE, TOKEN_HEADER, Server
-from wakewise.serving.gate import Caller
+from wakewise.meter.server import MOST_KEPT, OFFER, PAGE, Server
+from wakewise.serving.gate import TOKEN_HEADER, Caller
+from wakewise.serving.pending import PER_ADDRESS
 
 WISHED: list[str] = []
 ASK = urllib.request.build_opener(urllib.request.ProxyHandler({})).open
@@ -93,6 +98,7 @@ def test_from_elsewhere_the_token_opens_it_unless_everybody_may() -> None:
     try:
         assert closed.token is not None
         assert closed.address.endswith(f"#token={closed.token}")
+        assert not any("0.0.0.0" in one for one in closed.addresses), "no phone can open that"
         assert closed.answer("GET", "/", rov, None)[0] == 200
         for method, path in (("GET", "/state.json"), ("POST", "/begin")):
             assert closed.answer(method, path, rov, None)[0] == 401
@@ -126,3 +132,104 @@ def test_a_port_that_is_taken_is_said_in_one_line(server: Server) -> None:
     """With the way out."""
     with pytest.raises(InputError, match=r"--port \d+ at 127.0.0.1: .*give another --port"):
         Server(dict, dict, wish, port=server.port)
+
+
+def dialled(server: Server, says: bytes) -> socket.socket:
+    caller = socket.create_connection(("127.0.0.1", server.port), timeout=5.0)
+    caller.sendall(says)
+    return caller
+
+
+@pytest.mark.parametrize("says", [b"", b"G", b"GET /state.json HTTP/1.1\r\nHost: x", b"POST /mark HTTP/1.1\r\n"])
+def test_connections_that_say_nothing_keep_nobody_out(says: bytes) -> None:
+    """However many there are: the page is answered, and threads stay bounded."""
+    server, before = make(), threading.active_count()
+    server.start()
+    try:
+        with ExitStack() as stack:
+            for _ in range(3 * PER_ADDRESS):
+                stack.enter_context(dialled(server, says))
+            assert got(server, "/state.json")[0] == 200
+            assert threading.active_count() - before <= PER_ADDRESS + 3
+    finally:
+        server.stop()
+
+
+def test_a_connection_that_was_let_in_is_kept_whatever_others_do(server: Server) -> None:
+    """A page that asks again and again loses nothing to a crowd of silent connections; of kept ones there are few."""
+    page = http.client.HTTPConnection("127.0.0.1", server.port, timeout=5)
+    with ExitStack() as stack:
+        stack.callback(page.close)
+
+        def asks(asker: http.client.HTTPConnection) -> http.client.HTTPResponse:
+            asker.request("GET", "/state.json")
+            answer = asker.getresponse()
+            answer.read()
+            return answer
+
+        assert not asks(page).will_close
+        own = page.sock
+        for _ in range(2 * PER_ADDRESS):
+            stack.enter_context(dialled(server, b""))
+        assert not asks(page).will_close
+        assert page.sock is own
+        kept = 0
+        for _ in range(MOST_KEPT + 5):
+            other = http.client.HTTPConnection("127.0.0.1", server.port, timeout=5)
+            stack.callback(other.close)
+            kept += not asks(other).will_close
+        assert kept < MOST_KEPT
+
+
+def test_without_the_token_no_connection_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A caller from elsewhere who may see the files alone goes on counting as one who has said nothing."""
+    server = make()
+    monkeypatch.setattr(type(server._gate), "needs_token", lambda *_: True)
+    server.start()
+    try:
+        for path, headers, closes in (
+            ("/", {}, "close"),
+            ("/state.json", {}, "close"),
+            ("/state.json", {TOKEN_HEADER: "guess"}, "close"),
+            ("/state.json", {TOKEN_HEADER: str(server.token)}, None),
+        ):
+            asks = http.client.HTTPConnection("127.0.0.1", server.port, timeout=5)
+            asks.request("GET", path, headers=headers)
+            assert asks.getresponse().getheader("Connection") == closes
+            asks.close()
+    finally:
+        server.stop()
+
+
+@pytest.mark.parametrize(
+    ("request_line", "headers", "status"),
+    [
+        (b"POST / HTTP/1.1", b"Content-Length: 300000\r\n\r\n" + b"x" * 300_000, 404),
+        (b"DELETE / HTTP/1.1", b"\r\n", 501),
+        (b"GET / HTTP/1.1", b"X: " + b"y" * 70_000 + b"\r\n\r\n", 431),
+        (b"GET / HTTP/1.1", b"X: y\r\n" * 300 + b"\r\n", 431),
+        (b"GET /" + b"a" * 70_000 + b" HTTP/1.1", b"\r\n", 414),
+        (b"GET / HTTP/9.9", b"\r\n", 505),
+        (b"GET / nonsense", b"\r\n", 400),
+        (b"GET / HTTP/1.1", b"Host: \xff\r\n\r\n", 403),
+    ],
+)
+def test_whatever_is_asked_is_answered(server: Server, request_line: bytes, headers: bytes, status: int) -> None:
+    """No request ends without a status, nor with a page of HTML."""
+    own = b"" if b"Host:" in headers else f"Host: 127.0.0.1:{server.port}\r\n".encode()
+    with dialled(server, request_line + b"\r\n" + own + headers) as caller:
+        answer = http.client.HTTPResponse(caller)
+        answer.begin()
+        assert answer.status == status
+        assert (answer.getheader("Content-Type") or "").startswith("text/plain")
+        assert answer.read().strip()
+
+
+def test_head_is_get_without_the_body(server: Server) -> None:
+    """With the length that GET would have; refusals alike."""
+    for path, host in (("/", ""), ("/page/meter.js", ""), ("/nothing", ""), ("/state.json", ""), ("/", "evil.example")):
+        own = {"Host": host} if host else {}
+        status, headers, body = got(server, path, **own)
+        head, told, nothing = got(server, path, "HEAD", **own)
+        assert (head, nothing) == (status, b"")
+        assert told["Content-Length"] == headers["Content-Length"] == str(len(body))

@@ -104,7 +104,7 @@ def cockpit(
         stack.callback(session.stop)
         try:
             session.start()
-            _say(f"cockpit: {server.address} (Ctrl-C ends the flight)")
+            _say(f"cockpit: {' or '.join(server.addresses)} (Ctrl-C ends the flight)")
             if not no_browser:
                 _open(server.address)
             _watch(session)

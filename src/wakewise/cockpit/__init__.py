@@ -2,8 +2,9 @@
 
 Start reading in `session.py` (a scenario becomes flights that are shown) and `server.py` (one port for page and socket,
 in a thread that no flight waits for; `show.py` is what it asks for). `helm.py` says who may fly and which sticks count,
-`seat.py` is where the flight reads them; `messages.py` is what a page may say, `client.py` what waits to be sent to it,
-`extras.py` the page's own files in `page/` and what other ground stations ask for; who may come in is `serving`'s.
+`seat.py` is where the flight reads them; `messages.py` is what a page may say, `client.py` what waits to be sent to it;
+`connection.py` is one connection before that, `requests.py` what a request is answered, `extras.py` the page's files in
+`page/` and what other ground stations ask for. Who may come in, and how many may wait, is `serving`'s.
 What is shown: `lookout.py` takes it down in the flight's thread, `gauges.py` holds flown thrusts against direct ones,
 `state.py` makes numbers of it, `guide.py` follows the photographs, `frames.py` draws the camera's picture in a process
 of its own, `pictures.py` says when and for whom, `scene.py` is viser's view from outside. `latency.py` measures how a

@@ -25,7 +25,6 @@ class Client:
     connection: ServerConnection
     id: str
     name: str = "somebody"
-    needs_token: bool = False
     greeted: bool = False
     amiss: int = 0
     throttled: int = 0

@@ -10,6 +10,7 @@ rules are those that others learnt with sticks in browsers (docs/decisions/0044)
 - Sticks count by their number: a replay or an older one is dropped. Sticks older than `STALE_S` when they would be
   flown are zero. Their age counts from when they were sent, as far as two clocks can tell: by how much longer than the
   fastest of this lease they were under way.
+- After a pause of `STALE_S` sticks count again once they were seen centred: what was held meanwhile was not meant.
 """
 
 from __future__ import annotations
@@ -65,13 +66,17 @@ class Hands:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Helm:
-    """Who holds the helm, with which lease, who asks for it, and the hands of the holder."""
+    """Who holds the helm, with which lease, who asks for it, and the hands of the holder.
+
+    `armed` tells whether the sticks are flown: not after a pause, until they were let go.
+    """
 
     holder: str | None = None
     lease: str | None = None
     renewed_s: float = -math.inf
     asked_by: str | None = None
     hands: Hands = field(default_factory=Hands)
+    armed: bool = True
     pressed: tuple[str, ...] = ()
 
     def held(self, now_s: float) -> bool:
@@ -80,7 +85,7 @@ class Helm:
 
     def axes(self, now_s: float) -> Array:
         """Sticks as they may be flown now, shape (5,): zero where they are old or nobody's."""
-        fresh = self.held(now_s) and now_s - self.hands.sent_s <= STALE_S
+        fresh = self.armed and self.held(now_s) and now_s - self.hands.sent_s <= STALE_S
         return self.hands.axes if fresh else np.zeros_like(CENTRED.axes)
 
     def ask(self, client: str, now_s: float, lease: str, force: bool = False) -> tuple[Helm, str]:
@@ -111,14 +116,16 @@ class Helm:
     def left(self, client: str) -> Helm:
         """A client gives the helm back, or is gone: its sticks are zero at once."""
         if client == self.holder:
-            return replace(self, holder=None, lease=None, renewed_s=-math.inf, hands=Hands(), pressed=())
+            return replace(self, holder=None, lease=None, renewed_s=-math.inf, hands=Hands(), armed=True, pressed=())
         return replace(self, asked_by=None) if client == self.asked_by else self
 
     def moved(self, client: str, lease: str, seq: int, t_ms: float, axes: Array, now_s: float) -> tuple[Helm, bool]:
         """Sticks came in; whether they were taken."""
         if not self.may(client, lease, now_s) or seq <= self.hands.seq or not math.isfinite(t_ms):
             return self, False
-        return replace(self, hands=self.hands.then(seq, 1e-3 * t_ms, axes, now_s), renewed_s=now_s), True
+        hands = self.hands.then(seq, 1e-3 * t_ms, axes, now_s)
+        armed = (self.armed and now_s - self.renewed_s <= STALE_S) or not axes.any()
+        return replace(self, hands=hands, armed=armed, renewed_s=now_s), True
 
     def press(self, client: str, lease: str, what: str, now_s: float) -> tuple[Helm, bool]:
         """A button of the holder; whether it counts."""

@@ -24,11 +24,12 @@ _FIELDS = 16
 
 @dataclass(frozen=True, kw_only=True)
 class Hello:
-    """The first message of a client."""
+    """The first message of a client; `lease`: of the helm, that it had before its connection was lost."""
 
     token: str | None
     name: str
     wants: Literal["helm", "watch"]
+    lease: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,9 +119,9 @@ def _hello(told: dict[str, Any]) -> Hello:
     wants = told.get("wants", "watch")
     if wants not in ("helm", "watch"):
         raise _Wrong(f"wants {_shown(wants)}, allowed helm, watch")
-    token = None if told.get("token") is None else _word(told, "token")
+    token, lease = (None if told.get(field) is None else _word(told, field) for field in ("token", "lease"))
     name = "".join(c for c in _word({"name": "somebody"} | told, "name") if c.isprintable()).strip()
-    return Hello(token=token, name=name or "somebody", wants=wants)
+    return Hello(token=token, name=name or "somebody", wants=wants, lease=lease)
 
 
 def _helm(told: dict[str, Any]) -> HelmWish:

@@ -26,12 +26,13 @@ _KEPT = 1024
 
 @dataclass(frozen=True, kw_only=True)
 class Holding:
-    """Who has the helm: ids of clients, and the lease that only the holder is to be told."""
+    """Who has the helm: ids of clients, the lease that only the holder is to be told, and whether its sticks count."""
 
     holder: str | None
     lease: str | None
     asked_by: str | None
     flying: bool
+    armed: bool
 
 
 class Seat:
@@ -60,7 +61,10 @@ class Seat:
         """Who has the helm now."""
         with self._lock:
             self._helm = helm = self._helm.tick(self.clock())
-            return Holding(holder=helm.holder, lease=helm.lease, asked_by=helm.asked_by, flying=helm.held(self.clock()))
+            flying = helm.held(self.clock())
+            return Holding(
+                holder=helm.holder, lease=helm.lease, asked_by=helm.asked_by, flying=flying, armed=helm.armed
+            )
 
     def ask(self, client: str, force: bool = False) -> str:
         """A client asks for the helm; the answer in words."""

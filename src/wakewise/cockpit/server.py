@@ -9,21 +9,21 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import http
 import logging
 import secrets
 import socket
 import threading
 from dataclasses import replace
-from typing import Any
+from functools import partial
+from typing import Any, cast
 
 from websockets.asyncio.server import Server as Listening
 from websockets.asyncio.server import ServerConnection, serve
-from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from wakewise.cockpit.client import Client
+from wakewise.cockpit.connection import PageConnection
 from wakewise.cockpit.extras import page_files
 from wakewise.cockpit.messages import (
     MOST_BYTES,
@@ -39,19 +39,23 @@ from wakewise.cockpit.messages import (
     read_message,
 )
 from wakewise.cockpit.pictures import show_pictures
+from wakewise.cockpit.requests import SUBPROTOCOL, respond, wrong
 from wakewise.cockpit.seat import DEVICE, Holding
 from wakewise.cockpit.show import Note, Show, as_json
 from wakewise.errors import InputError
+from wakewise.serving.addresses import page_addresses
 from wakewise.serving.files import Files
-from wakewise.serving.gate import Caller, Gate, is_loopback, page_headers
+from wakewise.serving.gate import Gate, is_loopback, same
+from wakewise.serving.pending import Pending
 
 PROTOCOL = 1
 STATE_EVERY_S = 0.1
 MOST_CLIENTS = 16
+"""Pages at a time. One more place is kept for whoever had the helm last."""
 STUCK_S = 10.0
 """A client that takes nothing for so long is let go."""
 _HELLO_WITHIN_S, _MOST_AMISS, _MOST_THROTTLED = 5.0, 50, 40
-_REFUSED, _TOO_MUCH = 4401, 1008
+_REFUSED, _TOO_MUCH, _FULL = 4401, 1008, 1013
 _SYSTEM_KEEPS = 1 << 17  # bytes
 _QUIET = logging.getLogger("wakewise.cockpit")
 _QUIET.addHandler(logging.NullHandler())
@@ -98,19 +102,23 @@ class Server:
         self._fault: OSError | None = None
         self._over: asyncio.Event | None = None
         self._told: Holding | None = None
+        self._last_lease: str | None = None
+        self._pending = Pending()
         self._edition = -1
         self._count = 0
 
     @property
-    def address(self) -> str:
-        """Where the page is, for this computer's browser, or with the token where it is asked for."""
+    def addresses(self) -> tuple[str, ...]:
+        """Where the page is, best first: for this computer's browser, or with the token where it is asked for."""
         token = f"#token={self.token}"
         if self._gate.origins:
-            return f"{self._gate.origins[0]}/{token}"
-        if is_loopback(self.host):
-            host = f"[{self.host}]" if ":" in self.host else self.host
-            return f"http://{host}:{self.port}/"
-        return f"http://{self.host}:{self.port}/{token}"
+            return tuple(f"{origin}/{token}" for origin in self._gate.origins)
+        return page_addresses(self.host, self.port, "" if is_loopback(self.host) else token)
+
+    @property
+    def address(self) -> str:
+        """The first of `addresses`."""
+        return self.addresses[0]
 
     @property
     def spectators(self) -> int:
@@ -153,6 +161,8 @@ class Server:
                 self.host,
                 self.port,
                 process_request=self._answer,
+                select_subprotocol=lambda _, offered: SUBPROTOCOL if SUBPROTOCOL in offered else None,
+                create_connection=cast("type[ServerConnection]", partial(PageConnection, pending=self._pending)),
                 compression=None,
                 max_size=MOST_BYTES,
                 ping_interval=5.0,
@@ -177,46 +187,33 @@ class Server:
         for task in tasks:
             task.cancel()
         self._listening.close()
+        self._pending.close()
         await self._listening.wait_closed()
         await asyncio.gather(*tasks, return_exceptions=True)
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request for a file, let a socket open, or refuse either."""
-        caller = _caller(connection, request)
-        file = self._files.at(request.path)
-        shared = file is not None and file.shared
-        refused = self._gate.refusal(replace(caller, origin=None) if shared else caller)
-        if refused is not None:
-            return _response(http.HTTPStatus.FORBIDDEN, f"refused: {refused}\n".encode())
-        if request.path.partition("?")[0] == "/ws":
-            if len(self.clients) >= MOST_CLIENTS:
-                return _response(http.HTTPStatus.SERVICE_UNAVAILABLE, b"too many pages are open\n")
-            return None
-        if file is None:
-            return _response(http.HTTPStatus.NOT_FOUND, b"there is nothing here\n")
-        more = page_headers(caller.host or "", self._gate.origins) | (
-            {"Access-Control-Allow-Origin": "*"} if shared else {}
-        )
-        return _response(http.HTTPStatus.OK, file.body, file.kind, more)
+        assert isinstance(connection, PageConnection)
+        response = respond(connection, request, self._files, self._gate)
+        return None if response is None else connection.without_body(response)
 
     async def _meet(self, connection: ServerConnection) -> None:
         """One client, from its first word to its last."""
         assert self._loop is not None
+        assert isinstance(connection, PageConnection)
         self._count += 1
         client = Client(connection=connection, id=f"c{self._count}-{secrets.token_hex(3)}")
-        client.needs_token = connection.request is not None and self._gate.needs_token(
-            _caller(connection, connection.request)
-        )
         self.clients[client.id] = client
         _keep_little(connection)
         sending = asyncio.create_task(client.send_all(self._loop))
         try:
             async with asyncio.timeout(_HELLO_WITHIN_S):
                 first = read_message(await connection.recv())
-            refused = self._refused(client, first)
+            refused = self._refused(first)
             if refused is not None:
-                await connection.close(_REFUSED, refused)
+                await connection.close(*refused)
                 return
+            connection.named()
             self._greet(client, first)
             async for raw in connection:
                 if not client.may_speak(self._loop.time()):
@@ -236,24 +233,38 @@ class Server:
             self.show.seat.left(client.id)
             self._tell_helm("the page was closed")
 
-    def _refused(self, client: Client, first: Message | Amiss) -> str | None:
+    def _refused(self, first: Message | Amiss) -> tuple[int, str] | None:
+        """Code and words with which a client is let go for its first message; None where it may stay."""
         if not isinstance(first, Hello):
-            return f"say hello first: {first.why}"[:120] if isinstance(first, Amiss) else "say hello first"
-        if (client.needs_token or first.token is not None) and not self._gate.fits(first.token):
-            return "the token is wrong" if first.token else "a token is needed: open the address that was printed"
+            return _REFUSED, f"say hello first: {first.why}"[:120] if isinstance(first, Amiss) else "say hello first"
+        if first.token is not None and (why := wrong(first.token, self._gate)):
+            return _REFUSED, why
+        comes_back = first.lease is not None and self._last_lease is not None and same(first.lease, self._last_lease)
+        if len(self._greeted()) >= MOST_CLIENTS + comes_back:
+            return _FULL, "too many pages are open"
         return None
 
     def _greet(self, client: Client, hello: Message | Amiss) -> None:
         assert isinstance(hello, Hello)
-        client.name, client.greeted = hello.name, True
+        client.name, client.greeted = self._free_name(hello.name), True
         client.tell(self._welcome(client))
         holding = self.show.seat.holding
         if hello.wants == "helm" and not holding.flying:
             self.show.seat.ask(client.id)
         self._tell_helm("", always=client)
 
+    def _free_name(self, name: str) -> str:
+        """A name that no other page has: its own, else with the first number that is free."""
+        taken, count, free = {client.name for client in self._greeted()}, 1, name
+        while free in taken:
+            count += 1
+            free = f"{name} {count}"
+        return free
+
     def _welcome(self, client: Client) -> str:
-        return as_json({"type": "welcome", "id": client.id, "protocol": PROTOCOL, **self.show.welcome()})
+        return as_json(
+            {"type": "welcome", "id": client.id, "name": client.name, "protocol": PROTOCOL, **self.show.welcome()}
+        )
 
     def _heed(self, client: Client, message: Message | Amiss) -> None:
         """Do what a client asks for, as far as it may."""
@@ -294,6 +305,8 @@ class Server:
         holding = self.show.seat.holding
         changed, before = holding != self._told, self._told
         self._told = holding
+        if holding.holder in self.clients:
+            self._last_lease = holding.lease
         if before is not None and holding.holder != before.holder:
             name = self._named(holding.holder)
             self._to_all(Note(text="nobody has the helm" if name is None else f"{name} has the helm").message())
@@ -303,6 +316,7 @@ class Server:
             "holder": self._named(holding.holder),
             "asked_by": None if asking is None else {"id": asking.id, "name": asking.name},
             "flying": holding.flying,
+            "armed": holding.armed,
             "why": why,
         }
         for client in list(self.clients.values()):
@@ -370,25 +384,3 @@ def _keep_little(connection: ServerConnection) -> None:
     """Have the system keep little for a client: what waits there is old when it arrives."""
     with contextlib.suppress(OSError):
         connection.transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SYSTEM_KEEPS)
-
-
-def _caller(connection: ServerConnection, request: Request) -> Caller:
-    peer = connection.remote_address
-    return Caller(
-        address=str(peer[0]) if peer else "",
-        host=_only(request.headers, "Host"),
-        origin=_only(request.headers, "Origin"),
-    )
-
-
-def _only(headers: Headers, name: str) -> str | None:
-    """The one value of a header; of several none counts but one that nobody may have."""
-    values = headers.get_all(name)
-    return values[0] if len(values) == 1 else ", ".join(values) if values else None
-
-
-def _response(
-    status: http.HTTPStatus, body: bytes, kind: str = "text/plain; charset=utf-8", more: dict[str, str] | None = None
-) -> Response:
-    headers = Headers({"Content-Type": kind, "Content-Length": str(len(body)), "Connection": "close", **(more or {})})
-    return Response(status.value, status.phrase, headers, body)

@@ -178,7 +178,7 @@ class Work:
     def _introduce(self) -> None:
         settings = self.settings
         ends = settings.ends
-        self.say(f"gentle meter: {self.server.address} (Ctrl-C ends it)")
+        self.say(f"gentle meter: {' or '.join(self.server.addresses)} (Ctrl-C ends it)")
         heard = f"listens at {ends.host}:{ends.port}" if ends.way == "udpin" else f"asks {ends.host}:{ends.port}"
         says = [
             *(["a heartbeat"] if settings.publish or ends.way != "udpin" else []),

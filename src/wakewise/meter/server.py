@@ -9,16 +9,22 @@ from __future__ import annotations
 
 import http
 import secrets
+import socket
 import sys
 import threading
+import time
 from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
 from wakewise.errors import InputError
+from wakewise.serving.addresses import page_addresses
 from wakewise.serving.files import File, Files
-from wakewise.serving.gate import Caller, Gate, is_loopback, page_headers
+from wakewise.serving.gate import TOKEN_HEADER, Caller, Gate, is_loopback, page_headers
+from wakewise.serving.pending import Pending
 from wakewise.serving.stations import Offer, as_json
 
 PAGE = Path(__file__).with_name("page")
@@ -28,9 +34,10 @@ OFFER = Offer(
     widget="Wakewise: gentle meter",
 )
 WISHES = ("mark", "unmark", "begin")
-TOKEN_HEADER = "X-Wakewise-Token"
 _STATE, _HISTORY = "/state.json", "/history.json"
-_QUIET_S = 10.0
+MOST_KEPT = 32
+"""Connections that are kept open for callers who were let in; of more, each ends with its answer."""
+_QUIET_S, _LINGER_S = 10.0, 0.5
 
 Told = Callable[[], dict[str, Any]]
 Wish = Callable[[str], str | None]
@@ -74,11 +81,15 @@ class Server:
         self._thread = threading.Thread(target=self._http.serve_forever, name="meter page", daemon=True)
 
     @property
-    def address(self) -> str:
-        """Where the page is."""
-        host = f"[{self.host}]" if ":" in self.host else self.host
+    def addresses(self) -> tuple[str, ...]:
+        """Where the page is, best first."""
         secret = "" if is_loopback(self.host) or self.token is None else f"#token={self.token}"
-        return f"http://{host}:{self.port}/{secret}"
+        return page_addresses(self.host, self.port, secret)
+
+    @property
+    def address(self) -> str:
+        """The first of `addresses`."""
+        return self.addresses[0]
 
     def start(self) -> None:
         """Answer from now on."""
@@ -89,6 +100,7 @@ class Server:
         self.over = True
         self._http.shutdown()
         self._http.server_close()
+        self._http.pending.close()
         self._thread.join(timeout=10.0)
 
     def answer(self, method: str, path: str, caller: Caller, token: str | None) -> tuple[int, File]:
@@ -102,7 +114,7 @@ class Server:
             return 403, _line(f"refused: {refused}")
         if file is not None:
             return 200, file
-        if self.token is not None and self._gate.needs_token(caller) and not self._gate.fits(token):
+        if not self.lets_in(caller, token):
             return 401, _line("a token is needed: open the address that was printed")
         if method == "GET" and (file := self._files.at(path)) is not None:
             return 200, file
@@ -111,14 +123,52 @@ class Server:
             return (200, as_json({"done": True})) if why_not is None else (409, as_json({"why_not": why_not}))
         return 404, _line("there is nothing here")
 
+    def lets_in(self, caller: Caller, token: str | None) -> bool:
+        """Whether a caller may see the state: by the token, where one is needed."""
+        return self.token is None or not self._gate.needs_token(caller) or self._gate.fits(token)
+
 
 def _line(text: str) -> File:
     return File(body=f"{text}\n".encode(), kind="text/plain; charset=utf-8")
 
 
 class _Listening(ThreadingHTTPServer):
+    """Takes connections; each waits in `pending` until a caller who may see the state has asked for something."""
+
     daemon_threads = True
     allow_reuse_address = True
+    request_queue_size = 128
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        self.pending = Pending()
+        self._numbers: dict[Any, int] = {}
+        self._named: set[Any] = set()
+        super().__init__(*args, **kwargs)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Count a connection among those that wait, and hear it in a thread of its own."""
+        self._numbers[request] = self.pending.enter(str(client_address[0]), partial(_shut, request))
+        super().process_request(request, client_address)
+
+    def named(self, request: Any) -> bool:
+        """Whoever is at the other end was let in; whether its connection may be kept open."""
+        if request not in self._named and len(self._named) >= MOST_KEPT:
+            return False
+        self._named.add(request)
+        self.pending.leave(self._numbers.get(request, 0))
+        return True
+
+    def shutdown_request(self, request: Any) -> None:
+        """Close a connection once the other end has read its answer, which it may lose while words still come."""
+        end_s = time.monotonic() + _LINGER_S
+        with suppress(OSError):
+            request.shutdown(socket.SHUT_WR)
+            request.settimeout(_LINGER_S)
+            while request.recv(1 << 16) and time.monotonic() < end_s:
+                pass
+        self.pending.leave(self._numbers.pop(request, 0))
+        self._named.discard(request)
+        self.close_request(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A page that was closed while it was answered is nothing to tell of; anything else is."""
@@ -126,27 +176,41 @@ class _Listening(ThreadingHTTPServer):
             super().handle_error(request, client_address)
 
 
+def _shut(request: Any) -> None:
+    with suppress(OSError):
+        request.shutdown(socket.SHUT_RDWR)
+
+
 def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
     """The class of requests to one server."""
 
     class Request(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"
+        default_request_version = "HTTP/1.0"  # of a request without one; older ones get no status
         timeout = _QUIET_S
+        error_content_type = "text/plain; charset=utf-8"
+        error_message_format = "%(code)d %(message)s\n"
 
         def do_GET(self) -> None:
             self._do("GET")
+
+        def do_HEAD(self) -> None:
+            self._do("GET", body=False)
 
         def do_POST(self) -> None:
             # What a wish carries says nothing; it is not read, so the connection ends with the answer.
             self.close_connection = True
             self._do("POST")
 
-        def _do(self, method: str) -> None:
+        def _do(self, method: str, *, body: bool = True) -> None:
             if server.over:
                 self.close_connection = True
                 return
             caller = Caller(address=self.client_address[0], host=self._only("Host"), origin=self._only("Origin"))
-            status, file = server.answer(method, self.path, caller, self._only(TOKEN_HEADER))
+            token = self._only(TOKEN_HEADER)
+            status, file = server.answer(method, self.path, caller, token)
+            if status == http.HTTPStatus.FORBIDDEN or not server.lets_in(caller, token) or not self._kept():
+                self.close_connection = True
             self.send_response(status, http.HTTPStatus(status).phrase)
             self.send_header("Content-Type", file.kind)
             self.send_header("Content-Length", str(len(file.body)))
@@ -157,7 +221,12 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
             if self.close_connection:
                 self.send_header("Connection", "close")
             self.end_headers()
-            self.wfile.write(file.body)
+            if body:
+                self.wfile.write(file.body)
+
+        def _kept(self) -> bool:
+            assert isinstance(self.server, _Listening)
+            return self.server.named(self.request)
 
         def _only(self, name: str) -> str | None:
             """The one value of a header; of several none counts but one that nobody may have."""

@@ -18,7 +18,9 @@ from wakewise.errors import InputError
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 FRAMED_BY = ("'self'", "http://localhost:*", "http://127.0.0.1:*", "http://blueos.local:*", "http://192.168.2.2:*")
 """Pages that may show ours within them: this computer's, and BlueRobotics Cockpit where a BlueROV2 serves it."""
-_NAME = re.compile(r"([A-Za-z0-9.-]+)(:\d+)?\Z")
+TOKEN_HEADER = "X-Wakewise-Token"
+"""Where a caller shows the token."""
+_NAME = re.compile(r"([A-Za-z0-9._-]+|\[[0-9A-Fa-f:.]+\])(:\d+)?\Z")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +49,8 @@ class Gate:
         """Why a request is refused; None where it is let in."""
         if caller.host is None:
             return "no Host header"
+        if _NAME.match(caller.host) is None:
+            return f"Host {_short(caller.host)}: not the name of a computer"
         if not self.open_to_net and not self._local(caller.host) and caller.host not in self._proxies():
             return f"Host {_short(caller.host)}: this page is served as {self._names()} only"
         if caller.origin is not None and caller.origin not in self._origins(caller.host):
@@ -61,7 +65,7 @@ class Gate:
 
     def fits(self, token: str | None) -> bool:
         """Whether a token is the right one; takes the same time whatever is wrong with it."""
-        return token is not None and hmac.compare_digest(token.encode(), self.token.encode())
+        return token is not None and same(token, self.token)
 
     def _origins(self, host: str) -> set[str]:
         """Where a page must come from that was asked for under this name."""
@@ -77,6 +81,11 @@ class Gate:
 
     def _names(self) -> str:
         return ", ".join(f"{name}:{self.port}" for name in LOOPBACK)
+
+
+def same(one: str, other: str) -> bool:
+    """Whether two secrets are the same, in a time that tells nothing; any text may be compared."""
+    return hmac.compare_digest(one.encode(errors="surrogatepass"), other.encode(errors="surrogatepass"))
 
 
 def origin_of(text: str) -> str:
@@ -116,7 +125,7 @@ def page_headers(host: str, origins: tuple[str, ...] = ()) -> dict[str, str]:
 
     Besides `FRAMED_BY` that is any port of the name under which it was asked for: the same computer's other pages.
     """
-    named = _NAME.match(host)
+    named = None if host.startswith("[") else _NAME.match(host)  # the rules know no IPv6 addresses
     framed_by = (*FRAMED_BY, *([f"http://{named[1]}:*"] if named else []))
     sockets = [f"ws://{host}", *(f"ws{origin.removeprefix('http')}" for origin in origins)]
     rules = (

@@ -19,7 +19,8 @@ export function banner({ link, said, helm, sending, mode, preparing }) {
   else if (link === "silent") [tone, first, second] = ["bad", "No news from the vehicle", "what is shown is old; without a link it holds"];
   else if (helm.mine) {
     label = "Give back";
-    if (sending) [tone, first, second] = [mode === "operator" ? "live" : "mine", "You have the helm", MODES[mode] ?? ""];
+    if (sending && !helm.armed) [tone, first, second] = ["warn", "Sticks at zero", "they were silent for a moment: let go of them once"];
+    else if (sending) [tone, first, second] = [mode === "operator" ? "live" : "mine", "You have the helm", MODES[mode] ?? ""];
     else [tone, first, second] = ["warn", "Sticks at zero", "this window is not in front: click here to fly on"];
   } else if (helm.holder && helm.quiet) {
     [first, second, label] = [`${helm.holder} has left the sticks`, "the vehicle holds, the helm is free", "Take the helm"];

@@ -26,7 +26,8 @@ const name = () => words(asked.get("name") ?? kept("name") ?? "", 24) || "A pilo
 // The token stands in the fragment, which browsers send to nobody.
 const token = () => decodeURIComponent(location.hash.replace(/^#(token=)?/, "")) || null;
 
-const link = new Link(() => ({ type: "hello", token: token(), name: name(), wants: "watch" }));
+// The lease of the helm that this tab had last, by which the server knows it again.
+const link = new Link(() => ({ type: "hello", token: token(), name: name(), wants: "watch", ...(Helm.last() ? { lease: Helm.last() } : {}) }));
 const helm = new Helm(link);
 const notes = new Notes($("notes"));
 const desk = new Desk(helm);
@@ -161,7 +162,8 @@ link.addEventListener("refused", (event) => linked("refused", words(event.detail
 link.addEventListener("down", (event) => {
   for (const source of [keyboard, pads, touch]) source.drop();
   if (now.link !== "down" && now.link !== "connecting") notes.add("error", "Link lost: the vehicle holds; helm given up");
-  linked(now.link === "connecting" ? "connecting" : "down", `trying again in ${shown(event.detail.wait_ms / 1000, 1, "s")}`);
+  const why = words(event.detail.why);
+  linked(now.link === "connecting" ? "connecting" : "down", `${why ? `${why}; ` : ""}trying again in ${shown(event.detail.wait_ms / 1000, 1, "s")}`);
 });
 helm.addEventListener("change", show);
 

@@ -19,6 +19,7 @@ export class Pads {
   #index = null;
   #armed = [];
   #down = new Set();
+  #stale = new Set();
   #press;
   #nudge;
   #say;
@@ -38,6 +39,8 @@ export class Pads {
       // An axis counts once it was seen at rest: a trigger that rests at -1, or a stick held over, does not fly.
       if (Number.isFinite(value) && Math.abs(value) < REST) this.#armed[k] = true;
     });
+    // Which of its sticks is which is known of a standard mapping alone.
+    if (pad.mapping !== "standard") return axes;
     for (const [from, sign, to] of STANDARD) {
       const value = pad.axes[from];
       if (this.#armed[from] && Number.isFinite(value) && Math.abs(value) > DEAD) {
@@ -45,31 +48,39 @@ export class Pads {
       }
     }
     const held = new Set(pad.buttons.map((b, k) => (b && b.pressed ? k : -1)).filter((k) => k >= 0));
-    const fresh = [...held].filter((k) => !this.#down.has(k));
+    for (const k of [...this.#stale]) if (!held.has(k)) this.#stale.delete(k);
+    const fresh = [...held].filter((k) => !this.#down.has(k) && !this.#stale.has(k));
     this.#down = held;
-    if (pad.mapping === "standard") {
-      axes[4] = (held.has(TILT_UP) ? 1 : 0) - (held.has(TILT_DOWN) ? 1 : 0);
-      for (const k of fresh) {
-        if (PRESSES[k]) this.#press(PRESSES[k]);
-        if (k === GENTLER) this.#nudge(-1);
-        if (k === OBEY) this.#nudge(1);
-      }
+    const tilts = (k) => held.has(k) && !this.#stale.has(k);
+    axes[4] = (tilts(TILT_UP) ? 1 : 0) - (tilts(TILT_DOWN) ? 1 : 0);
+    for (const k of fresh) {
+      if (PRESSES[k]) this.#press(PRESSES[k]);
+      if (k === GENTLER) this.#nudge(-1);
+      if (k === OBEY) this.#nudge(1);
     }
     return axes;
   }
 
+  /** Sticks count once they were seen at rest, buttons that are down now once they were let go. */
   drop() {
     this.#armed = [];
+    this.#stale = new Set(this.#found()?.buttons.map((_, k) => k));
   }
 
-  #pad() {
+  #found() {
     let pads = [];
     try {
       pads = [...(navigator.getGamepads?.() ?? [])].filter((pad) => pad && pad.connected);
     } catch {
       // Not allowed in this frame: flown without.
     }
-    const pad = pads.find((one) => one.index === this.#index) ?? pads[0] ?? null;
+    // One that can be flown is taken before one that cannot.
+    const flown = pads.filter((pad) => pad.mapping === "standard"), kept = (one) => one.index === this.#index;
+    return flown.find(kept) ?? flown[0] ?? pads.find(kept) ?? pads[0] ?? null;
+  }
+
+  #pad() {
+    const pad = this.#found();
     const index = pad ? pad.index : null;
     if (index !== this.#index) {
       if (this.#index !== null) this.#say("warn", `Gamepad lost (${this.name}): its sticks are at zero`);
@@ -79,7 +90,7 @@ export class Pads {
       // A button held while it is plugged in presses nothing.
       this.#down = new Set(pad ? pad.buttons.map((_, k) => k) : []);
       if (pad) this.#say("info", `Gamepad: ${this.name}`);
-      if (pad && pad.mapping !== "standard") this.#say("warn", "This gamepad has no standard mapping: try its sticks with care; its buttons are not used");
+      if (pad && pad.mapping !== "standard") this.#say("warn", "This gamepad is not flown: the browser does not know which of its sticks is which. Plug it into the computer that runs the cockpit: wakewise cockpit --gamepad --mapping FILE");
     }
     return pad;
   }

@@ -12,6 +12,7 @@ export class Helm extends EventTarget {
   why = "";
   waiting = false;
   quiet = false;
+  armed = true;
   id = null;
   #link;
   #holdUntil_ms = 0;
@@ -21,6 +22,16 @@ export class Helm extends EventTarget {
     this.#link = link;
     link.addEventListener("down", () => this.#set({}));
     link.addEventListener("refused", () => this.#set({}));
+  }
+
+  /** The lease that this tab had last, through reloads of the page; null if none. */
+  static last() {
+    try {
+      return sessionStorage.getItem("lease");
+    } catch {
+      // A frame may not be allowed to keep anything.
+      return null;
+    }
   }
 
   get mine() {
@@ -70,19 +81,30 @@ export class Helm extends EventTarget {
       waiting: lease === null && asked != null && this.id !== null && asked.id === this.id,
       // Whoever has it sends nothing: it may be taken.
       quiet: message.flying === false,
+      // After a pause the sticks count once they were let go.
+      armed: message.armed !== false,
     });
+    if (lease) keepLease(lease);
     if (lease && performance.now() < this.#holdUntil_ms) {
       this.#holdUntil_ms = 0;
       this.press("hold");
     }
   }
 
-  #set({ lease = null, holder = null, askedBy = null, why = "", waiting = false, quiet = false }) {
-    Object.assign(this, { lease, holder, askedBy, why, waiting, quiet });
+  #set({ lease = null, holder = null, askedBy = null, why = "", waiting = false, quiet = false, armed = true }) {
+    Object.assign(this, { lease, holder, askedBy, why, waiting, quiet, armed });
     this.#tell();
   }
 
   #tell() {
     this.dispatchEvent(new Event("change"));
+  }
+}
+
+function keepLease(lease) {
+  try {
+    sessionStorage.setItem("lease", lease);
+  } catch {
+    // Without it a lost connection comes back as any other.
   }
 }

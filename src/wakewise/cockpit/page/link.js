@@ -4,9 +4,10 @@ const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 8000;
 const SILENT_MS = 1500;
 const DEAD_MS = 12000;
-const REFUSED = 4401;
+const REFUSED = 4401, FULL = 1013;
+const NOT_LET_IN = [401, 403];
 
-/** Events: "up", "down" (detail.wait_ms), "silent", "heard", "refused" (detail.why), "message" (object), "picture" (ArrayBuffer). */
+/** Events: "up", "down" (detail.wait_ms, detail.why), "silent", "heard", "refused" (detail.why), "message" (object), "picture" (ArrayBuffer). */
 export class Link extends EventTarget {
   #socket = null;
   #wait_ms = FIRST_WAIT_MS;
@@ -18,7 +19,7 @@ export class Link extends EventTarget {
   expectant = false;
   #hello;
 
-  /** `hello` gives the first message anew for each connection. */
+  /** `hello` gives the first message anew for each connection; its token is shown with the handshake, too. */
   constructor(hello) {
     super();
     this.#hello = hello;
@@ -35,17 +36,41 @@ export class Link extends EventTarget {
     const url = new URL("ws", location.href);
     url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
     url.search = url.hash = "";
-    const socket = new WebSocket(url);
+    const token = this.#hello().token;
+    // A token that cannot be one is not shown; the hello tells what is wrong with it.
+    const socket = new WebSocket(url, /^[\w-]+$/.test(token ?? "") ? ["wakewise", `token.${token}`] : ["wakewise"]);
+    let opened = false;
     socket.binaryType = "arraybuffer";
     this.#socket = socket;
     socket.onopen = () => {
+      opened = true;
       this.#heard_ms = performance.now();
       this.expectant = false;
       this.send(this.#hello());
       this.#tell("up");
     };
     socket.onmessage = (event) => this.#take(event.data);
-    socket.onclose = (event) => this.#closed(socket, event);
+    socket.onclose = (event) => {
+      this.#closed(socket, event);
+      if (!opened) this.#askWhy(token);
+    };
+  }
+
+  /** A browser does not tell why a socket was refused: the same request without a socket is answered in words. */
+  async #askWhy(token) {
+    try {
+      const answer = await fetch("ws", { headers: token ? { "X-Wakewise-Token": encodeURI(token) } : {}, cache: "no-store" });
+      if (!NOT_LET_IN.includes(answer.status) || this.#socket || this.#ended) return;
+      this.#refused(await answer.text());
+    } catch {
+      // Nobody answers: it is tried again.
+    }
+  }
+
+  #refused(why) {
+    clearTimeout(this.#timer);
+    this.#ended = true;
+    this.#tell("refused", { why: why.trim() });
   }
 
   /** Send an object; false if it could not go. */
@@ -95,15 +120,14 @@ export class Link extends EventTarget {
     this.#socket = null;
     this.#silent = false;
     if (event && event.code === REFUSED) {
-      this.#ended = true;
-      this.#tell("refused", { why: event.reason });
+      this.#refused(event.reason);
       return;
     }
     // Some spread, so that the pages of a server that restarts do not all come at once.
     const wait_ms = this.#wait_ms * (0.8 + 0.4 * Math.random());
     this.#wait_ms = Math.min(2 * this.#wait_ms, LONGEST_WAIT_MS);
     if (!this.#ended) this.#timer = setTimeout(() => this.connect(), wait_ms);
-    this.#tell("down", { wait_ms });
+    this.#tell("down", { wait_ms, why: event?.code === FULL ? event.reason : "" });
   }
 
   #listen() {

@@ -4,6 +4,8 @@ import { clip } from "./numbers.js";
 
 export const AXES = ["forward", "right", "down", "turn", "tilt"];
 const PERIOD_MS = 40;
+/** A page that stood still for longer has nothing in its hands: whatever was held must be let go and pressed anew. */
+const FROZEN_MS = 300;
 
 /** Sum of sources, each with `read()` -> five shares of full stick, and `drop()`: forget what is held until it is let go. */
 export class Sticks {
@@ -15,6 +17,7 @@ export class Sticks {
   #sources;
   #attentive;
   #changed;
+  #ticked_ms = performance.now();
 
   /** `attentive()` tells whether somebody looks at this page; `changed()` is called when sending begins or ends. */
   constructor({ link, helm, sources, attentive, changed }) {
@@ -42,7 +45,9 @@ export class Sticks {
   }
 
   tick() {
-    if (!this.#attentive()) {
+    const now_ms = performance.now(), frozen = now_ms - this.#ticked_ms > FROZEN_MS;
+    this.#ticked_ms = now_ms;
+    if (frozen || !this.#attentive()) {
       this.cut();
       return;
     }
