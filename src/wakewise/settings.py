@@ -59,15 +59,22 @@ def describe_faults(
     known : callable, optional
         Called with dotted name and value of each; words that it returns are told in place of ours.
     """
-    told, more = [], 0
+    told: dict[str, str] = {}
+    alike: dict[str, list[str]] = {}
+    more = 0
     for fault in error.errors(include_url=False):
         dotted = ".".join(str(part) for part in fault["loc"]) or whole
         words = None if known is None else known(dotted, fault["input"])
-        if words is None and len(told) >= MOST_FAULTS:
+        # Numbers of one list that are wrong in one way are told as one.
+        owner = f"{dotted.rpartition('.')[0]} {fault['type']}" if isinstance([*fault["loc"], ""][-2], int) else dotted
+        if owner in told:
+            alike[owner].append(dotted.rpartition(".")[2])
+        elif words is None and len(told) >= MOST_FAULTS:
             more += 1
         else:
-            told.append(f"{dotted}: {words or _words(fault, model)}")
-    return "; ".join(told) + (f"; and {more} more" if more else "")
+            told[owner], alike[owner] = f"{dotted}: {words or _words(fault, model)}", []
+    lines = [line + (f" (so are {', '.join(alike[owner])})" if alike[owner] else "") for owner, line in told.items()]
+    return "; ".join(lines) + (f"; and {more} more" if more else "")
 
 
 def _words(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
@@ -84,7 +91,9 @@ def _words(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
     shown = f"found {text if len(text) <= 80 else text[:80] + '...'}, " if plain else ""
     message = str(fault["msg"]).removeprefix("Value error, ").replace("Input should", "should").replace("\n", " ")
     message = message.replace("a valid tuple", "a list in square brackets")
-    message = message.replace("a valid list", "a list in square brackets")
+    message = message.removesuffix(", unable to parse string as a number").replace(
+        "a valid list", "a list in square brackets"
+    )
     return f"{shown}{message[:1].lower()}{message[1:]}"
 
 

@@ -15,8 +15,27 @@ if TYPE_CHECKING:
     from wakewise.vehicles import VehicleDraft
     from wakewise.vehicles.mixing import Comparison
 
-File = Annotated[Path, typer.Argument(help="URDF, xacro, Gazebo SDF, Stonefish .scn, or YAML with a matrix.")]
-Out = Annotated[Path | None, typer.Option("--out", help="Write what was found as a vehicle file.", show_default=False)]
+File = Annotated[
+    Path,
+    typer.Argument(help="URDF, xacro, Gazebo SDF, Stonefish .scn, YAML with a matrix; or a vehicle file to complete."),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        help="Write what was found as a vehicle file, what a flight needs beside as comments to fill in.",
+        show_default=False,
+    ),
+]
+Like = Annotated[
+    str | None,
+    typer.Option(
+        "--like",
+        metavar="NAME",
+        help="Estimate what is missing after this vehicle, scaled by mass; each such group is marked estimate: true.",
+        show_default=False,
+    ),
+]
 Frame = Annotated[str, typer.Option("--frame", help="Body axes of the file: auto, FLU or FRD.")]
 Thrust = Annotated[
     str,
@@ -35,6 +54,15 @@ Packages = Annotated[
 Arguments = Annotated[
     list[str] | None, typer.Option("--arg", metavar="NAME:=VALUE", help="A xacro argument; may be repeated.")
 ]
+Rows = Annotated[
+    str | None,
+    typer.Option(
+        "--rows",
+        metavar="NAMES",
+        help="What the six rows of a matrix are, in the file's order, such as roll,pitch,yaw,x,y,z.",
+        show_default=False,
+    ),
+]
 Skip = Annotated[bool, typer.Option("--skip-missing", help="Leave out xacro includes that are not there.")]
 
 
@@ -47,30 +75,40 @@ def import_file(
     package: Packages = None,
     arg: Arguments = None,
     skip_missing: Skip = False,
+    rows: Rows = None,
+    like: Like = None,
     json: Json = False,
 ) -> None:
-    """Import a vehicle file of another project; say what it holds, what was decided, and what is missing."""
+    """Import a vehicle file of another project; say what it holds, what was decided, and what is missing.
+
+    docs/vehicle-file.md explains every field of what --out writes.
+    """
     from wakewise.files import write_text
-    from wakewise.importers import import_vehicle
-    from wakewise.vehicles import draft_yaml
+    from wakewise.importers import find_vehicle
+    from wakewise.vehicles import blanks, completed, draft_yaml, load_draft
     from wakewise.vehicles.mixing import compare_matrix
 
-    if out is not None and out.is_dir():
-        raise InputError(f"--out {out}: is a folder, must be a file")
-    draft = import_vehicle(
-        file,
+    if out is not None:
+        if out.is_dir():
+            raise InputError(f"--out {out}: is a folder, must be a file")
+        if out.suffix not in (".yaml", ".yml"):
+            raise InputError(f"--out {out}: must end in .yaml, by which a vehicle file is known")
+    draft = find_vehicle(
+        str(file),
         convention=frame,
         thrust=thrust_direction,
         matrix=matrix,
         packages={name: Path(folder) for name, folder in pairs(package, "=", "--package NAME=DIR").items()},
         arguments=pairs(arg, ":=", "--arg NAME:=VALUE"),
         skip_missing=skip_missing,
+        rows=rows,
     )
+    draft = draft if like is None else completed(draft, load_draft(like))
     comparison = None
     if draft.thrusters and draft.shipped_matrix is not None:
         comparison = compare_matrix(draft, draft.shipped_matrix, str(matrix or file))
     if out is not None:
-        write_text(out, draft_yaml(draft))
+        write_text(out, draft_yaml(draft, blanks(draft)))
     if json:
         print_json(_facts(draft, comparison, out))
     else:
@@ -193,5 +231,9 @@ def _tell(draft: VehicleDraft, comparison: Comparison | None, out: Path | None) 
             typer.echo(f"  {disagreement.text}")
         for note in comparison.notes:
             typer.echo(f"  {note}")
+    estimates = [origin for origin in draft.provenance if origin.estimate]
+    for origin in estimates:
+        typer.echo(f"estimate: {origin.group.replace('_', ' ')}: {' '.join(origin.source.split())}")
     if out is not None:
-        typer.echo(f"written: {out}")
+        how = "; its fields marked Missing are to be filled in (docs/vehicle-file.md)" if draft.missing else ""
+        typer.echo(f"written: {out}{how}")

@@ -9,6 +9,15 @@ from pathlib import Path
 
 from wakewise.errors import InputError
 from wakewise.importers.stated_matrix import read_number_matrix
+from wakewise.importers.wrench_rows import (
+    ARDUSUB,
+    FORCES_FIRST,
+    MOMENTS_FIRST,
+    agreeing,
+    is_signs,
+    nearest,
+    told_order,
+)
 from wakewise.plugins import find, offered
 from wakewise.vehicles.check import AnyVehicle
 from wakewise.vehicles.draft import VehicleDraft
@@ -17,6 +26,7 @@ from wakewise.vehicles.mixing import Comparison, compare_either_frame, compare_s
 from wakewise.vehicles.vehicle import Vehicle
 
 _OURS = re.compile(r"^(does_not_claim|thruster_layout):", re.MULTILINE)
+_BASED = re.compile(r"^base:\s*[\"']?([\w-]+)", re.MULTILINE)
 
 
 def find_vehicle(
@@ -24,9 +34,11 @@ def find_vehicle(
     *,
     convention: str = "auto",
     thrust: str = "auto",
+    matrix: Path | None = None,
     packages: Mapping[str, Path] | None = None,
     arguments: Mapping[str, str] | None = None,
     skip_missing: bool = False,
+    rows: str | None = None,
 ) -> VehicleDraft:
     """Read a vehicle of the library, a vehicle file, or any file of another project that can be imported.
 
@@ -38,7 +50,13 @@ def find_vehicle(
         If there is no such vehicle or file, it cannot be read as a vehicle, or an option does not apply to it.
     """
     path = Path(name_or_path)
-    told = {"frame": convention != "auto", "thrust direction": thrust != "auto", "arguments": bool(arguments)}
+    told = {
+        "frame": convention != "auto",
+        "thrust direction": thrust != "auto",
+        "matrix": matrix is not None,
+        "arguments": bool(arguments),
+        "rows": rows is not None,
+    }
     useless = ", ".join(word for word, given in told.items() if given)
     try:
         is_file, is_folder = path.is_file(), path.is_dir()
@@ -59,9 +77,11 @@ def find_vehicle(
         path,
         convention=convention,
         thrust=thrust,
+        matrix=matrix,
         packages=packages,
         arguments=arguments,
         skip_missing=skip_missing,
+        rows=rows,
     )
 
 
@@ -100,8 +120,11 @@ def any_vehicle(name_or_path: str) -> Vehicle:
     return draft.vehicle()
 
 
-def compare_with(vehicle: AnyVehicle, matrix: str) -> Comparison:
+def compare_with(vehicle: AnyVehicle, matrix: str, rows: str | None = None) -> Comparison:
     """Compare the geometry with a stated matrix: the word ardusub, or a file of numbers or YAML that holds one.
+
+    What the file leaves open, such as whether forces or moments come first, is read as the geometry agrees best;
+    `rows` names its rows in their order, such as "roll,pitch,yaw,x,y,z".
 
     Raises
     ------
@@ -111,24 +134,39 @@ def compare_with(vehicle: AnyVehicle, matrix: str) -> Comparison:
     if not vehicle.thrusters:
         raise InputError(f"vehicle {vehicle.name}: holds no places of thrusters to compare {matrix} with")
     if matrix == "ardusub":
+        if rows is not None:
+            raise InputError("rows: ArduSub's factors need none")
         return compare_with_ardusub(vehicle)
-    path = Path(matrix)
+    path, geometry = Path(matrix), vehicle.allocation_matrix
+    signs_only = False
     if path.suffix in (".yaml", ".yml"):
         from wakewise.importers.read import read_matrix
 
-        stated, notes = read_matrix(path)
+        stated, notes = read_matrix(path, geometry=geometry, rows=rows)
+    else:
+        raw, signs_only = read_number_matrix(path)
+        stated, notes = raw, []
+        told = told_order(rows)
+        if not signs_only:
+            orders = [FORCES_FIRST, MOMENTS_FIRST, ARDUSUB] if told is None else [told]
+            best, words = nearest([raw], geometry, orders, ["FRD", "FLU"])
+            if told is not None or not words or agreeing(best, geometry) > agreeing(raw, geometry):
+                stated, notes = best, [f"matrix read as {words}"] if words else []
+            if not words:
+                stated = raw
+    if signs_only or (is_signs(stated) and stated.shape == geometry.shape):
+        found = compare_signs(vehicle, stated, path.name)
+    else:
         found = compare_either_frame(vehicle, stated, path.name)
-        return replace(found, notes=(*notes, *found.notes))
-    stated, signs_only = read_number_matrix(path)
-    if signs_only:
-        return compare_signs(vehicle, stated, path.name)
-    return compare_either_frame(vehicle, stated, path.name)
+    return replace(found, notes=(*notes, *found.notes))
 
 
 def _is_ours(path: Path) -> bool:
     if path.suffix not in (".yaml", ".yml"):
         return False
     try:
-        return _OURS.search(path.read_text("utf-8")) is not None
+        text = path.read_text("utf-8")
     except (OSError, UnicodeDecodeError):
         return True
+    based = _BASED.search(text)
+    return _OURS.search(text) is not None or (based is not None and based[1] in draft_names())

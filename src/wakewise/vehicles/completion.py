@@ -43,6 +43,8 @@ _POWERS = {
 }
 """Powers of length by which the fields of similar vehicles differ; of fields that have a plausible range."""
 
+_LIMITS = (THRUSTER_FIELDS["max_forward_N"], THRUSTER_FIELDS["max_reverse_N"])
+
 _FORMS = {
     "thruster_layout.mounts": "[{name: _, position_m: [_, _, _], axis: [_, _, _]}]",
     **dict.fromkeys(
@@ -84,7 +86,7 @@ def plausible(dotted: str, draft: VehicleDraft | None = None) -> str:
     values: list[float] = []
     for found, other in _stated(dotted):
         scale = 1.0 if length is None or other is None else (length / other) ** _POWERS[dotted]
-        values += [scale * float(value) for value in found]
+        values += [scale * value for value in found if value != 0.0]
     low, high = _short(min(values)), _short(max(values))
     return low if low == high else f"{low} to {high}"
 
@@ -115,7 +117,7 @@ def _length(draft: VehicleDraft) -> float | None:
 
 
 def _short(value: float) -> str:
-    return f"{float(f'{value:.2g}'):g}"
+    return f"{float(f'{value:.3g}'):g}"
 
 
 def blanks(draft: VehicleDraft) -> dict[str, list[str]]:
@@ -124,36 +126,26 @@ def blanks(draft: VehicleDraft) -> dict[str, list[str]]:
     Each is a line of the file as it should be, with `_` in place of numbers, its unit, meaning and plausible range.
     """
     held = groups_of(draft)
+    asked = list(draft.missing_fields)
+    if set(_LIMITS) & set(asked):  # their group holds both
+        asked = [name for name in asked if name not in _LIMITS] + list(_LIMITS)
     lines: dict[str, list[str]] = {}
-    for dotted in draft.missing_fields:
-        group, _, field = dotted.partition(".")
+    for dotted in asked:
+        group = dotted.partition(".")[0]
         if group not in lines:
             there = any(value is not None for value in held[group].values())
-            lines[group] = [] if there else [f"# {group}:", "#   source:", "#   estimate: true"]
+            head = [] if there else [f"#{group}:", "#  source:  # where the numbers come from", "#  estimate: true"]
+            lines[group] = ["# Missing: uncomment the lines below and put numbers for _.", *head]
         lines[group].append(_blank(dotted, draft))
-        if (
-            group == "thruster_limits"
-            and field == "max_forward_N"
-            and "thruster_limits.max_reverse_N" not in (draft.missing_fields)
-        ):  # the group holds both or none
-            lines[group].append(_blank("thruster_limits.max_reverse_N", draft))
-    return {group: _as_comments(found) for group, found in lines.items()}
-
-
-def _as_comments(found: list[str]) -> list[str]:
-    head = "# Missing, a flight needs it: take away the first # of each line and fill in _"
-    return [head, *found]
+    return lines
 
 
 def _blank(dotted: str, draft: VehicleDraft) -> str:
     group, _, field = dotted.partition(".")
-    about = description(group, field)
     near = plausible(dotted, draft)
     scaled = " scaled to this mass" if draft.mass_kg is not None and _POWERS.get(dotted, 0) else ""
-    words = "; ".join(
-        text for text in (unit_of(field), about, f"the library's vehicles{scaled}: {near}" if near else "") if text
-    )
-    return f"#   {field}: {_FORMS.get(dotted, '[_, _, _]')}  # {words}"
+    said = (unit_of(field), description(group, field), f"the library's vehicles{scaled}: {near}" if near else "")
+    return f"#  {field}: {_FORMS.get(dotted, '[_, _, _]')}  # {'; '.join(text for text in said if text)}"
 
 
 def description(group: str, field: str) -> str:
@@ -208,8 +200,7 @@ def completed(draft: VehicleDraft, like: VehicleDraft) -> VehicleDraft:
         give("X_BC", Pose(s * like.X_BC.p_m, like.X_BC.q))
     give("camera_fov_rad", like.camera_fov_rad)
     given["thrusters"] = _thrusters(draft, like, s)
-    limits = THRUSTER_FIELDS["max_forward_N"], THRUSTER_FIELDS["max_reverse_N"]
-    if set(limits) <= set(asked) and all(t.max_forward_N is t.max_reverse_N is None for t in draft.thrusters):
+    if set(_LIMITS) <= set(asked) and all(t.max_forward_N is t.max_reverse_N is None for t in draft.thrusters):
         given |= {"curve": like.curve, "least_thrust": like.least_thrust}
         asked += ["thruster_curve.table"] if like.curve is not None else []
         asked += ["thruster_least.forward_N"] if like.least_thrust is not None else []

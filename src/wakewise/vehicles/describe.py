@@ -95,6 +95,7 @@ def check_report(vehicle: AnyVehicle, comparison: Comparison | None = None) -> d
             "compared": found.compared,
             "agree": found.agree,
             "notes": list(found.notes),
+            "commands": list(found.commands),
         },
         "missing": list(draft.missing),
         "notes": list(draft.notes),

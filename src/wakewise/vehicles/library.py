@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from wakewise.errors import InputError
 from wakewise.settings import describe_faults, guess
 from wakewise.vehicles.draft import VehicleDraft
-from wakewise.vehicles.needs import NEEDED_FIELDS
+from wakewise.vehicles.needs import BLANK, NEEDED_FIELDS
 from wakewise.vehicles.vehicle import Vehicle
 from wakewise.vehicles.vehicle_file import VehicleFile
 from wakewise.yaml_text import YamlError, read_yaml
@@ -98,14 +98,14 @@ def parse_vehicle(text: str, where: str, name: str) -> VehicleDraft:
     try:
         return VehicleFile.model_validate(value).draft(name)
     except ValidationError as error:
-        told = describe_faults(error, VehicleFile, "file")
-        raise InputError(f"vehicle file {where}: {told}{_lacks(value)}") from error
+        told = describe_faults(error, VehicleFile, "file", lambda _, found: "not filled in" if found == BLANK else None)
+        raise InputError(f"vehicle file {where}: {told}{_lacks(value, told)}") from error
     except InputError as error:
-        raise InputError(f"vehicle file {where}: {error}{_lacks(value)}") from error
+        raise InputError(f"vehicle file {where}: {error}{_lacks(value, str(error))}") from error
 
 
-def _lacks(tree: dict[str, Any]) -> str:
-    """What a flight needs beside, of a file that cannot be read as it is; of thrusters, where no mount states it."""
+def _lacks(tree: dict[str, Any], told: str) -> str:
+    """What a flight needs beside what was told, of a file that cannot be read as it is."""
     layout = tree.get("thruster_layout")
     mounts = layout.get("mounts") if isinstance(layout, dict) else None
     own = {key for mount in mounts if isinstance(mount, dict) for key in mount} if isinstance(mounts, list) else set()
@@ -114,7 +114,11 @@ def _lacks(tree: dict[str, Any]) -> str:
         group, _, field = dotted.partition(".")
         fields = tree.get(group)
         at_mounts = {"diameter_m": "disk_diameter_m"}.get(field, field) in own
-        if not at_mounts and (fields is None or (isinstance(fields, dict) and fields.get(field) is None)):
+        if (
+            dotted not in told
+            and not at_mounts
+            and (fields is None or (isinstance(fields, dict) and fields.get(field) is None))
+        ):
             lacking.append(dotted)
     return f"; for a flight it lacks {', '.join(lacking)} too" if lacking else ""
 

@@ -45,6 +45,9 @@ ARDUSUB_FRAMES = {8: ("vectored_6dof", ARDUSUB_VECTORED_6DOF), 6: ("vectored", A
 ROUNDING = 1e-3
 """Entries that differ by less than this, relative to the largest of their row, agree."""
 
+_PARASITIC = 1e-3
+"""Share of a command from which a side effect is told."""
+
 FLU = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 """Signs that turn the rows of a matrix between x forward, y left, z up and x forward, y right, z down."""
 
@@ -80,12 +83,16 @@ class Disagreement:
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """A stated matrix against the geometry: how many entries were compared, which disagree, and what explains it."""
+    """A stated matrix against the geometry: how many entries were compared, which disagree, and what explains it.
+
+    `commands` says what else each single command makes with this geometry, one line per command.
+    """
 
     stated_by: str
     compared: int
     disagreements: tuple[Disagreement, ...]
     notes: tuple[str, ...] = ()
+    commands: tuple[str, ...] = ()
 
     @property
     def agree(self) -> int:
@@ -156,7 +163,13 @@ def compare_signs(vehicle: AnyVehicle, stated: Array, stated_by: str) -> Compari
             f"couplings: {_summary(at_origin)}"
         )
     notes += _explanations(stated, _signs(vehicle, height_m), found)
-    return Comparison(stated_by=stated_by, compared=stated.size, disagreements=tuple(found), notes=tuple(notes))
+    return Comparison(
+        stated_by=stated_by,
+        compared=stated.size,
+        disagreements=tuple(found),
+        notes=tuple(notes),
+        commands=command_effects(vehicle, stated.T),
+    )
 
 
 def compare_matrix(vehicle: AnyVehicle, stated: Array, stated_by: str) -> Comparison:
@@ -175,7 +188,40 @@ def compare_matrix(vehicle: AnyVehicle, stated: Array, stated_by: str) -> Compar
         compared=stated.size,
         disagreements=tuple(found),
         notes=tuple(_explanations(stated, matrix, found)),
+        commands=command_effects(vehicle, np.asarray(np.linalg.pinv(stated), dtype=np.float64)),
     )
+
+
+def command_effects(vehicle: AnyVehicle, thrusts: Array) -> tuple[str, ...]:
+    """What each single command of a mixer makes beside its own axis with this geometry, in % of what it is to make.
+
+    Parameters
+    ----------
+    vehicle : Vehicle or VehicleDraft
+    thrusts : ndarray, shape (n, 6)
+        Thrusts of each command, a column for each of surge, sway, heave, roll, pitch, yaw.
+
+    Returns
+    -------
+    tuple of str
+        A line for each command with side effects of at least 0.1 %: forces in N and moments in N m about the centre
+        of gravity (the origin where it is not known), per N or N m of the commanded axis.
+    """
+    centre, where = vehicle.p_BG_m, "the centre of gravity"
+    if centre is None:
+        centre, where = np.zeros(3), "the origin, as the centre of gravity is not known"
+    made = about(vehicle.allocation_matrix, centre) @ thrusts
+    lines = []
+    for i, axis in enumerate(WRENCH_AXES):
+        if abs(made[i, i]) < 1e-9:
+            continue
+        shares = made[:, i] / made[i, i]
+        beside = [j for j in range(6) if j != i and abs(shares[j]) >= _PARASITIC]
+        if beside:
+            said = ", ".join(f"{WRENCH_AXES[j]} {100.0 * shares[j]:+.1f} %" for j in beside)
+            unit = "N" if i < 3 else "N m"
+            lines.append(f"{axis} alone also makes {said} (N or N m per {unit} of {axis}, moments about {where})")
+    return tuple(lines)
 
 
 def compare_either_frame(vehicle: AnyVehicle, stated: Array, stated_by: str) -> Comparison:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+BLANK = "_"
+"""What a vehicle file has in place of a number that is to be filled in."""
+
 VEHICLE_WORDS = {
     "size_m": ("size", ("body.size_m",)),
     "mass_kg": ("mass", ("body.mass_kg",)),
