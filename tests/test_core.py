@@ -85,7 +85,7 @@ assert steps["target_speed_mean_m_s"].max() > 0.0
 
 @pytest.mark.slow
 def test_a_campaign_of_flights_is_made_without_extras(tmp_path):
-    """`stages: fly` takes no photograph: its trials are flown, listed and put in a table; `stages: model` is refused."""
+    """`stages: fly` takes no photograph: its trials are flown and put in a table; `stages: model` is refused."""
     text = (
         "name: core\nmethods: [dp]\ntargets: [brain]\nworlds: [still-tank]\nseeds: 1\nretries: 0\n"
         "scenario: {mission.elevations_deg: [40], mission.views: [3], target.points: 60}\n"

@@ -1,11 +1,21 @@
 """Files: whole or not there."""
 
 import os
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
+import polars as pl
 import pytest
+from PIL import Image
 
-from wakewise.files import whole_file, whole_folder, write_json
+from wakewise.errors import FileFailure, is_full
+from wakewise.files import whole_file, whole_folder, write_bytes, write_json
+from wakewise.film.encode import film_writer
+from wakewise.operation.telemetry import write_mcap
+from wakewise.targets import Mesh, write_mesh
 
 
 def test_a_block_that_fails_leaves_nothing(tmp_path: Path) -> None:
@@ -61,3 +71,83 @@ def test_json_refuses_what_json_cannot_hold(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="JSON"):
         write_json(tmp_path / "x.json", {"rmse_mm": float("nan")})
     assert not (tmp_path / "x.json").exists()
+
+
+@pytest.fixture
+def full_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system in memory with room for a few pages."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    told = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=64k", "none", str(place)], capture_output=True, text=True, check=False
+    ) if shutil.which("mount") else None  # fmt: skip
+    if told is None or told.returncode:
+        pytest.skip("file systems can be mounted by root alone")
+    yield place
+    subprocess.run(["umount", "--lazy", str(place)], check=True)
+
+
+NOISE = np.random.default_rng(1).normal(size=60_000)
+PICTURE = np.random.default_rng(1).integers(0, 255, (240, 320, 3), dtype=np.uint8)
+
+
+def _film(path: Path) -> None:
+    with film_writer(path, 10.0, (320, 240)) as sink:
+        for k in range(12):
+            sink.add(np.roll(PICTURE, 7 * k))
+
+
+def _mcap(path: Path) -> None:
+    poses = {
+        f"{who}_{axis}": NOISE
+        for who in ("true", "est", "goal")
+        for axis in ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
+    }
+    write_mcap(pl.DataFrame({"time_s": 0.02 * np.arange(len(NOISE)), "disturbance": NOISE, **poses}), path, every=20)
+
+
+def _whole(write: Callable[[Path], object]) -> Callable[[Path], None]:
+    def work(path: Path) -> None:
+        with whole_file(path) as temporary:
+            write(temporary)
+
+    return work
+
+
+@pytest.mark.parametrize(
+    ("name", "write"),
+    [
+        ("a.parquet", _whole(pl.DataFrame({"a": NOISE}).write_parquet)),
+        ("lazy.parquet", _whole(pl.LazyFrame({"a": NOISE}).sink_parquet)),
+        ("a.csv", _whole(pl.DataFrame({"a": NOISE}).write_csv)),
+        ("a.npz", _whole(lambda path: np.savez_compressed(path, a=NOISE))),
+        ("a.png", _whole(Image.fromarray(PICTURE).save)),
+        ("a.json", lambda path: write_json(path, NOISE.tolist())),
+        ("a.bin", lambda path: write_bytes(path, NOISE.tobytes())),
+        ("a.ply", lambda path: write_mesh(path, Mesh(NOISE.reshape(-1, 3), np.arange(60_000).reshape(-1, 3) % 20_000))),
+        ("a.mcap", _mcap),
+        ("a.webm", _film),
+        ("a.mp4", _film),
+        ("a.webp", _film),
+    ],
+)
+def test_a_full_disk_leaves_no_part_of_a_file_whichever_library_writes(
+    name: str, write: Callable[[Path], None], full_disk: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Tables, arrays, pictures, meshes, logs and films: one exception that says so, and nothing beside it."""
+    with pytest.raises(FileFailure) as told:
+        write(full_disk / name)
+    capfd.readouterr()  # what libraries print
+    assert is_full(told.value)
+    assert str(told.value) == f"{full_disk / name}: the disk is full"
+    assert not list(full_disk.iterdir())
+
+
+def test_a_place_that_cannot_be_written_is_told_by_its_own_name(tmp_path: Path) -> None:
+    """Not by that of a temporary file."""
+    (tmp_path / "file").touch()
+    for block in (whole_file, whole_folder):
+        with pytest.raises(FileFailure, match=r"Not a directory|File exists") as told, block(tmp_path / "file" / "x"):
+            pass
+        assert str(told.value).startswith(f"{tmp_path / 'file'}")
+        assert ".w" not in str(told.value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import shutil
@@ -11,8 +12,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from wakewise.errors import FULL, FileFailure, WakewiseError, environment_failure
 from wakewise.processes import half_done
 
+_LEAST_BYTES = 65_536
 _MOST_HEAD_LINES, _LONGEST_LINE = 1000, 10_000
 
 
@@ -21,21 +24,58 @@ def whole_file(path: Path, lasting: bool = False) -> Iterator[Path]:
     """Give a temporary path beside `path`, same suffix; rename it into place if the block ends well, else remove it.
 
     What is `lasting` is there, whole, after a power cut too: file and folder are on the disk when the block is left.
+    Every file of a result is written so, or in a `whole_folder`; tests/test_files.py knows the exceptions.
+
+    Raises
+    ------
+    FileFailure
+        If the operating system does not let it be written, whichever library met that; an OSError too.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=half_done(path.stem), suffix=path.suffix, dir=path.parent)
+    began = half_done(path.stem)
+    with _failures_told(path, began):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=began, suffix=path.suffix, dir=path.parent)
     os.close(handle)
     temporary = Path(name)
     try:
-        yield temporary
-        temporary.chmod(0o644)
-        if lasting:
-            settle(temporary)
-        temporary.replace(path)
-        if lasting:
-            settle(path.parent)
+        with _failures_told(path, began):
+            yield temporary
+            temporary.chmod(0o644)
+            if lasting:
+                settle(temporary)
+            temporary.replace(path)
+            if lasting:
+                settle(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def _failures_told(path: Path, began: str) -> Iterator[None]:
+    """Tell of what the operating system does not allow with the name of what was to be written.
+
+    `began` is how the names of its temporary files begin.
+    """
+    try:
+        yield
+    except Exception as fault:
+        failure = environment_failure(fault, path)
+        told = isinstance(fault, WakewiseError) or getattr(failure, "errno", None)
+        if not told and not _has_room(path.parent):
+            failure = FileFailure(errno.ENOSPC, FULL, str(path))  # some libraries say only that they failed
+        if failure is None or failure is fault:
+            raise
+        if isinstance(failure, FileFailure) and str(failure.filename).startswith(str(path.parent / began)):
+            failure.filename = str(path)
+        raise failure from fault
+
+
+def _has_room(folder: Path) -> bool:
+    """Whether anything can still be written to a folder's disk."""
+    try:
+        return shutil.disk_usage(folder).free >= _LEAST_BYTES
+    except OSError:
+        return True
 
 
 def settle(path: Path) -> None:
@@ -54,17 +94,32 @@ def settle(path: Path) -> None:
 
 @contextmanager
 def whole_folder(path: Path) -> Iterator[Path]:
-    """Give a temporary folder beside `path`; rename it into place if the block ends well, else remove it."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = Path(tempfile.mkdtemp(prefix=half_done(path.name), dir=path.parent))
+    """Give a temporary folder beside `path`; rename it into place if the block ends well, else remove it.
+
+    Raises
+    ------
+    FileFailure
+        As `whole_file`.
+    """
+    began = half_done(path.name)
+    with _failures_told(path, began):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(prefix=began, dir=path.parent))
     try:
-        yield temporary
-        if path.exists():
-            shutil.rmtree(path)
-        temporary.chmod(0o755)
-        temporary.replace(path)
+        with _failures_told(path, began):
+            yield temporary
+            if path.exists():
+                shutil.rmtree(path)
+            temporary.chmod(0o755)
+            temporary.replace(path)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+
+
+def write_bytes(path: Path, data: bytes, lasting: bool = False) -> None:
+    """Write bytes whole or not at all; `lasting` as in `whole_file`."""
+    with whole_file(path, lasting) as temporary:
+        temporary.write_bytes(data)
 
 
 def write_text(path: Path, text: str, lasting: bool = False) -> None:

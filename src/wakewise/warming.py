@@ -246,7 +246,9 @@ def _take_note(job: str, amiss: Sequence[str]) -> None:
     path = _note(job)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text("".join(f"{line}\n" for line in amiss), encoding="utf-8")
+        half = path.with_suffix(f".{os.getpid()}")
+        half.write_text("".join(f"{line}\n" for line in amiss), encoding="utf-8")
+        half.replace(path)
     except OSError:  # then it is looked through again the next time, which takes a second
         return
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import errno
 import os
 import resource
 import signal
@@ -13,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from wakewise.campaigns import Processes, Task, run
+from wakewise.errors import InputError
+from wakewise.files import whole_file
 
 Telling = Callable[..., None]
 
@@ -71,6 +74,39 @@ def no_room(settings: Mapping[str, Any], folder: Path, progress: Telling) -> dic
     if not Path(settings["room"]).exists():
         resource.setrlimit(resource.RLIMIT_FSIZE, (2000, resource.RLIM_INFINITY))
     return {f"figure_{i}": 1.0 for i in range(200)}
+
+
+FAULTS: dict[str, Callable[[Path], object]] = {
+    "memory": lambda _: _raise(MemoryError("Unable to allocate 9 GiB")),
+    "disk": lambda _: _raise(OSError(errno.EIO, "Input/output error")),
+    "rust": lambda _: _raise(RuntimeError("parquet: Read-only file system (os error 30)")),
+    "behind": lambda _: _raise(ValueError("cannot go on"), OSError(errno.EMFILE, "Too many open files")),
+    "input": lambda _: _raise(InputError("v.yaml: cannot be read"), OSError(errno.ESTALE, "Stale file handle")),
+}
+"""Failures of the computer as works meet them, by name."""
+
+
+def _raise(fault: Exception, cause: Exception | None = None) -> None:
+    raise fault from cause
+
+
+def fail(settings: Mapping[str, Any], folder: Path, progress: Telling) -> dict[str, float]:
+    """The computer fails it, until there is a file that says otherwise."""
+    if not Path(settings["room"]).exists():
+        FAULTS[settings["fault"]](folder)
+    return {"made": 1.0}
+
+
+def too_large(settings: Mapping[str, Any], folder: Path, progress: Telling) -> dict[str, float]:
+    """Writes a table that does not fit on the disk, until there is room."""
+    import numpy as np
+    import polars as pl
+
+    if not Path(settings["room"]).exists():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY))
+    with whole_file(folder / "steps.parquet") as path:
+        pl.DataFrame({"x": np.random.default_rng(1).normal(size=10_000)}).write_parquet(path)
+    return {"made": 1.0}
 
 
 def threads(settings: Mapping[str, Any], folder: Path, progress: Telling) -> dict[str, float]:

@@ -93,6 +93,35 @@ def test_a_full_disk_is_told_in_a_line_and_nothing_is_lost(tmp_path: Path) -> No
     assert not list(store.place(tasks[-1].key).glob(".*"))
 
 
+def test_a_table_that_does_not_fit_is_a_full_disk_too(tmp_path: Path) -> None:
+    """Whoever tells of it: nothing is left under the table's name, and with room the same call makes the trial."""
+    folder, room = tmp_path / "c", tmp_path / "room"
+    task = cheap.one("too_large", room=str(room))
+    for _ in range(4):  # more than there are retries
+        with pytest.raises(EnvironmentFailure, match="the disk is full; what was finished is kept"):
+            run([task], folder, Processes(1))
+    assert not list((open_store(folder).place(task.key) / "work").iterdir())
+    room.touch()
+    (outcome,) = run([task], folder, Processes(1))
+    assert outcome.figures == {"made": 1.0}
+
+
+def test_failures_of_the_computer_are_never_the_trials_own(tmp_path: Path) -> None:
+    """A run tries them again and then leaves them, with their reason; every later run tries them anew."""
+    room = tmp_path / "room"
+    tasks = [*cheap.adding(1), *(cheap.one("fail", fault=name, room=str(room)) for name in cheap.FAULTS)]
+    for runs in (1, 2):
+        first, *others = run(tasks, tmp_path / "c", Processes(2), retries=1)
+        assert first.figures == {"twice": 0.0}
+        assert [(one.figures, one.how, one.attempts) for one in others] == [(None, "computer", 2 * runs)] * len(others)
+    assert others[0].reason == "out of memory (Unable to allocate 9 GiB)"
+    assert [one.reason for one in others[1:]] == [
+        "Input/output error", "Read-only file system", "Too many open files", "Stale file handle",
+    ]  # fmt: skip
+    room.touch()
+    assert all(one.figures is not None for one in run(tasks, tmp_path / "c", Processes(2), retries=1))
+
+
 def test_stopping_ends_what_is_under_way_and_it_counts_as_no_failure(tmp_path: Path) -> None:
     """What was stopped is made by the next run, as if it had not been begun."""
     task = cheap.adding(1, takes_s=300.0)[0]

@@ -70,6 +70,30 @@ def test_a_campaign_is_run_looked_at_and_gone_on_with(cheap_work: Path, capsys: 
     assert set(table["state"]) == {"done", "failed"}
 
 
+def test_trials_that_the_computer_failed_are_told_and_made_by_the_same_command(
+    cheap_work: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 1 and a line: they count as waiting, not as failed, and need no --again."""
+    (cheap_work / "pretend.py").write_text(
+        "from pathlib import Path\n"
+        "def fly(settings, folder, progress):\n"
+        "    if settings['scenario']['seed'] == 2 and not Path('room').exists():\n"
+        "        raise MemoryError('Unable to allocate 9 GiB')\n"
+        "    return {'success': True}\n"
+    )
+    assert command(["campaign", "run", "small.yaml", "--workers", "2", "--retries", "0", "--json"]) == 1
+    out, err = capsys.readouterr()
+    told = json.loads(out)
+    assert (told["done"], told["failed"], told["waiting"]) == (4, 0, 4)
+    assert err.strip().splitlines()[-1] == (
+        "wakewise: runs/small: 4 of 8 trials could not be made, the first: dp/branching/payload/2: out of memory "
+        "(Unable to allocate 9 GiB); what was finished is kept, run the same command again to go on"
+    )
+    Path("room").touch()
+    assert command(["campaign", "run", "small.yaml", "--workers", "2", "--json"]) == 0
+    assert _json(capsys)["done"] == 8
+
+
 def test_people_see_tables_and_reasons(cheap_work: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The same in words."""
     assert command(["campaign", "run", "small.yaml"]) == 0

@@ -36,7 +36,7 @@ def test_a_full_standard_output_is_one_line(arguments: list[str]) -> None:
     """Whether the text is short enough to be written only at the end or not: exit code 1, one line, no traceback."""
     with Path("/dev/full").open("w") as full:
         done = wakewise(*arguments, stdout=full)
-    assert (done.returncode, done.stderr) == (1, "wakewise: cannot write: No space left on device\n")
+    assert (done.returncode, done.stderr) == (1, "wakewise: cannot write: the disk is full\n")
 
 
 def test_a_reader_that_went_away_is_no_fault() -> None:
@@ -77,7 +77,7 @@ def test_a_place_that_cannot_be_written_is_one_line(
     ("fault", "words"),
     [
         (PermissionError(13, "Permission denied", "runs"), "runs: Permission denied"),
-        (OSError(28, "No space left on device"), "cannot write: No space left on device"),
+        (OSError(28, "No space left on device"), "cannot write: the disk is full"),
         (MemoryError("Unable to allocate 214 GiB"), "out of memory (Unable to allocate 214 GiB)"),
         (EnvironmentFailure("match: the disk of x is full"), "match: the disk of x is full"),
         (ValueError("parquet: underlying IO error: No space left on device (os error 28)"), "the disk is full"),

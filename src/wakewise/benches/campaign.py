@@ -6,7 +6,6 @@ are those of a clock on the wall, so other work on the computer shows; `load_ave
 
 from __future__ import annotations
 
-import json
 import os
 import statistics
 import tempfile
@@ -25,6 +24,7 @@ from wakewise.campaigns.store import FIGURES, open_store
 from wakewise.campaigns.task import Figures, WorkProgress
 from wakewise.errors import StageError
 from wakewise.extras import has, how_to_install
+from wakewise.files import write_json, write_text
 from wakewise.trials.timing import BenchOptions
 from wakewise.warming import warm
 
@@ -105,8 +105,8 @@ def list_many(folder: Path, count: int) -> dict[str, float]:
     for number in range(count):
         place = store.place(f"{number:032x}")
         place.mkdir()
-        (place / FIGURES).write_text(json.dumps({"figures": figures, "took_s": 60.0}))
-        (place / ATTEMPTS).write_text('{"event": "begun"}\n{"event": "ended", "how": "done", "took_s": 60.0}\n')
+        write_json(place / FIGURES, {"figures": figures, "took_s": 60.0})
+        write_text(place / ATTEMPTS, '{"event": "begun"}\n{"event": "ended", "how": "done", "took_s": 60.0}\n')
     times, worked = [], []
     for _ in range(1 + REPEATS):
         began, cpu = time.perf_counter(), time.process_time()

@@ -102,7 +102,7 @@ def spring(trap: Trap) -> Row:
         folder = Path(scratch) / "photos"
         folder.mkdir()
         for name, shot in zip(names, shots, strict=True):
-            cv2.imwrite(str(folder / name), shot.image)
+            (folder / name).write_bytes(cv2.imencode(".png", shot.image)[1].tobytes())
         said: list[str] = []
         placed: dict[str, Camera] = {}
         try:

@@ -15,12 +15,13 @@ from typing import Any, Literal, get_args
 ATTEMPTS = "attempts.jsonl"
 
 How = Literal["done", "error", "computer", "died", "late", "memory", "stopped"]
-"""How an attempt ended: figures; an exception of the work; a fault of the computer, as a file that cannot be read; the
-process died; it took too long; it took too much memory; the user stopped the run."""
+"""How an attempt ended: figures; an exception of the work; a failure of the computer, such as a full disk; the process
+died; it took too long; it took more memory than it was allowed; the user stopped the run."""
 FINAL: tuple[How, ...] = ("error",)
 """Ends that would be the same the next time: the same configuration and seed give the same exception."""
-TRIED: tuple[How, ...] = ("computer", "died", "late", "memory")
-"""Ends after which a trial is tried again, a few times."""
+TRIED: tuple[How, ...] = ("died", "late", "memory")
+"""Ends after which a trial is tried again, a few times. A failure of the computer is none of the trial's: every run
+tries it again."""
 
 
 @dataclass(frozen=True)

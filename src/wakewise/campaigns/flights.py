@@ -15,15 +15,14 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from wakewise.campaigns.pictures import keep_pictures
 from wakewise.campaigns.task import Figures, WorkProgress
 from wakewise.evaluation import flight_figures
+from wakewise.files import whole_file
 from wakewise.missions import SETTLING
 from wakewise.operation import Scenario, fly
 from wakewise.operation.flight_log import timings_of
 from wakewise.operation.scenario import check_scenario
 from wakewise.trials.metrics import UNITS, Gathering
-from wakewise.trials.trial import run_trial
 from wakewise.trials.yardstick import add_yardsticks
 
 _FLIGHT = ("steps.parquet", "metrics.json", "scenario.yaml")
@@ -44,12 +43,16 @@ def fly_stage(settings: Mapping[str, Any], folder: Path, progress: WorkProgress)
     solve_ms = solve_ms[min(_LOADING, len(solve_ms) // 2) :]
     gathering.add({"solve_ms_median": float(np.median(solve_ms)), "solve_ms_p99": float(np.percentile(solve_ms, 99))})
     gathering.add({"wall_s": time.monotonic() - began, "cpu_s": time.process_time() - worked})
-    flight.steps.write_parquet(folder / "steps.parquet", compression="zstd")
+    with whole_file(folder / "steps.parquet") as path:
+        flight.steps.write_parquet(path, compression="zstd")
     return _plain(gathering.figures)
 
 
 def model_stage(settings: Mapping[str, Any], folder: Path, progress: WorkProgress) -> Figures:
     """Figures of a whole trial: flight, photographs, model, and the model against the truth."""
+    from wakewise.campaigns.pictures import keep_pictures  # needs the extras, which flights do without
+    from wakewise.trials.trial import run_trial
+
     scenario = scenario_of(settings)
     keep = settings["keep"]
     trial = folder / "trial"

@@ -11,22 +11,22 @@ import json
 import math
 import os
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from wakewise.campaigns import attempts, claims
 from wakewise.campaigns.engines import Crew, Engine
 from wakewise.campaigns.index import listing
 from wakewise.campaigns.slot import Report, attempt
-from wakewise.campaigns.store import FULL, Store, open_store, told_if_full
+from wakewise.campaigns.store import Store, open_store, told_if_full
 from wakewise.campaigns.task import Outcome, Task
 from wakewise.campaigns.versions import source_version
 from wakewise.campaigns.worker import Ticket
-from wakewise.errors import InputError
+from wakewise.errors import FULL, InputError
 from wakewise.interfaces import Progress, no_progress
 
 DRIVERS = ".drivers"
@@ -74,8 +74,9 @@ def run(
     timeout_s, memory_MB : float, optional
         An attempt that takes longer, or whose processes take more memory, is ended.
     retries : int
-        How often a trial is tried again whose process died, took too long or too much, or met a fault of the computer.
-        An exception of the work is final: the same seed would raise it again.
+        How often a trial is tried again whose process died, took too long or too much, or met a failure of the
+        computer; the latter is tried again by each run. An exception of the work is final: the same seed would raise
+        it again.
     progress : callable
         Called as `(done, total, note)`.
     stop : callable
@@ -136,6 +137,7 @@ class _Driver:
         self._done: dict[str, Outcome] = {}
         self._held: dict[str, _Held] = {}
         self._abandoned: dict[str, int | None] = {}
+        self._met: Counter[str] = Counter()  # failures of the computer, by trial
         self.pending: deque[Task] = deque()
         self._began = time.monotonic()
         self._made_s = 0.0
@@ -221,6 +223,7 @@ class _Driver:
             attempts.end(place, "died", report.reason, 0.0)
         if report.reason == FULL:
             raise OSError(errno.ENOSPC, FULL)
+        self._met[key] += report.how == "computer"
         if report.how == "held":
             place = self._store.place(key)
             self._held[key] = _Held(task, claims.beat_of(place), time.monotonic())
@@ -228,6 +231,9 @@ class _Driver:
         if self._is_settled(task):
             if report.how == "done":
                 self._made, self._made_s = self._made + 1, self._made_s + report.took_s
+            return
+        if self._met[key] > self._retries:  # left for another run
+            self._done[key] = replace(self._store.outcome(task), reason=report.reason, how="computer")
             return
         self.pending.append(task)
 

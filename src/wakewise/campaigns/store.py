@@ -9,7 +9,6 @@ FOLDER/trials/KEY/figures.json the trial is finished
 
 from __future__ import annotations
 
-import errno
 import json
 import math
 import shutil
@@ -21,15 +20,14 @@ from typing import Any
 
 from wakewise.campaigns import attempts
 from wakewise.campaigns.task import Figure, Outcome, Task
-from wakewise.errors import EnvironmentFailure, InputError
+from wakewise.errors import FULL, EnvironmentFailure, InputError, is_full
 from wakewise.files import write_json
 
 FORMAT = 1
 """Of the folder; another one is refused."""
 FIGURES, TRIAL, LOG, WORK = "figures.json", "trial.json", "log.txt", "work"
-FULL = "the disk is full"
+GO_ON = "what was finished is kept, run the same command again to go on"
 _STORE, _TRIALS = "store.json", "trials"
-_NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
 @dataclass(frozen=True)
@@ -58,9 +56,13 @@ class Store:
         kept = read_figures(place)
         told = attempts.read_attempts(place)
         if kept is not None:
-            return Outcome(task=task, figures=kept[0], attempts=max(1, told.begun), took_s=kept[1], known=known)
-        reason = told.reason or "not finished"
-        return Outcome(task=task, figures=None, reason=reason, attempts=told.begun, took_s=told.took_s, known=known)
+            return Outcome(
+                task=task, figures=kept[0], attempts=max(1, told.begun), took_s=kept[1], known=known, how="done"
+            )
+        reason, begun = told.reason or "not finished", told.begun
+        return Outcome(
+            task=task, figures=None, reason=reason, attempts=begun, took_s=told.took_s, known=known, how=told.how
+        )
 
     def forget(self, key: str) -> None:
         """Remove what is known of a trial."""
@@ -109,11 +111,6 @@ def read_store(folder: Path) -> Store:
     return Store(folder)
 
 
-def is_full(fault: BaseException) -> bool:
-    """Whether a fault says that a file had no room."""
-    return isinstance(fault, OSError) and fault.errno in _NO_ROOM
-
-
 @contextmanager
 def told_if_full(folder: Path) -> Iterator[None]:
     """Tell of a disk that is full, whoever met it, in a line that says what to do.
@@ -124,12 +121,10 @@ def told_if_full(folder: Path) -> Iterator[None]:
     """
     try:
         yield
-    except OSError as fault:
+    except Exception as fault:
         if not is_full(fault):
             raise
-        raise EnvironmentFailure(
-            f"{folder}: {FULL}; what was finished is kept, run the same command again to go on"
-        ) from None
+        raise EnvironmentFailure(f"{folder}: {FULL}; {GO_ON}") from None
 
 
 def read_figures(place: Path) -> tuple[dict[str, Figure], float] | None:

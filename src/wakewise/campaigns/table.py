@@ -82,7 +82,7 @@ def results(folder: Path) -> Results:
         done = kept is not None and kept.figures is not None
         state: State = "done" if done else _state(store, entry.key, told)
         figures = kept.figures if kept is not None and kept.figures is not None else {}
-        reason = told.reason if state == "failed" else None
+        reason = told.reason if state in ("failed", "waiting") else None
         took_s = kept.took_s if kept is not None and done else told.took_s
         made.append(Made(entry=entry, state=state, figures=figures, reason=reason, attempts=told.begun, took_s=took_s))
     keys = {entry.key for entry in plan.trials}

@@ -96,6 +96,8 @@ class Outcome:
         Wall time of the attempt that counts; 0 where it never ended.
     known : bool
         It was finished before this run began.
+    how : str or None
+        How the last attempt ended (`attempts.How`); None if none has.
     """
 
     task: Task
@@ -104,6 +106,7 @@ class Outcome:
     attempts: int = 0
     took_s: float = 0.0
     known: bool = False
+    how: str | None = None
 
 
 def function_named(name: str) -> Callable[..., Any]:

@@ -23,10 +23,10 @@ from pathlib import Path
 from typing import Any
 
 from wakewise.campaigns import attempts, claims
-from wakewise.campaigns.store import FIGURES, FULL, LOG, TRIAL, WORK, is_full, write_figures
+from wakewise.campaigns.store import FIGURES, LOG, TRIAL, WORK, write_figures
 from wakewise.campaigns.task import Work, WorkProgress, function_named
 from wakewise.campaigns.versions import source_version
-from wakewise.errors import EnvironmentFailure
+from wakewise.errors import FULL, EnvironmentFailure, environment_failure, is_full
 from wakewise.files import write_json
 
 _GRACE_S = 10.0
@@ -95,7 +95,8 @@ def work_on(
             attempts.end(place, told["how"], told["reason"], told["took_s"])
         return told
     except OSError as fault:
-        return {"how": "computer", "reason": _of_the_computer(fault), "took_s": time.monotonic() - began}
+        failure = environment_failure(fault) or fault
+        return {"how": "computer", "reason": _in_a_line(failure), "took_s": time.monotonic() - began}
     finally:
         if held:
             with suppress(OSError):
@@ -115,11 +116,10 @@ def _tried(ticket: Ticket, place: Path, send: WorkProgress, quiet: bool) -> dict
             if not claims.is_mine(place):
                 raise EnvironmentFailure("another computer took the trial over: this one was not heard of for too long")
             write_figures(place, figures, time.monotonic() - began)
-    except (OSError, EnvironmentFailure) as fault:
-        return {"how": "computer", "reason": _of_the_computer(fault)}
-    except MemoryError as fault:
-        return {"how": "memory", "reason": f"out of memory ({fault})" if str(fault) else "out of memory"}
-    except Exception as fault:  # whatever the work raises is the trial's outcome
+    except Exception as fault:  # whatever the work raises is the trial's outcome, unless the computer is at fault
+        failure = environment_failure(fault)
+        if failure is not None:
+            return {"how": "computer", "reason": _in_a_line(failure)}
         return {"how": "error", "reason": f"{type(fault).__name__}: {' '.join(str(fault).split())}"}
     return {"how": "done", "reason": None}
 
@@ -133,14 +133,9 @@ def _check_version(ticket: Ticket) -> None:
         )
 
 
-def _of_the_computer(fault: BaseException) -> str:
-    """The computer's fault in a line; a full disk, however it was told, in the same words."""
-    cause: BaseException | None = fault
-    while cause is not None:
-        if is_full(cause) or FULL in str(cause):
-            return FULL
-        cause = cause.__cause__ or cause.__context__
-    return " ".join(str(fault).split()) or type(fault).__name__
+def _in_a_line(failure: Exception) -> str:
+    """A failure of the computer in a line; a full disk, however it was told, in the same words."""
+    return FULL if is_full(failure) else " ".join(str(failure).split()) or type(failure).__name__
 
 
 def _tidy(place: Path) -> None:

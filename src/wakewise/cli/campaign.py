@@ -106,12 +106,11 @@ def run_campaign(
     from wakewise.campaigns import load_campaign, planned, run
     from wakewise.campaigns.plan import keep_plan
     from wakewise.campaigns.run import check_bounds
-    from wakewise.campaigns.store import open_store
+    from wakewise.campaigns.store import GO_ON, open_store
     from wakewise.campaigns.table import group_table, results, status
-    from wakewise.errors import InputError
+    from wakewise.errors import EnvironmentFailure, InputError
     from wakewise.extras import need
     from wakewise.operation.flying import FLIGHT_JOBS
-    from wakewise.trials.trial import JOBS
     from wakewise.warming import warm
 
     chosen = _engine(engine, scheduler, workers)
@@ -120,8 +119,12 @@ def run_campaign(
     memory_MB = campaign.memory_MB if memory is None else memory
     tries = campaign.retries if retries is None else retries
     check_bounds(timeout_s, memory_MB, tries)
+    jobs: tuple[str, ...] = FLIGHT_JOBS
     if campaign.stages == "model":
         need("a campaign of `stages: model`", "photos", "logs")
+        from wakewise.trials.trial import JOBS
+
+        jobs = JOBS
     bars = Bars()
     with bars.stage("plan") as progress:
         progress(0, 1, "checking every combination")
@@ -130,9 +133,9 @@ def run_campaign(
     open_store(folder)
     keep_plan(folder, campaign, trials)
     with bars.stage("compile") as progress:  # else each of the workers would
-        warm(FLIGHT_JOBS if campaign.stages == "fly" else JOBS, progress)
+        warm(jobs, progress)
     with bars.stage("trials") as progress:
-        run(
+        outcomes = run(
             [one.task for one in trials],
             folder,
             chosen,
@@ -148,6 +151,12 @@ def run_campaign(
     else:
         _show_groups(found, group_table(found))
         typer.echo(f"folder: {folder}; `wakewise campaign page {folder}` says who won, with pictures")
+    unmade = [one for one in outcomes if one.figures is None and one.how == "computer"]
+    if unmade:
+        raise EnvironmentFailure(
+            f"{folder}: {len(unmade)} of {len(outcomes)} trials could not be made, the first: {unmade[0].task.name}: "
+            f"{unmade[0].reason}; {GO_ON}"
+        )
     if found.count("done") == 0 and found.count("failed"):
         raise InputError(f"{file}: every trial failed, the first: {status(found)['failures'][0]['reason']}")
 

@@ -94,15 +94,30 @@ class _VP9:
 
     def __init__(self, path: Path, fps: float, size_px: tuple[int, int]) -> None:
         code = cv2.VideoWriter.fourcc(*("vp09" if path.suffix.lower() == ".mp4" else "VP90"))
+        self._path, self._frames = path, 0
         self._writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, fps, size_px)
         if not self._writer.isOpened():
             raise StageError(f"film: OpenCV here cannot write VP9; use --out film.webp, or {how_to_install('film')}")
 
     def add(self, frame: Frame) -> None:
         self._writer.write(np.ascontiguousarray(frame[..., ::-1]))
+        self._frames += 1
 
-    def close(self, whole: bool) -> None:  # noqa: ARG002
+    def close(self, whole: bool) -> None:
         self._writer.release()
+        if whole and (there := _frames_in(self._path)) != self._frames:  # OpenCV says nothing of what it cannot write
+            raise OSError(f"{there} of {self._frames} frames are in the file that was written")
+
+
+def _frames_in(path: Path) -> int:
+    """How many frames of a film can be read."""
+    film, count = cv2.VideoCapture(str(path)), 0
+    try:
+        while film.grab():
+            count += 1
+    finally:
+        film.release()
+    return count
 
 
 class _H264:

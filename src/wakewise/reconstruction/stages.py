@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import json
 import shutil
@@ -12,13 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from wakewise.errors import EnvironmentFailure, InputError, WakewiseError
+from wakewise.errors import EnvironmentFailure, InputError, WakewiseError, is_full
 from wakewise.files import write_json
 from wakewise.reconstruction.colmap import RESERVE_MB
 
 LOW_DISK_MB = 5.0
-# What SQLite and the C library say of it.
-FULL = ("disk is full", "No space left")
 
 
 def fingerprint(*parts: Any) -> str:
@@ -66,7 +63,7 @@ def run_stage(
     except (WakewiseError, RuntimeError) as fault:
         # COLMAP and SQLite tell of a full disk in words of their own, or not at all.
         free_MB = shutil.disk_usage(folder).free / 1e6
-        if free_MB > LOW_DISK_MB and not any(words in str(fault) for words in FULL):
+        if free_MB > LOW_DISK_MB and not is_full(fault):
             raise
         reason = " ".join(str(fault).split())[:200]
         raise EnvironmentFailure(f"{reason}; the disk of {folder} is full, {free_MB:.0f} MB are left") from fault
@@ -100,7 +97,7 @@ def need_room(folder: Path, size_bytes: float, name: str) -> None:
 
 def no_room(fault: OSError, folder: Path) -> str:
     """What a failed write means, in one line."""
-    if fault.errno in (errno.ENOSPC, errno.EDQUOT):
+    if is_full(fault):
         return f"the disk of {folder} is full"
     return f"{fault.filename or folder}: {fault.strerror or fault}"
 

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from wakewise.arrays import Array, BoolArray, IntArray
 from wakewise.errors import InputError
-from wakewise.files import whole_file, write_text
+from wakewise.files import whole_file, write_bytes, write_text
 from wakewise.reports.ink import INK, LINE, MUTED, SLATE, TEAL, dress, new_figure
 from wakewise.reports.page import plot, tile, whole_page
 from wakewise.reports.trial import Surface
@@ -64,8 +64,7 @@ def write_coloured(path: Path, target: Target, delicacy: Delicacy) -> None:
     colours = np.round(255 * colours_of(delicacy.score)).astype(np.uint8)
     mesh = trimesh.Trimesh(vertices, target.mesh.faces, vertex_colors=colours, process=False)
     mesh.vertex_attributes["delicate"] = delicacy.score.astype(np.float32)
-    with whole_file(path) as temporary:
-        mesh.export(temporary, file_type="ply", vertex_normal=False)
+    write_bytes(path, mesh.export(file_type="ply", vertex_normal=False))
 
 
 def colours_of(score: Array) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 
 from wakewise.arrays import Array, IntArray, freeze, frozen_indices
 from wakewise.errors import InputError
-from wakewise.files import broken_promise, whole_file
+from wakewise.files import broken_promise, write_bytes
 
 READABLE_SUFFIXES = (".ply", ".stl", ".obj", ".off", ".glb")
 PLAUSIBLE_SIZE_M = (0.02, 2.0)
@@ -165,8 +165,7 @@ def write_mesh(path: Path, mesh: Mesh) -> None:
     """Write a mesh as binary PLY, whole or not at all, in single precision (0.1 um at 1 m)."""
     import trimesh
 
-    with whole_file(path) as temporary:
-        trimesh.Trimesh(mesh.vertices_m, mesh.faces, process=False).export(temporary, file_type="ply")
+    write_bytes(path, trimesh.Trimesh(mesh.vertices_m, mesh.faces, process=False).export(file_type="ply"))
 
 
 def _read(path: Path) -> tuple[Array, IntArray]:

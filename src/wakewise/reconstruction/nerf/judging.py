@@ -11,7 +11,7 @@ import torch
 from skimage.metrics import structural_similarity
 
 from wakewise.arrays import Array
-from wakewise.files import whole_file
+from wakewise.files import write_bytes
 from wakewise.interfaces import Progress
 from wakewise.reconstruction.nerf.posed import PosedPhoto
 from wakewise.reconstruction.nerf.rays import origin_in
@@ -128,8 +128,7 @@ def judge(
         scores.append((psnr_db(image, truth), _ssim_or_none(image, truth)))
         views[photo.name] = {"psnr_db": scores[-1][0], "ssim": scores[-1][1]}
         pair = np.concatenate([photo.colours, np.rint(255.0 * image).astype(np.uint8)], axis=1)
-        with whole_file(folder / f"{Path(photo.name).stem}.png") as temporary:
-            cv2.imwrite(str(temporary), pair[:, :, ::-1])
+        write_bytes(folder / f"{Path(photo.name).stem}.png", cv2.imencode(".png", pair[:, :, ::-1])[1].tobytes())
     progress(len(photos), len(photos), "views")
     all_psnr = [one for one, _ in scores]
     all_ssim = [one for _, one in scores if one is not None]

@@ -5,7 +5,6 @@ It grows in a hidden folder beside its place and moves there at the end, so that
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from pathlib import Path
 import polars as pl
 
 from wakewise.errors import InputError
+from wakewise.files import whole_file, write_json, write_text
 from wakewise.interfaces import no_progress
 from wakewise.links.exports.checksums import SUMS, sha256_of, sums_text
 from wakewise.processes import LOCK, alone
@@ -121,22 +121,24 @@ def _finish(growing: Path, parts: Sequence[Part], left_out: dict[str, str], word
     figures = sorted({name for part in parts for name in part.figures})
     rows = [{"trial": part.trial, **part.facts} for part in parts]
     (growing / TRUTH).mkdir()
-    pl.DataFrame(rows, infer_schema_length=None).write_parquet(growing / TRIALS)
+    with whole_file(growing / TRIALS) as path:
+        pl.DataFrame(rows, infer_schema_length=None).write_parquet(path)
     sums = {path: digest for part in parts for path, digest in part.sums.items()}
     sizes = {path: size for part in parts for path, size in part.sizes.items()}
     written = [TRIALS]
     if figures:
         table = [{"trial": part.trial, **{name: part.figures.get(name) for name in figures}} for part in parts]
         schema = {"trial": pl.String} | dict.fromkeys(figures, pl.Float64)
-        pl.DataFrame(table, schema=schema).write_parquet(growing / FIGURES)
+        with whole_file(growing / FIGURES) as path:
+            pl.DataFrame(table, schema=schema).write_parquet(path)
         written.append(FIGURES)
     text = data_sheet(words, parts, left_out, sizes)
-    (growing / SHEET).write_text(text, encoding="utf-8")
+    write_text(growing / SHEET, text)
     for name in (*written, SHEET):
         sums[name], sizes[name] = sha256_of(growing / name), (growing / name).stat().st_size
-    (growing / SUMS).write_text(sums_text(sums), encoding="utf-8")
+    write_text(growing / SUMS, sums_text(sums))
     told = metadata(growing, words, description_of(parts), parts, figures)
-    (growing / METADATA).write_text(json.dumps(told, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    write_json(growing / METADATA, told)
     (growing / KNOWN).mkdir()
     # From here on only names change. A part without its note is made again, should this be cut off.
     for part in parts:
