@@ -14,6 +14,7 @@ from wakewise.cli.main import app
 ROOT = Path(__file__).parents[1]
 PAGES = ["README.md", "CONTRIBUTING.md"]
 PAGES += [f"docs/{name}.md" for name in ("README", "python", "extending", "worlds", "reproduce", "campaigns")]
+PAGES += ["docs/vehicle-file.md"]
 
 
 def blocks(page, language=""):

@@ -94,7 +94,7 @@ class AddedMass(Group):
 
 
 class Damping(Group):
-    """Damping as positive magnitudes; either kind may be absent."""
+    """Damping as positive magnitudes; zeros for a kind that the vehicle is taken not to have."""
 
     linear_N_s_m: DiagonalOrFull | None = Field(default=None, description="force by surge, sway, heave")
     linear_N_m_s: DiagonalOrFull | None = Field(default=None, description="moment by roll, pitch, yaw")
