@@ -1,4 +1,4 @@
-"""Build with colcon; `wakewise` itself comes from pip."""
+"""Build with colcon; `wakewise` itself is installed from its clone, as the README has it."""
 
 from setuptools import setup
 

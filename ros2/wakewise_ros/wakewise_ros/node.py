@@ -11,9 +11,10 @@ import numpy as np
 import rclpy
 from geometry_msgs.msg import Wrench, WrenchStamped
 from nav_msgs.msg import Odometry
-from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64, Float64MultiArray, MultiArrayDimension, String
 
@@ -54,10 +55,13 @@ DEFAULTS = {
     "base_frame": "base_link",
     "target_points": [math.nan],
     "target_on_body": False,
+    "target_latched": False,
     "controllers": [""],
 }
 """Parameters and what they are unless told; a list of one NaN or one empty name stands for an empty list, whose type
 ROS 2 cannot tell."""
+ANY_TYPE = ("failed",)
+"""Parameters that may be of any type: `ros2 param set /wakewise failed 5` sends a whole number, and "1, 5" a text."""
 
 
 class AllocatorNode(Node):
@@ -66,7 +70,7 @@ class AllocatorNode(Node):
     def __init__(self) -> None:
         super().__init__("wakewise")
         for name, value in DEFAULTS.items():
-            self.declare_parameter(name, value)
+            self.declare_parameter(name, value, ParameterDescriptor(dynamic_typing=name in ANY_TYPE))
         told = {name: self.get_parameter(name).value for name in DEFAULTS}
         self._frame = read_frame(told["frame"])
         vehicle = load_vehicle(told["vehicle"])
@@ -76,9 +80,7 @@ class AllocatorNode(Node):
         self._make = {
             "vehicle": vehicle,
             "wake": wake_model(told["wake_model"]),
-            "weights": Weights(
-                disturbance=told["w_disturbance"], effort=told["w_effort"], previous=told["w_previous"]
-            ),
+            "weights": Weights(disturbance=told["w_disturbance"], effort=told["w_effort"], previous=told["w_previous"]),
             "priority": told["priority"] or None,
             "share": float(told["limit_share"]),
         }
@@ -92,11 +94,13 @@ class AllocatorNode(Node):
         self._pose_frame = ""
         self._pose_ns = 0
         self._way = ""
+        # How long ago a message came is asked of a clock that no simulation stops: thrusts must not outlive it.
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         # Compiled before a vehicle waits for it.
         self._allocate(np.ones(6), Target(points_m=np.array([[2.0, 0.0, 0.0]]), weights=np.ones(1), on_body=True))
-        self._wire(told["controllers"], bool(told["stamped"]))
+        self._wire(told["controllers"], bool(told["stamped"]), bool(told["target_latched"]))
 
-    def _wire(self, controllers: list[str], stamped: bool) -> None:
+    def _wire(self, controllers: list[str], stamped: bool, latched: bool) -> None:
         names = [name for name in controllers if name]
         if not names:
             names = [f"thruster_{k + 1}_controller" for k in range(len(self._names))]
@@ -109,12 +113,13 @@ class AllocatorNode(Node):
         self.create_subscription(WrenchStamped if stamped else Wrench, "~/reference", self._on_reference, 10)
         self.create_subscription(String, "~/failed", self._on_failed, 10)
         self.create_subscription(Odometry, "~/odometry", self._on_odometry, qos_profile_sensor_data)
-        self.create_subscription(PointCloud2, "~/target", self._on_target, qos_profile_sensor_data)
+        kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL, reliability=ReliabilityPolicy.RELIABLE)
+        self.create_subscription(PointCloud2, "~/target", self._on_target, kept if latched else qos_profile_sensor_data)
         self.add_on_set_parameters_callback(self._on_parameters)
-        self.create_timer(0.25 * self._timeout_s, self._watch)
+        self.create_timer(0.25 * self._timeout_s, self._watch, clock=self._steady)
 
     def _now_ns(self) -> int:
-        return self.get_clock().now().nanoseconds
+        return self._steady.now().nanoseconds
 
     def _on_reference(self, message: Wrench | WrenchStamped) -> None:
         wrench = message.wrench if hasattr(message, "wrench") else message
@@ -204,12 +209,14 @@ class AllocatorNode(Node):
         except WakewiseError as fault:
             self.get_logger().error(str(fault))
 
-    def _fail(self, text: str) -> None:
-        self._allocate = ThrustAllocator(**self._make, failed=failed_thrusters(text, self._names))
+    def _fail(self, told: object) -> None:
+        self._allocate = ThrustAllocator(**self._make, failed=failed_thrusters(told, self._names))
 
     def _on_parameters(self, parameters: list) -> SetParametersResult:
-        """`failed` may change in flight; the rest is read once."""
+        """`failed` may change in flight, and so may what is not the node's own, such as use_sim_time."""
         for parameter in parameters:
+            if parameter.name not in DEFAULTS:
+                continue
             if parameter.name != "failed":
                 return SetParametersResult(successful=False, reason=f"{parameter.name}: is read at the start only")
             try:

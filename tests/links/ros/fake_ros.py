@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from array import array
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import pytest
@@ -19,8 +19,8 @@ KINDS = {"float64": float, "float32": float, "string": str, "bool": bool}
 class Clock:
     """A clock that a test sets."""
 
-    def __init__(self) -> None:
-        self.nanoseconds = 1_000_000_000
+    def __init__(self, *, clock_type: str = "ROS_TIME") -> None:
+        self.clock_type, self.nanoseconds = clock_type, 1_000_000_000
 
     def now(self) -> Clock:
         return self
@@ -64,16 +64,36 @@ class Node:
     def __init__(self, name: str) -> None:
         self.name, self.clock, self.logger = name, Clock(), Logger()
         self.parameters: dict[str, Any] = {}
+        self.described: dict[str, Any] = {}
         self.publishers: dict[str, Publisher] = {}
         self.heard: dict[str, tuple[type, Any]] = {}
         self.timers: list[tuple[float, Any]] = []
+        self.timed_by: list[Clock] = []
+        self.qos: dict[str, Any] = {}
         self.on_set: Any = None
 
-    def declare_parameter(self, name: str, value: Any) -> None:
-        given = self.overrides.get(name, value)
-        kinds = [type(x[0]) if isinstance(x, list) else type(x) for x in (value, given)]
-        assert kinds[0] is kinds[1], f"parameter {name}: {kinds[1]}, declared {kinds[0]}"
-        self.parameters[name] = Parameter(name, given)
+    def declare_parameter(self, name: str, value: Any, descriptor: Any) -> None:
+        self.parameters[name] = Parameter(name, value)
+        self.described[name] = descriptor
+        if name in self.overrides:
+            self._typed(Parameter(name, self.overrides[name]))
+
+    def _typed(self, given: Parameter) -> None:
+        """Keep a parameter of its declared type, as rclpy does; of any where typing is dynamic."""
+        told = (self.parameters[given.name].value, given.value)
+        if not self.described[given.name].dynamic_typing:
+            kinds = [type(x[0]) if isinstance(x, list) else type(x) for x in told]
+            assert kinds[0] is kinds[1], f"parameter {given.name}: {kinds[1]}, declared {kinds[0]}"
+        self.parameters[given.name] = given
+
+    def set_parameter(self, name: str, value: Any) -> Any:
+        """What the service of `ros2 param set` does: a wrong type is refused before the node is asked."""
+        if name in self.described:
+            try:
+                self._typed(Parameter(name, value))
+            except AssertionError as fault:
+                return SimpleNamespace(successful=False, reason=f"Wrong parameter type, {fault}")
+        return self.on_set([Parameter(name, value)])
 
     def get_parameter(self, name: str) -> Parameter:
         return self.parameters[name]
@@ -84,9 +104,11 @@ class Node:
     def create_subscription(self, kind: type, topic: str, callback: Any, qos: Any) -> None:
         assert topic not in self.heard
         self.heard[topic] = (kind, callback)
+        self.qos[topic] = qos
 
-    def create_timer(self, period_s: float, callback: Any) -> None:
+    def create_timer(self, period_s: float, callback: Any, clock: Clock) -> None:
         self.timers.append((period_s, callback))
+        self.timed_by.append(clock)
 
     def add_on_set_parameters_callback(self, callback: Any) -> None:
         self.on_set = callback
@@ -159,6 +181,11 @@ def install(patch: pytest.MonkeyPatch) -> None:
         messages.__getattr__ = lambda word, package=package: make(f"{package}/msg/{word}")  # type: ignore[method-assign]
         patch.setitem(sys.modules, f"{package}.msg", messages)
     ros, node, qos = ModuleType("rclpy"), ModuleType("rclpy.node"), ModuleType("rclpy.qos")
+    clock = ModuleType("rclpy.clock")
     node.Node, qos.qos_profile_sensor_data = Node, object()  # type: ignore[attr-defined]
-    for module in (ros, node, qos):
+    qos.QoSProfile = SimpleNamespace  # type: ignore[attr-defined]
+    qos.DurabilityPolicy = SimpleNamespace(TRANSIENT_LOCAL="transient local")  # type: ignore[attr-defined]
+    qos.ReliabilityPolicy = SimpleNamespace(RELIABLE="reliable")  # type: ignore[attr-defined]
+    clock.Clock, clock.ClockType = Clock, SimpleNamespace(STEADY_TIME="STEADY_TIME")  # type: ignore[attr-defined]
+    for module in (ros, node, qos, clock):
         patch.setitem(sys.modules, module.__name__, module)

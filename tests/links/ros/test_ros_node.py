@@ -2,10 +2,15 @@
 
 import ast
 import importlib.util
+import json
 import math
+import re
+import subprocess
 import sys
+import tomllib
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
+from importlib.metadata import packages_distributions
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -20,6 +25,13 @@ from wakewise.vehicles import load_vehicle
 
 PACKAGE = Path(__file__).parents[3] / "ros2" / "wakewise_ros"
 HEAVY = load_vehicle("bluerov2-heavy")
+NEW_IN_NUMPY_2 = (
+    "acosh?|asinh?|atan[2h]?|bitwise_count|bitwise_invert|bitwise_left_shift|bitwise_right_shift|bool|concat|isdtype|"
+    "cumulative_prod|cumulative_sum|astype|long|matrix_transpose|matvec|permute_dims|pow|trapezoid|ulong|unique_all|"
+    "unique_counts|unique_inverse|unique_values|unstack|vecdot|vecmat"
+)
+NEW_IN_LINALG_2 = "cross|outer|vector_norm|matrix_norm|vecdot|trace"
+"""Names that NumPy's notes of 2.0 to 2.2 list as new."""
 
 
 @pytest.fixture
@@ -102,10 +114,10 @@ def test_silence_means_zero_thrusts_and_nothing_comes_before_the_first_word(make
     watch()
     assert not node.publishers["~/thrusts"].sent
     node.say("~/reference", _wrench(10.0))
-    node.clock.nanoseconds += 300_000_000
+    node._steady.nanoseconds += 300_000_000
     watch()
     assert np.any(_thrusts(node))
-    node.clock.nanoseconds += 200_000_000
+    node._steady.nanoseconds += 200_000_000
     watch()
     assert not np.any(_thrusts(node))
     assert any("no reference for 0.4 s" in text for _, text in node.logger.said)
@@ -123,7 +135,7 @@ def test_a_target_and_a_fresh_pose_make_it_gentle(make: Callable[..., Any]) -> N
     d, least, saved = node.publishers["~/disturbance"].sent[-1].data
     assert saved == pytest.approx(100.0 * (1.0 - d / least))
     assert saved > 5.0
-    node.clock.nanoseconds += 600_000_000
+    node._steady.nanoseconds += 600_000_000
     node.say("~/reference", _wrench(-20.0))
     assert len(node.publishers["~/disturbance"].sent) == 1
     assert "no fresh pose" in node.logger.said[-1][1]
@@ -157,6 +169,76 @@ def test_failed_thrusters_are_taken_out_in_flight(make: Callable[..., Any]) -> N
     assert not node.on_set([Parameter("frame", "fsd")]).successful
     node.say("~/reference", _wrench(10.0))
     assert _thrusts(node)[2] == 0.0
+
+
+def _guessed(text: str) -> Any:
+    """The value that `ros2 param set` makes of a text: YAML's, a mixed list and all else stay a text.
+
+    As `get_parameter_value` of ros2cli (ros2param/api) and rclpy.parameter have it in Jazzy.
+    """
+    value = yaml.safe_load(text)
+    if isinstance(value, list):
+        kinds = {type(item) for item in value}
+        return value if len(kinds) <= 1 and kinds <= {bool, int, float, str} else text
+    return value if isinstance(value, bool | int | float | str) else text
+
+
+@pytest.mark.parametrize(
+    ("text", "dead"),
+    [
+        ("5", [4]), ('"5"', [4]), ("[1, 5]", [0, 4]), ("1, 5", [0, 4]), ("5,", [4]), ("", []), ("[]", []),
+        ("front right horizontal", [0]), ("front right horizontal, 5", [0, 4]),
+        ("[front right horizontal, 5]", [0, 4]), ("['1', '5']", [0, 4]),
+    ],
+)  # fmt: skip
+def test_failed_is_taken_as_ros2_param_set_sends_it(make: Callable[..., Any], text: str, dead: list[int]) -> None:
+    """A number, a list, a name or a text with commas, by the command line's own guess, at the start and in flight."""
+    wrench = _wrench(10.0, 2.0, 5.0)
+    wrench.torque.x, wrench.torque.y, wrench.torque.z = 0.3, 0.2, 0.1
+    for node in (make(), make(failed=_guessed(text))):
+        assert node.set_parameter("failed", _guessed(text)).successful
+        node.say("~/reference", wrench)
+        assert np.flatnonzero(_thrusts(node) == 0.0).tolist() == dead
+
+
+@pytest.mark.parametrize("text", ["9", "0", "-1", "5.0", "true", "[1, 9]", "bow"])
+def test_failed_that_names_no_thruster_is_refused_in_a_line(make: Callable[..., Any], text: str) -> None:
+    """And what was told before goes on."""
+    node = make(failed="2")
+    answer = node.set_parameter("failed", _guessed(text))
+    assert not answer.successful
+    assert "allowed: 1 to 8" in answer.reason
+    node.say("~/reference", _wrench(10.0))
+    assert _thrusts(node)[1] == 0.0
+
+
+def test_parameters_that_are_not_the_nodes_own_are_let_through(make: Callable[..., Any]) -> None:
+    """ROS sets use_sim_time by the same call; its own are read at the start, and of their type."""
+    node = make()
+    assert node.set_parameter("use_sim_time", True).successful
+    assert not node.set_parameter("frame", "fsd").successful
+    assert "Wrong parameter type" in node.set_parameter("timeout_s", 1).reason
+
+
+def test_a_simulation_that_stops_leaves_no_thrust(make: Callable[..., Any]) -> None:
+    """The watch goes by a steady clock: with /clock stopped thrusts still become zero."""
+    node = make(timeout_s=0.4)
+    (clock,) = node.timed_by
+    assert clock.clock_type == "STEADY_TIME"
+    node.say("~/reference", _wrench(10.0))
+    before = node.get_clock().nanoseconds
+    clock.nanoseconds += 500_000_000
+    ((_, watch),) = node.timers
+    watch()
+    assert node.get_clock().nanoseconds == before
+    assert not np.any(_thrusts(node))
+
+
+def test_a_latched_target_is_heard_where_the_parameter_says_so(make: Callable[..., Any]) -> None:
+    """Transient local and reliable, which a publisher that is not latched would not match: so not by default."""
+    assert not hasattr(make().qos["~/target"], "durability")
+    latched = make(target_latched=True).qos["~/target"]
+    assert (latched.durability, latched.reliability, latched.depth) == ("transient local", "reliable", 1)
 
 
 def test_what_cannot_be_taken_is_said_and_changes_nothing(make: Callable[..., Any]) -> None:
@@ -196,6 +278,35 @@ def test_a_stamped_reference_is_one_parameter_away(make: Callable[..., Any]) -> 
     assert len(node.publishers["/left_7/reference"].sent) == 1
     with pytest.raises(ValueError, match="8 thrusters"):
         make(controllers=["one"])
+
+
+def test_what_the_readme_installs_is_what_the_node_imports() -> None:
+    """NumPy below 2, as Jazzy has it, and the packages of the core that an allocation loads; no name of NumPy 2 alone."""
+    names = "Answer, Field, Target, ThrustAllocator, body_points, cloud_points, failed_thrusters, pose_of, read_frame"
+    code = (
+        "import sys, json; import numpy as np\n"
+        f"from wakewise.links.ros import {names}, world_points, wrench_for, wrench_of\n"
+        "from wakewise.vehicles import load_vehicle; from wakewise.wake import wake_model\n"
+        "made = dict(vehicle=load_vehicle('bluerov2-heavy'), wake=wake_model('jet'))\n"
+        "ahead = Target(points_m=np.array([[2.0, 0.0, 0.0]]), weights=np.ones(1), on_body=True)\n"
+        "for told in ({}, {'failed': (4,)}, {'priority': 'ZKMN,XY'}):\n"
+        "    ThrustAllocator(**made, **told)(np.ones(6), ahead)\n"
+        "print(json.dumps({name: module.__file__ for name, module in sys.modules.items() "
+        "if getattr(module, '__file__', None)}))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
+    files: dict[str, str] = json.loads(done.stdout)
+    whose = packages_distributions()
+    loaded = {package.lower() for name in files for package in whose.get(name.partition(".")[0], [])}
+    core = tomllib.loads((PACKAGE.parents[1] / "pyproject.toml").read_text())["project"]["dependencies"]
+    readme = (PACKAGE / "README.md").read_text()
+    told = set(re.findall(r"'([\w<>=.]+)'", readme.partition("pip install 'numpy<2'")[2].partition("&&")[0]))
+    wanted = {line for line in core if re.split("[<>=]", line)[0] in loaded and not line.startswith("numpy")}
+    assert told == wanted
+    used = re.compile(rf"\bnp\.({NEW_IN_NUMPY_2})\b|\bnp\.linalg\.({NEW_IN_LINALG_2})\b")
+    ours = [Path(path) for name, path in files.items() if name.partition(".")[0] == "wakewise"]
+    assert len(ours) > 50
+    assert {path.name: m[0] for path in ours for m in used.finditer(path.read_text())} == {}
 
 
 def test_the_shipped_file_tells_every_parameter_its_default(node_module: ModuleType) -> None:

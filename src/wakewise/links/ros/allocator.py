@@ -6,6 +6,7 @@ that have failed, and a target whose water is to be left alone.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -156,16 +157,29 @@ class ThrustAllocator:
         return view.gram(placed), view.total_weight, "gentle"
 
 
-def failed_thrusters(text: str, names: tuple[str, ...]) -> tuple[int, ...]:
-    """Thrusters, from 0, that a text names: names or numbers from 1, parted by commas; empty for none.
+def failed_thrusters(told: object, names: tuple[str, ...]) -> tuple[int, ...]:
+    """Thrusters, from 0, that a parameter or a text names; nothing, an empty text or an empty list for none.
+
+    Parameters
+    ----------
+    told : object
+        Names or numbers from 1: one, a list of them, or a text in which commas part them.
+    names : tuple of str
+        The vehicle's thrusters.
 
     Raises
     ------
     InputError
         If there is no such thruster.
     """
+    if told is None or isinstance(told, str):
+        parts: list[object] = [*(told or "").strip().removeprefix("[").removesuffix("]").split(",")]
+    else:
+        # rclpy gives lists of numbers as arrays.
+        parts = list(told) if isinstance(told, Iterable) else [told]
     found = set()
-    for word in (part.strip() for part in text.split(",")):
+    for part in parts:
+        word = part.strip() if isinstance(part, str) else f"{part}"
         if not word:
             continue
         if word in names:

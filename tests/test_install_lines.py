@@ -1,0 +1,61 @@
+"""Nothing of Wakewise is published yet: no page and no hint tells to install it from an index."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from wakewise.extras import EXTRAS, how_to_install
+
+ROOT = Path(__file__).parents[1]
+STATED = set(tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"])
+OTHERS = {"pyserial", "asyncssh", "numpy", "scipy", "numba", "pydantic", "pyyaml"}
+"""Packages of others that a page tells to install, by their names in Python's index."""
+INSTALL = re.compile(r"\bpip3? install\b[ \t]*([^`\n]*)")
+FROM_CLONE = re.compile(r"(?:--no-deps )?-e (?:'\.(?:\[([\w,]+)\])?'|\.(?=\s|$|\)))")
+
+
+def _fault(said: str) -> str | None:
+    """Why what stands after `pip install` cannot be run; None if it can, in the clone's folder."""
+    clone = FROM_CLONE.match(said)
+    if clone is not None:
+        unknown = set((clone[1] or "").split(",")) - STATED - {""}
+        return f"no extra {sorted(unknown)}" if unknown else None
+    words = re.split(r"&&|[#\")]", said)[0].split()
+    if words and {re.split("[<>=]", word.strip("'"))[0] for word in words} <= OTHERS:
+        return None
+    return "not `pip install -e '.[EXTRAS]'`"
+
+
+def _texts() -> list[Path]:
+    """Pages, and sources that print hints; scripts that set up the clone itself install by their own means."""
+    folders = [ROOT / name for name in ("docs", "src", "ros2", "extensions")]
+    found = [path for folder in folders for path in folder.rglob("*") if path.suffix in (".md", ".py", ".yaml", ".xml")]
+    return sorted([*ROOT.glob("*.md"), *found])
+
+
+def test_every_install_line_can_be_run_in_a_clone() -> None:
+    """Every `pip install` of every page and source names the clone's folder with known extras, or another's package."""
+    texts = _texts()
+    assert {"README.md", "sitl.md", "ardusub.md", "meter.md", "cockpit.md", "node.py"} <= {path.name for path in texts}
+    said = [(path, m[1]) for path in texts for m in INSTALL.finditer(path.read_text(encoding="utf-8"))]
+    assert len(said) > 6
+    # A hint's extras are filled in where it is printed.
+    faults = {f"{path.relative_to(ROOT)}: {text}": _fault(text.replace("{extras}", "all")) for path, text in said}
+    assert {line: fault for line, fault in faults.items() if fault is not None} == {}
+
+
+@pytest.mark.parametrize("extra", EXTRAS)
+def test_every_hint_can_be_run_in_a_clone(extra: str) -> None:
+    """What a missing package's message tells to type."""
+    found = INSTALL.search(how_to_install(extra))
+    assert found is not None
+    assert _fault(found[1]) is None
+    assert extra in STATED
+
+
+@pytest.mark.parametrize("said", ["wakewise", "'wakewise[links]'", "-e '.[no-such]'", "-e '.[nothing]'", "-U wakewise"])
+def test_a_line_that_cannot_be_run_is_found(said: str) -> None:
+    """From an index, or with an extra that is not there."""
+    assert _fault(said) is not None
