@@ -41,7 +41,7 @@ class Rehearsal:
             "w_track": 5.0,
             "gain": 0.5,
             "precise": False,
-            "watch_target": True,
+            "watch_target": False,
             "orbit": False,
             "regime": "work",
         }
@@ -126,6 +126,8 @@ class Rehearsal:
             "deviation_pct": 4.2,
             "disturbance": 0.3 * direct if aware else direct,
             "direct_disturbance": direct,
+            "rms_m_s": math.sqrt((0.3 if aware else 1.0) * direct),
+            "direct_rms_m_s": math.sqrt(direct),
             "saved_pct": 70.0 if aware and direct else 0.0,
             "predicted_m_s": np.round((0.55 if aware else 1.0) * wash, 4).tolist(),
             "true_m_s": np.round(0.5 * wash, 4).tolist(),

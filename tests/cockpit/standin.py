@@ -80,7 +80,7 @@ class StandIn:
 
     def __post_init__(self) -> None:
         self.desk = {"mode": "hold", "method": "wake-aware", "w_track": 5.0, "gain": 0.5, "precise": False,
-                     "watch_target": True, "orbit": False}  # fmt: skip
+                     "watch_target": False, "orbit": False}  # fmt: skip
         self._loop = asyncio.new_event_loop()
         self._ready = threading.Event()
         self._leases = self._ids = 0
@@ -310,6 +310,7 @@ class StandIn:
             "commanded_m_s": [0.12 * self.axes[0], 0.12 * self.axes[1], 0.12 * self.axes[2]],
             "velocity_m_s": [0.11 * math.sin(0.3 * t), 0.02, 0.0], "deviation_pct": 6.5 + 2.5 * math.sin(0.5 * t),
             "disturbance": flown, "direct_disturbance": direct, "saved_pct": 100 * (1 - flown / direct),
+            "rms_m_s": math.sqrt(flown), "direct_rms_m_s": math.sqrt(direct),
             "predicted_m_s": wash.round(5).tolist(),
             "true_m_s": (wash * (0.8 + 0.2 * np.sin(60 * POINTS_W_M[:, 0]))).round(5).tolist() if self.tank else None,
             "depth_m": 1.23 + 0.02 * math.sin(t), "roll_deg": 1.4 * math.sin(0.7 * t),

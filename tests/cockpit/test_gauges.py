@@ -7,7 +7,9 @@ import pytest
 
 from wakewise.allocation import least_thrusts
 from wakewise.cockpit.gauges import Gauges
+from wakewise.cockpit.state import Instruments
 from wakewise.operation import Parts, Scenario
+from wakewise.tank.measuring import STILL_M_S
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +36,23 @@ def test_thrusts_of_the_null_space_are_held_against_none(parts: Parts, gauges: G
     flown, direct = gauges.disturbances(parts.start, idle)
     assert direct == pytest.approx(0.0, abs=1e-12)
     assert flown > 0.0
+
+
+def test_the_rms_speed_is_that_of_the_whole_region(parts: Parts, gauges: Gauges) -> None:
+    """D over the sum of the region's weights, under the root."""
+    weight = float(np.sum(parts.region.weights))
+    assert gauges.rms_m_s(4e-6 * weight) == pytest.approx(2e-3, rel=1e-12)
+    assert gauges.rms_m_s(0.0) == 0.0
+    assert np.isnan(gauges.rms_m_s(float("nan")))
+
+
+@pytest.mark.parametrize(("direct_m_s", "saved"), [(2e-3, 75.0), (0.9 * STILL_M_S, None), (0.0, None)])
+def test_of_still_water_nothing_is_saved(gauges: Gauges, direct_m_s: float, saved: float | None) -> None:
+    """Where direct thrusts leave the water as good as still there is no share to tell, not one of 0 %."""
+    instruments = Instruments(gauges, None)  # type: ignore[arg-type]
+    direct = gauges.view.total_weight * direct_m_s**2
+    instruments._both.append((0.25 * direct, direct))
+    assert instruments.saved_pct == (None if saved is None else pytest.approx(saved))
 
 
 def test_predicted_speeds_grow_with_the_root_of_thrust(parts: Parts, gauges: Gauges) -> None:

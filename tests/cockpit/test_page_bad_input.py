@@ -11,7 +11,8 @@ from standin import StandIn
 
 NOTHING = dict.fromkeys(
     ("time_s", "mode", "desk", "controls", "thrusts_N", "commanded_m_s", "velocity_m_s", "deviation_pct", "disturbance",
-     "direct_disturbance", "saved_pct", "predicted_m_s", "true_m_s", "depth_m", "roll_deg", "pitch_deg", "heading_deg",
+     "direct_disturbance", "rms_m_s", "direct_rms_m_s", "saved_pct", "predicted_m_s", "true_m_s",
+     "depth_m", "roll_deg", "pitch_deg", "heading_deg",
      "tilt_deg", "power_W", "energy_J", "position_W_m", "goal_W_m", "coverage", "photos", "loop", "fallback", "helm",
      "spectators")
 )  # fmt: skip

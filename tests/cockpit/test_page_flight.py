@@ -46,7 +46,6 @@ def test_a_flight_by_hand_from_the_browser(session: Session, page: Page, browser
     page.until("document.body.dataset.helm === 'mine'")
     page.press("KeyO")
     page.until("document.body.dataset.mode === 'operator'")
-    page.click("[data-assist=watch_target]")
     start = position(session)
     page.down("KeyD")
     until(lambda: np.linalg.norm(position(session) - start) > 0.05, "to move", 60.0)

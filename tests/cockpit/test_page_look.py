@@ -24,6 +24,38 @@ NAMELESS = """[...document.querySelectorAll('button, input, canvas, svg[role], i
   || e.labels?.length)).map((e) => e.outerHTML)"""
 
 
+SMALL = """[...document.querySelectorAll('body *')].filter((e) => e.offsetParent !== null
+  && [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim())
+  && parseFloat(getComputedStyle(e).fontSize) < 12).map((e) => e.outerHTML)"""
+LOW = """[...document.querySelectorAll('button, input')].filter((e) => { const b = e.getBoundingClientRect();
+  return b.width > 0 && (b.height < 44 || (e.matches('button') && b.width < 44)); }).map((e) => e.outerHTML)"""
+HIDDEN = """[...document.querySelectorAll('.side .panel')].filter((e) => e.offsetParent !== null
+  && e.scrollHeight > e.clientHeight + 1).map((e) => e.className)"""
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_words_can_be_read_and_thumbs_find_every_button(standin: StandIn, spectate: Any, size: str) -> None:
+    """No text below 12 px; on a phone every button and slider is 44 px high, and no panel hides a part of itself."""
+    width, height, phone = SIZES[size]
+    page = spectate("", width, height, phone=phone)
+    tabs = page.js(
+        "[...document.querySelectorAll('[data-show]')].filter((e) => e.offsetParent).map((e) => e.dataset.show)"
+    )
+    assert bool(tabs) == (size == "upright")
+    for tab in tabs or [None]:
+        if tab is not None:
+            page.click(f"[data-show={tab}]")
+        assert page.js(SMALL) == []
+        if size in ("upright", "sideways"):
+            assert page.js(LOW) == []
+            assert page.js(HIDDEN) == []
+    for box in ("help", "end"):
+        page.click(f"#{box}")
+        assert page.js(SMALL) == []
+        assert size in ("desk", "tablet") or page.js(LOW) == []
+        page.js(f"document.getElementById('{box}-box').close()")
+
+
 @pytest.mark.parametrize("size", SIZES)
 def test_stop_is_in_reach_and_nothing_runs_over(standin: StandIn, spectate: Any, size: str) -> None:
     """At a desk, on a phone held either way, on a tablet: with and without the helm, and as a widget."""
@@ -74,6 +106,17 @@ def contrast(one: str, other: str) -> float:
     """Ratio of relative luminances, 1 to 21."""
     low, high = sorted(luminance(colour) for colour in (one, other))
     return (high + 0.05) / (low + 0.05)
+
+
+def test_wash_is_told_as_a_speed(standin: StandIn, spectate: Any) -> None:
+    """Root mean square over the target, in mm/s, as the gentle meter has it; what is not known is a dash."""
+    page = spectate()
+    page.until("/^\\d+\\.\\d+.mm.s$/.test(document.querySelector('[data-field=rms]').innerText)")
+    standin.quiet = True
+    standin.tell({**standin.state(), "rms_m_s": 0.0123, "saved_pct": None})
+    page.until("document.querySelector('[data-field=rms]').innerText.startsWith('12.3')")
+    assert page.text("[data-field=saved]") == "–"
+    assert "mm²" not in page.js("document.body.textContent")
 
 
 def luminance(colour: str) -> float:

@@ -7,6 +7,7 @@ finds, as they are for the controller (see `wakewise.control.watch`).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,6 +65,10 @@ class Gauges:
         direct_N = least_thrusts(layout, layout.B @ thrusts_N).thrusts_N
         one, other = (disturbance_of(self.watch.gram(estimate, thrusts), thrusts) for thrusts in (thrusts_N, direct_N))
         return one, other
+
+    def rms_m_s(self, disturbance: float) -> float:
+        """Root mean square speed of the water at the target that a disturbance D in (m/s)^2 amounts to."""
+        return math.sqrt(disturbance / self.view.total_weight) if disturbance >= 0.0 else math.nan
 
     def predicted_m_s(self, estimate: BodyState, thrusts_N: Array) -> Array:
         """Speed that the jets of thrusts, shape (n,), have at `points_W_m` by the wake model, shape (points,)."""

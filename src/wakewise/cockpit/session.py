@@ -28,7 +28,7 @@ from wakewise.cockpit.state import Instruments, described, number, rounded, told
 from wakewise.errors import StageError, WakewiseError
 from wakewise.operation import Parts, Scenario
 from wakewise.operation.by_hand.assisted import AssistedPilot, assisted
-from wakewise.operation.by_hand.desk import MODES, RANGES, WAYS, Desk, regime
+from wakewise.operation.by_hand.desk import MODES, RANGES, WAYS, Desk, DeskState, regime
 from wakewise.operation.by_hand.live import LiveFlight
 from wakewise.pilot.controls import CENTRED, ControlSource
 
@@ -68,7 +68,7 @@ class Session:
         scene: bool = False,
     ) -> None:
         self._parts = scenario if isinstance(scenario, Parts) else scenario.parts()
-        self.seat, self.desk = Seat(device=device), Desk()
+        self.seat, self.desk = Seat(device=device), Desk(DeskState(watch_target=False))
         self._device, self._scene_wanted = device, scene
         self._scene: Scene | None = None
         self._fallback: str | None = None

@@ -17,6 +17,7 @@ from wakewise.cockpit.gauges import Gauges
 from wakewise.cockpit.lookout import SAMPLED_S, WINDOW_S, Lookout, Moment
 from wakewise.geometry import euler_from_quat
 from wakewise.operation import Parts
+from wakewise.tank.measuring import STILL_M_S
 
 POINTS_EVERY, GAUGES_EVERY = 5, 2
 """States between two looks at the water of every point, and at D: with a current these cost the most."""
@@ -98,6 +99,8 @@ class Instruments:
             "deviation_pct": number(self._lookout.deviation_pct, 1),
             "disturbance": number(flown, 8),
             "direct_disturbance": number(direct, 8),
+            "rms_m_s": number(self._gauges.rms_m_s(flown), 6),
+            "direct_rms_m_s": number(self._gauges.rms_m_s(direct), 6),
             "saved_pct": number(self.saved_pct, 1),
             "predicted_m_s": rounded(self.predicted_m_s, 4),
             "true_m_s": None if now.true_m_s is None else rounded(now.true_m_s, 4),
@@ -115,9 +118,13 @@ class Instruments:
 
     @property
     def saved_pct(self) -> float | None:
-        """How much less D the flown thrusts made than direct allocation, over ten seconds; None without any."""
-        flown, direct = np.sum(self._both, axis=0) if self._both else (0.0, 0.0)
-        return 100.0 * (1.0 - float(flown / direct)) if direct > 0.0 else None
+        """How much less D the flown thrusts made than direct allocation over ten seconds; None where that leaves the
+        water as good as still (`STILL_M_S`), so that there is nothing to save."""
+        if not self._both:
+            return None
+        flown, direct = np.mean(self._both, axis=0)
+        still = self._gauges.rms_m_s(float(direct)) < STILL_M_S
+        return None if still else 100.0 * (1.0 - float(flown / direct))
 
 
 def number(value: float | None, digits: int) -> float | None:

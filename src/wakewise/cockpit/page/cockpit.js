@@ -6,7 +6,7 @@ import { Coverage } from "./coverage.js";
 import { Desk, pressed } from "./desk.js";
 import { HELP as PAD_HELP, Pads } from "./gamepad.js";
 import { Helm } from "./helm.js";
-import { Thrusts, figures, put, squares } from "./instruments.js";
+import { Thrusts, figures, millimetres, put } from "./instruments.js";
 import { HELP as KEY_HELP, Keyboard } from "./keyboard.js";
 import { Link } from "./link.js";
 import { Notes } from "./notes.js";
@@ -34,7 +34,7 @@ const desk = new Desk(helm);
 const thrusts = new Thrusts($("thrusts"));
 const target = new Target($("target"), $("scale"));
 const coverage = new Coverage({ canvas: $("patches"), share: $("share"), next: $("next") });
-const disturbances = new Plot($("plot-disturbance"), [{ ink: "--s1" }, { ink: "--s2", dashed: true }], { unit: "D, mm²/s²", least: 1000, decades: 4 });
+const washes = new Plot($("plot-disturbance"), [{ ink: "--s1" }, { ink: "--s2", dashed: true }], { unit: "rms, mm/s", least: 10, decades: 3 });
 const deviations = new Plot($("plot-deviation"), [{ ink: "--s1" }], { unit: "% of the command", least: 10, most: 100 });
 new Camera({ canvas: $("camera"), empty: $("no-picture"), late: $("late"), link });
 
@@ -46,7 +46,7 @@ const pads = new Pads({ press: act, nudge: (steps) => desk.nudge(steps), say: (l
 const touch = new Touch(document.querySelector(".touch"));
 const keyboard = new Keyboard({ act: onKey, stop });
 const sticks = new Sticks({ link, helm, sources: [keyboard, pads, touch], attentive, changed: show });
-const theme = new Theme($("theme"), () => [target, coverage, disturbances, deviations].forEach((one) => one.repaint()));
+const theme = new Theme($("theme"), () => [target, coverage, washes, deviations].forEach((one) => one.repaint()));
 
 function stop() {
   sticks.cut();
@@ -135,7 +135,7 @@ const takers = {
     showWash();
     desk.update(message.desk ?? {}, message);
     coverage.update(message);
-    disturbances.add(message.time_s, [squares(message.disturbance), squares(message.direct_disturbance)]);
+    washes.add(message.time_s, [millimetres(message.rms_m_s), millimetres(message.direct_rms_m_s)]);
     deviations.add(message.time_s, [message.deviation_pct]);
     pressed("[data-press][data-mode]", (button) => button.dataset.mode === now.mode);
     $("fallback").textContent = words(message.fallback) ? `fallback: ${words(message.fallback)}` : "";

@@ -24,21 +24,21 @@ export function figures(state) {
   put("energy", energy === null ? shown(null) : shown(energy / 3600, energy < 36000 ? 2 : 1, "Wh"));
   const photos = Array.isArray(state.photos) ? state.photos.length : state.photos;
   put("photos", shown(photos, 0));
-  put("disturbance", disturbance(state.disturbance));
+  put("rms", speedOfWash(state.rms_m_s));
   put("saved", shown(state.saved_pct, 0, "%"));
   document.body.dataset.saves = String(Number(state.saved_pct) > 0);
   put("deviation", `now ${shown(state.deviation_pct, 1, "%")}`);
   horizon(state);
 }
 
-/** D of m2/s2, in mm2/s2. */
-export function squares(value) {
-  const d = finite(value);
-  return d === null ? null : 1e6 * d;
+/** A speed of m/s, in mm/s. */
+export function millimetres(value) {
+  const speed = finite(value);
+  return speed === null ? null : 1e3 * speed;
 }
 
-function disturbance(value) {
-  return brief(squares(value), "mm²/s²");
+function speedOfWash(value) {
+  return brief(millimetres(value), "mm/s");
 }
 
 function turned(deg) {

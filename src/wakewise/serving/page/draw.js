@@ -52,7 +52,7 @@ export function forgetInks() {
   inks.clear();
 }
 
-export const FONT = '11px system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", "DejaVu Sans", sans-serif';
+export const FONT = '12px system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", "DejaVu Sans", sans-serif';
 
 /** "rgb(…)" between stops [[share, [r, g, b]], …], at a share from 0 to 1. */
 export function blend(stops, share) {
