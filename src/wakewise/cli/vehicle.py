@@ -82,6 +82,7 @@ def show(
     package: Packages = None,
     arg: vehicle_import.Arguments = None,
     skip_missing: SkipMissing = False,
+    rows: vehicle_import.Rows = None,
     json: Json = False,
 ) -> None:
     """Show a vehicle: thrusters, rank, what redundancy it has, limits, where the figures are from."""
@@ -90,7 +91,7 @@ def show(
     from wakewise.reports.vehicle import drawing_svg, vehicle_page
     from wakewise.vehicles import describe, parameters
 
-    draft = _found(vehicle, frame, thrust_direction, package, arg, skip_missing=skip_missing)
+    draft = _found(vehicle, frame, thrust_direction, package, arg, rows, skip_missing=skip_missing)
     facts = describe(draft)
     for option, path in (("--out", out), ("--drawing", drawing)):
         if path is not None and path.is_dir():
@@ -106,8 +107,8 @@ def show(
         return
     typer.echo(f"{draft.title}\n")
     _print_thrusters(facts)
-    rows = [[p.quantity, p.value or "missing", p.unit, "estimate" if p.estimate else ""] for p in parameters(draft)]
-    _print_rows("parameters", ["quantity", "value", "unit", ""], rows, left=4)
+    table = [[p.quantity, p.value or "missing", p.unit, "estimate" if p.estimate else ""] for p in parameters(draft)]
+    _print_rows("parameters", ["quantity", "value", "unit", ""], table, left=4)
     _print_allocation(facts)
     for group in facts["provenance"]:
         typer.echo(f"source of {group['group'].replace('_', ' ')}: {' '.join(group['source'].split())}")
@@ -128,21 +129,23 @@ def check(
     package: Packages = None,
     arg: vehicle_import.Arguments = None,
     skip_missing: SkipMissing = False,
+    rows: vehicle_import.Rows = None,
     json: Json = False,
 ) -> None:
     """Check a vehicle's thrusters: rank, null space, achievable wrench, single failures, stated matrix."""
     from wakewise.importers import compare_with
     from wakewise.vehicles import check_report
 
-    draft = _found(vehicle, frame, thrust_direction, package, arg, skip_missing=skip_missing)
-    facts = check_report(draft, None if matrix is None else compare_with(draft, matrix))
+    own_rows = rows if matrix is None else None
+    draft = _found(vehicle, frame, thrust_direction, package, arg, own_rows, skip_missing=skip_missing)
+    facts = check_report(draft, None if matrix is None else compare_with(draft, matrix, rows))
     if json:
         print_json(facts)
         return
     typer.echo(f"{draft.title}\n")
     _print_allocation(facts)
-    rows = [[failure["thruster"], failure["name"], failure["rank"], failure["words"]] for failure in facts["failures"]]
-    _print_rows("if one thruster fails", ["", "thruster", "rank", "what is left"], rows, left=4)
+    table = [[failure["thruster"], failure["name"], failure["rank"], failure["words"]] for failure in facts["failures"]]
+    _print_rows("if one thruster fails", ["", "thruster", "rank", "what is left"], table, left=4)
     found = facts["mixing"]
     if found is not None:
         typer.echo(f"{found['stated_by']}: {found['agree']} of {found['compared']} entries agree with the geometry")
@@ -150,6 +153,8 @@ def check(
             typer.echo(f"  {entry['text']}")
         for note in found["notes"]:
             typer.echo(f"  note: {note}")
+        for line in found["commands"]:
+            typer.echo(f"  command: {line}")
     _print_lacks(facts)
 
 
@@ -213,6 +218,7 @@ def _found(
     thrust_direction: str,
     package: list[str] | None,
     arg: list[str] | None,
+    rows: str | None,
     *,
     skip_missing: bool,
 ) -> VehicleDraft:
@@ -225,6 +231,7 @@ def _found(
         packages=_folders(package),
         arguments=vehicle_import.pairs(arg, ":=", "--arg NAME:=VALUE"),
         skip_missing=skip_missing,
+        rows=rows,
     )
 
 

@@ -168,8 +168,7 @@ def _matrix(root: Item, entries: Entries, found: Found, rows: Order | None, *, f
         found.matrix, stated = settle(raw, order, key, item.place if flown else None, found.notes)
         found.matrix_name, found.raw_matrix = key, None if stated else raw
         if order is not None and order.throttle:
-            how = "inferred" if order.why.startswith("inferred") else "detected"
-            found.frame, found.frame_why = "FRD", f"{how}: {key} is of throttle, up, and lateral, to the right"
+            found.frame, found.frame_why = "FRD", f"detected: {key} is of throttle, up, and lateral, to the right"
         found.notes.append(f"allocation matrix: {key}, 6 x {n} ({item.place.file.name}:{item.place.line})")
         return True
     return False

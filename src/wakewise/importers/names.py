@@ -110,7 +110,7 @@ def _some(names: list[str]) -> str:
 def _tokens(name: str) -> list[str]:
     tokens = [token.lower() for token in _TOKEN.findall(name)]
     # A left-handed propeller is on no side.
-    following = [*tokens[1:], ""]
+    following = [*tokens, ""][1:]
     return [t for t, after in zip(tokens, following, strict=True) if not after.startswith("hand") and t != "upright"]
 
 

@@ -19,10 +19,11 @@ LARGEST_FILE_BYTES = 1_000_000
 
 
 def read_number_matrix(path: Path) -> tuple[Array, bool]:
-    """Read a matrix of shape (6, n) and whether it holds signs only.
+    """Read a matrix of shape (6, n) or (n, 6) as it stands, and whether it holds signs only, then of shape (6, n).
 
-    Allowed are six lines of n numbers separated by commas or blanks, and a table of motor factors with the header
-    motor, roll, pitch, yaw, throttle, forward, lateral. Lines that begin with # are left out.
+    Allowed are six lines of n numbers separated by commas or blanks, a line of six for each thruster, and a table of
+    motor factors with the header motor, roll, pitch, yaw, throttle, forward, lateral. Lines that begin with # are left
+    out.
 
     Raises
     ------
@@ -57,6 +58,8 @@ def _numbers(rows: list[Any], path: Path) -> Array:
 
 
 def _matrix(array: Array, path: Path) -> Array:
-    if array.ndim != 2 or array.shape[0] != 6:
-        raise InputError(f"matrix file {path}: shape {array.shape}, allowed (6, n), a column per thruster")
-    return frozen(array, (6, None), f"matrix file {path}")
+    if array.ndim != 2 or 6 not in array.shape:
+        raise InputError(
+            f"matrix file {path}: shape {array.shape}, allowed (6, n), a column per thruster, or (n, 6), a row for each"
+        )
+    return frozen(array, (None, None), f"matrix file {path}")

@@ -141,14 +141,15 @@ def settle(raw: Array, order: Order | None, what: str, place: Place | None, note
         said = f"rows are {order.words} ({order.why})"
         pushing = [r for r in read if np.linalg.norm(r[0][:3], axis=0).min() > 0.5]
         chosen = (fits or unit or pushing or read)[0]
-        if not unit and bool(np.isin(chosen[0], (-1.0, 0.0, 1.0)).all()):
+        stated = not order.why.startswith("inferred")
+        if not unit and place is not None and bool(np.isin(chosen[0], (-1.0, 0.0, 1.0)).all()):
             notes.append(
                 f"{QUESTION}{what} holds motor factors, -1, 0 and 1: forces are scaled to length 1; which axes it "
                 f"makes can be told, moments in N m cannot; {said}"
             )
-            return chosen[0] / np.maximum(np.linalg.norm(chosen[0][:3], axis=0), 1e-12), True
+            return chosen[0] / np.maximum(np.linalg.norm(chosen[0][:3], axis=0), 1e-12), stated
         notes.append(f"{what}: {said}")
-        return chosen[0], True
+        return chosen[0], stated
     if fits:
         chosen = fits[0]
         others = [r for r in fits[1:] if not np.array_equal(r[0], chosen[0])]
