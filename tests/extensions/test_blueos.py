@@ -44,14 +44,67 @@ def instructions() -> list[tuple[str, str]]:
     return [(line.partition(" ")[0], line.partition(" ")[2].strip()) for line in whole.splitlines() if line.strip()]
 
 
+def expanded(word: str, known: dict[str, str]) -> str:
+    """A word of an instruction as BuildKit reads it (moby/buildkit, frontend/dockerfile/shell).
+
+    What stands in single quotes stays as it is. In double quotes and without any, $NAME and ${NAME} are replaced, and
+    a backslash makes the next sign plain, in double quotes only a quote, a dollar or a backslash.
+    """
+    found, at, quote = "", 0, ""
+    while at < len(word):
+        sign = word[at]
+        named = re.compile(r"\$(?:(\w+)|\{(\w+)\})").match(word, at)
+        if quote == "'":
+            quote, found = ("", found) if sign == "'" else (quote, found + sign)
+        elif sign == "\\" and at + 1 < len(word) and (not quote or word[at + 1] in '"$\\'):
+            at += 1
+            found += word[at]
+        elif named:
+            found += known.get(named[1] or named[2], "")
+            at = named.end() - 1
+        elif sign == '"' or (sign == "'" and not quote):
+            quote = "" if quote else sign
+        else:
+            found += sign
+        at += 1
+    assert not quote, f"a quote is open: {word}"
+    return found
+
+
 @pytest.fixture(scope="module")
 def labels(instructions: list[tuple[str, str]]) -> dict[str, str]:
+    """As an image has them that somebody built with OWNER=reef-lab."""
+    arguments = {said for name, said in instructions if name == "ARG"}
+    assert arguments == {"OWNER"}
     found = {}
     for name, said in instructions:
         if name == "LABEL":
             key, _, value = said.partition("=")
-            found[key] = value.strip("'\"")
+            found[key] = expanded(value, {"OWNER": "reef-lab"})
     return found
+
+
+@pytest.mark.parametrize(
+    ("word", "value"),
+    [
+        ("'a $OWNER'", "a $OWNER"), ('"a $OWNER"', "a reef"), ('"a ${OWNER}/b"', "a reef/b"), ("a$OWNER", "areef"),
+        (r'"\"x\": \$OWNER"', '"x": $OWNER'), ("'{\"a\": 1}'", '{"a": 1}'), ('"it\'s"', "it's"), ('"$NOBODY"', ""),
+    ],
+)  # fmt: skip
+def test_words_are_expanded_as_a_build_does_it(word: str, value: str) -> None:
+    """By the rules of Dockerfiles."""
+    assert expanded(word, {"OWNER": "reef"}) == value
+
+
+def test_every_label_leads_to_who_publishes_it(labels: dict[str, str]) -> None:
+    """No label keeps a name that stands for something; the page's address asks for the image's tag."""
+    assert "$" not in "".join(labels.values())
+    assert "OWNER" not in "".join(labels.values())
+    for link in (*json.loads(labels["links"]).values(), labels["readme"]):
+        assert "/reef-lab/wakewise" in link
+    readme = (FOLDER / "README.md").read_text(encoding="utf-8")
+    assert f"git tag {labels['version']}" in readme
+    assert f"wakewise-gentle-meter:{labels['version']}" in readme
 
 
 def test_the_labels_are_what_blueos_reads(labels: dict[str, str]) -> None:

@@ -281,7 +281,7 @@ def test_a_stamped_reference_is_one_parameter_away(make: Callable[..., Any]) -> 
 
 
 def test_what_the_readme_installs_is_what_the_node_imports() -> None:
-    """NumPy below 2, as Jazzy has it, and the packages of the core that an allocation loads; no name of NumPy 2 alone."""
+    """NumPy below 2, as Jazzy has it, and the packages that an allocation loads; it uses no name of NumPy 2 alone."""
     names = "Answer, Field, Target, ThrustAllocator, body_points, cloud_points, failed_thrusters, pose_of, read_frame"
     code = (
         "import sys, json; import numpy as np\n"
