@@ -53,6 +53,7 @@ class FoundThruster:
 class Found:
     """Everything a reader found; None where the file says nothing. Axes are the file's own.
 
+    `frame_doubt` is the note for a user who does not say the frame either, where it is a guess;
     `guessed` says how the thrusters were told if no rule of the format tells them; `raw_matrix` holds a matrix as it
     stands in the file if nothing states what its rows are.
     """
@@ -62,6 +63,7 @@ class Found:
     file: Path
     frame: Frame
     frame_why: str
+    frame_doubt: str = ""
     thrust_rule: str = ""
     guessed: str = ""
     size_m: Array | None = None
@@ -137,6 +139,8 @@ def make_draft(found: Found, convention: str, thrust: str) -> VehicleDraft:
     if turn and X_BC is not None:
         X_BC = Pose.from_matrix(_FLIP @ X_BC.R, _FLIP @ X_BC.p_m)
     notes += found.notes
+    if found.frame_doubt and convention == "auto":
+        notes.append(found.frame_doubt)
     if found.p_G_m is not None and found.p_buoyancy_m is not None:
         notes += _stability(found, frame)
     notes += _unfilled(found)

@@ -137,7 +137,7 @@ def _frame(root: Item, entries: Entries, found: Found, *, geometry: bool) -> tup
         return ("FRD", why) if frame == "FRD" else ("FLU", why)
     what = "thruster positions" if geometry else "the matrix"
     if found.thrusters or found.matrix is not None:
-        found.notes.append(
+        found.frame_doubt = (
             f"{QUESTION}the frame of {what} is a guess: no key, name of a thruster or comment says it; "
             f"--frame FLU or --frame FRD does"
         )

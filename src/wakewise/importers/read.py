@@ -248,7 +248,8 @@ def read_matrix(
             doubts = [note for note in found.notes if note.startswith(QUESTION)]
             found.notes = [note for note in found.notes if note not in doubts]
             return best, [*found.notes, f"matrix read as {words}"]
-    return stated, [*found.notes, f"frame of the matrix: {frame} ({why})"]
+    doubt = [found.frame_doubt] if found.frame_doubt and convention == "auto" else []
+    return stated, [*found.notes, f"frame of the matrix: {frame} ({why})", *doubt]
 
 
 def _with_matrix(draft: VehicleDraft, path: Path, convention: str, rows: str | None) -> VehicleDraft:
