@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from wakewise.checks import quoted
 from wakewise.errors import InputError
+from wakewise.files import named
 
 if TYPE_CHECKING:
     from wakewise.operation import Parts, Scenario
@@ -17,11 +18,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Result:
-    """What a trial or a comparison left: its folder, its figures (see docs/conventions.md), its report."""
+    """What a trial or a comparison left: its folder, its figures (see docs/conventions.md), its report.
+
+    A report that could not be written is None, and `report_fault` says why.
+    """
 
     folder: Path
     figures: dict[str, Any]
-    report: Path
+    report: Path | None
+    report_fault: str | None = None
 
 
 def trial(
@@ -57,13 +62,16 @@ def trial(
     """
     from wakewise.reports import Draft, begin_report, write_report
     from wakewise.trials import Quiet, run_trial
+    from wakewise.trials.reporting import report_attempt
 
     watch, place, draft = watch or Quiet(), _path(folder), Draft()
-    figures = run_trial(flight, place, watch, told, lambda missing: begin_report(place, draft, missing))
-    with watch.stage("report") as progress:
+    with_parts = _early(lambda missing: begin_report(place, draft, missing))
+    figures = run_trial(flight, place, watch, told, with_parts)
+    report = None
+    with report_attempt() as attempt, watch.stage("report") as progress:
         report = write_report(place, draft)
         progress(1, 1)
-    return Result(place, figures, report)
+    return Result(place, figures, report, attempt.fault)
 
 
 def compare(flights: Mapping[str, Parts | Scenario], folder: str | Path, watch: Watch | None = None) -> Result:
@@ -90,25 +98,38 @@ def compare(flights: Mapping[str, Parts | Scenario], folder: str | Path, watch: 
     """
     from wakewise.reports import Draft, begin_report, write_comparison, write_report
     from wakewise.trials import Quiet, compare_methods
+    from wakewise.trials.reporting import report_attempt
 
     if not isinstance(flights, Mapping):
         raise InputError(f"flights: {quoted(flights)}, must be names with parts or scenarios")
     if len(flights) < 2:
         raise InputError(f"compare: {len(flights)} flights, at least two are needed to compare; one alone is a `trial`")
     for name in flights:
-        if not isinstance(name, str) or not name or "/" in name or "\\" in name or name.startswith("."):
-            raise InputError(f"compare: '{name}' names a folder, it must hold no separator and not begin with a dot")
+        if not isinstance(name, str):
+            raise InputError(f"flights: {quoted(name)}, must be a name")
+        named(_path(folder), name, "compare")
     watch, place = watch or Quiet(), _path(folder)
     drafts = {name: Draft() for name in flights}
-    figures = compare_methods(
-        flights, place, watch, lambda name, lacks: begin_report(place / name, drafts[name], lacks)
-    )
-    with watch.stage("report") as progress:
+    with_parts = _early(lambda name, lacks: begin_report(place / name, drafts[name], lacks))
+    figures = compare_methods(flights, place, watch, with_parts)
+    report = None
+    with report_attempt() as attempt, watch.stage("report") as progress:
         for name in flights:
             write_report(place / name, drafts.pop(name))
         report = write_comparison({name: place / name for name in flights}, place)
         progress(1, 1)
-    return Result(place, figures, report)
+    return Result(place, figures, report, attempt.fault)
+
+
+def _early(begin: Callable[..., None]) -> Callable[..., None]:
+    """What makes parts of a report while the trial still runs, which it must not end: `write_report` tells of it."""
+    from wakewise.trials.reporting import report_attempt
+
+    def parts(*given: str) -> None:
+        with report_attempt():
+            begin(*given)
+
+    return parts
 
 
 def _path(folder: str | Path) -> Path:

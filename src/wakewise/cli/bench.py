@@ -11,7 +11,7 @@ from wakewise.cli.bench_gentle import show_gentle
 from wakewise.cli.bench_operator import show_operator
 from wakewise.cli.bench_traps import show_traps
 from wakewise.cli.bench_worlds import show_worlds
-from wakewise.cli.console import Bars, print_json, shown
+from wakewise.cli.console import Bars, print_json, shown, write_page
 from wakewise.cli.options import Json
 
 Name = Annotated[str, typer.Argument(help="Which bench; without a name, all of them.", show_default=False)]
@@ -122,6 +122,8 @@ def bench(
         raise InputError("--plot: only `wakewise bench gentle` and `wakewise bench operator` draw")
     if plot is not None:
         need("--plot", "reports")
+        if plot.suffix.lower() not in (".png", ".svg", ".pdf"):
+            raise InputError(f"--plot {plot}: ending '{plot.suffix}', allowed .png, .svg, .pdf")
     names = [name] if name else sorted(BENCHES)
     results: dict[str, Any] = {}
     bars = Bars()
@@ -153,7 +155,7 @@ def bench(
         from wakewise.reports.operator import draw_operator
 
         draw = {"gentle": draw_gentle, "operator": draw_operator}[name]
-        draw(results[name], plot)
+        write_page("plot", lambda: draw(results[name], plot))
     if json:
         print_json(results[name] if name else results)
         return

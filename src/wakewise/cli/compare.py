@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from wakewise.cli.console import Bars, print_json, print_table, shown
+from wakewise.cli.console import Bars, no_report, print_json, print_table, shown
 from wakewise.cli.options import (
     Json,
     Out,
@@ -71,9 +71,10 @@ def compare(
     scenarios = {name: load_scenario(preset, scenario, changes | {"method": name}) for name in names}
     folder = out or default_folder(scenarios[names[0]], "compare")
     result = api.compare(scenarios, folder, Bars())
-    figures, report = result.figures, result.report
+    figures = result.figures
     if json:
         print_json(figures)
+        no_report(result.report_fault)
         return
     from rich.table import Table
 
@@ -89,4 +90,5 @@ def compare(
         if key != "why":
             table.add_row(f"{key} ratio", *(shown(figures["ratios"][name][key]) for name in names), f"to {names[0]}")
     print_table(table)
-    typer.echo(f"report: {report}")
+    if no_report(result.report_fault):
+        typer.echo(f"report: {result.report}")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import sys
 import threading
 import time
@@ -104,9 +105,40 @@ def _heartbeat(name: str, where: list[Any]) -> Iterator[None]:
         thread.join()
 
 
+def write_page(name: str, write: Callable[[], Any]) -> bool:
+    """Write a report beside a result, as a stage of this name; whether it came about.
+
+    A report that fails is told in one line, and costs neither the result nor the exit code.
+    """
+    from wakewise.trials.reporting import report_attempt
+
+    with report_attempt() as attempt, Bars().stage(name):
+        write()
+    if INTERRUPTED.is_set():
+        raise KeyboardInterrupt
+    return no_report(attempt.fault)
+
+
+def no_report(fault: str | None) -> bool:
+    """Say on standard error why there is no report; whether there is one, which is where no fault is given."""
+    if fault is not None:
+        print(f"wakewise: report could not be written: {fault}", file=sys.stderr)
+    return fault is None
+
+
 def print_json(value: Any) -> None:
     """Print one JSON object and nothing else on standard output; NaN never leaves as a word JSON lacks."""
     sys.stdout.write(json.dumps(value, indent=2, allow_nan=False) + "\n")  # whole or not at all
+
+
+def status_line(line: str) -> None:
+    """Write a line over the last one of a terminal, cut to its width so that it never wraps; a line each time elsewhere."""
+    if sys.stderr.isatty():
+        columns = shutil.get_terminal_size().columns
+        sys.stderr.write(f"\r{line[: columns - 1]}\x1b[K")
+    else:
+        sys.stderr.write(f"{line}\n")
+    sys.stderr.flush()
 
 
 def print_table(table: Table) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from wakewise.cli.console import Bars, print_json, print_table, shown
+from wakewise.cli.console import Bars, print_json, print_table, shown, write_page
 from wakewise.cli.options import Json, Preset, Sets, TargetName
 from wakewise.errors import InputError
 
@@ -45,7 +46,7 @@ def degrade(
     for name in {row["factor"]: None for row in rows}:
         factor = FACTORS[name]
         some = [row for row in rows if row["factor"] == name]
-        plot_degradation(some, factor.title, factor.unit, out / f"{name}.png")
+        write_page(f"{name}.png", partial(plot_degradation, some, factor.title, factor.unit, out / f"{name}.png"))
     if json:
         print_json({"rows": rows})
         return

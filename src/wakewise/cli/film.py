@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wakewise.cli.console import Bars, print_json
+from wakewise.cli.console import Bars, print_json, write_page
 from wakewise.cli.options import Json
 from wakewise.errors import InputError
 
@@ -70,8 +70,7 @@ def film(
         with Bars().stage("rows") as progress:
             write_rows(rows, path, times_s=_times(at), progress=progress)
         if path.parent == rows and (rows / "comparison.html").is_file():
-            with Bars().stage("report"):
-                write_comparison(compared_trials(rows), rows)
+            write_page("report", lambda: write_comparison(compared_trials(rows), rows))
     elif trial is not None:
         if view not in VIEWS:
             raise InputError(f"--view: '{view}', allowed are {', '.join(VIEWS)}")
@@ -79,8 +78,7 @@ def film(
         with Bars().stage("film") as progress:
             write_film(trial, path, seconds=seconds, fps=fps, view=view, progress=progress)
         if path.parent == trial and path.name in FILMS and (trial / "report.html").is_file():
-            with Bars().stage("report"):
-                write_report(trial)
+            write_page("report", lambda: write_report(trial))
     if json:
         print_json({"file": str(path), "size_MB": path.stat().st_size / 1e6})
         return

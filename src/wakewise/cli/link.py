@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.cli import link_ardusub, link_script, link_sitl
-from wakewise.cli.console import Bars, print_json, shown
+from wakewise.cli import link_ardusub, link_script, link_share, link_sitl
+from wakewise.cli.console import Bars, print_json, shown, write_page
 from wakewise.cli.link_meter import meter
 from wakewise.cli.link_points import Ahead, Points, WakeModelName, region_ahead, region_words
 from wakewise.cli.link_sensors import sensors
@@ -27,6 +27,7 @@ app.command("sensors")(sensors)
 
 app.command("ardusub")(link_ardusub.ardusub)
 app.command("script")(link_script.script)
+app.command("share")(link_share.share)
 app.command("sitl")(link_sitl.sitl)
 app.command("stand-in")(link_sitl.stand_in)
 
@@ -106,8 +107,7 @@ def log(
     if page:
         from wakewise.reports.log import write_log_page
 
-        with bars.stage("page"):
-            write_log_page(folder, [thruster.name for thruster in chosen.thrusters])
+        write_page("page", lambda: write_log_page(folder, [thruster.name for thruster in chosen.thrusters]))
     if json:
         print_json(facts)
     else:

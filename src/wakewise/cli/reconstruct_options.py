@@ -97,7 +97,7 @@ def frames_of(photos: Path, out: Path) -> Path:
 def look_first(photos: Path, out: Path, threads: int, json: bool) -> None:
     """Leave `out/look.html` and `look.json`, and say what to shoot again."""
     from wakewise.cli.console import Bars as Progress
-    from wakewise.cli.console import print_json
+    from wakewise.cli.console import print_json, write_page
     from wakewise.extras import need
     from wakewise.files import write_json
     from wakewise.reconstruction.look import look_at
@@ -109,7 +109,7 @@ def look_first(photos: Path, out: Path, threads: int, json: bool) -> None:
     with Progress().stage("look") as progress:
         look, thumbs = look_at(photos, threads, progress)
     write_json(out / "look.json", look.summary())
-    write_look(look, thumbs, out / "look.html", photos.resolve().name)
+    page = write_page("page", lambda: write_look(look, thumbs, out / "look.html", photos.resolve().name))
     if json:
         print_json(look.summary())
         return
@@ -117,12 +117,13 @@ def look_first(photos: Path, out: Path, threads: int, json: bool) -> None:
     typer.echo(f"{len(look.photos)} photos, {look.groups[0]} hang together, {again} to look at again")
     for line in look.advice:
         typer.echo(f"  {line}")
-    typer.echo(f"page: {out / 'look.html'}")
+    if page:
+        typer.echo(f"page: {out / 'look.html'}")
 
 
 def write_report_of(out: Path, photos: Path) -> None:
     """Leave `out/report.html`; without the packages that it needs, say so."""
-    from wakewise.cli.console import Bars as Progress
+    from wakewise.cli.console import write_page
     from wakewise.extras import has, how_to_install
 
     if not has("reports"):
@@ -130,8 +131,7 @@ def write_report_of(out: Path, photos: Path) -> None:
         return
     from wakewise.reports.photo_model import write_model_report
 
-    with Progress().stage("report"):
-        write_model_report(out, photos)
+    write_page("report", lambda: write_model_report(out, photos))
 
 
 def scale_lines(model: Model) -> list[str]:

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from wakewise.cli.console import Bars, plain, print_json, print_table, shown
+from wakewise.cli.console import Bars, plain, print_json, print_table, shown, write_page
 from wakewise.cli.options import Json
 from wakewise.errors import InputError
 
@@ -113,14 +113,17 @@ def reproduce(
                 progress=progress,
             ),
         )
-    page = _write(tables, store, out, markdown)
+    pages: list[Path] = []
+    _keep(tables, out)
+    write_page("page", lambda: pages.append(_write(tables, store, out, markdown)))
     if json:
         told = {name: _told(table) for name, table in tables.items()}
         print_json(told[chosen[0]] if len(chosen) == 1 else {"tables": told})
         return
     for table in tables.values():
         show_table(table)
-    typer.echo(f"page: {page}")
+    for page in pages:
+        typer.echo(f"page: {page}")
 
 
 def seconds(option: str, text: str) -> float:
@@ -193,11 +196,15 @@ def _told(table: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _write(tables: dict[str, dict[str, Any]], store: Path, out: Path, markdown: bool) -> Path:
+def _keep(tables: dict[str, dict[str, Any]], out: Path) -> None:
     from wakewise.files import write_json
-    from wakewise.reports.reproduce import write_pages, write_results
 
     write_json(out / "results.json", {"tables": {name: _told(table) for name, table in tables.items()}})
+
+
+def _write(tables: dict[str, dict[str, Any]], store: Path, out: Path, markdown: bool) -> Path:
+    from wakewise.reports.reproduce import write_pages, write_results
+
     return write_results(tables, store, out) if markdown else write_pages(tables, store, out)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.cli.console import Bars, print_json, print_table, reasons_once, shown
+from wakewise.cli.console import Bars, no_report, print_json, print_table, reasons_once, shown
 from wakewise.cli.options import (
     Json,
     Out,
@@ -105,6 +105,7 @@ def scan(
     result = trial(resolved, folder, Bars(), print_json if json else partial(_print_figures, resolved))
     if not json:
         _say_trim(folder)
+    if no_report(result.report_fault) and not json:
         typer.echo(f"report: {result.report}")
 
 

@@ -15,7 +15,7 @@ from wakewise.files import write_text
 from wakewise.reports.methods_compared import methods_compared, price, profiles, won
 from wakewise.reports.page import fold, missing, plot, section, whole_page
 from wakewise.reports.trial_pictures import worst_panels
-from wakewise.reports.words import number
+from wakewise.reports.words import duration, number
 from wakewise.trials import UNITS
 
 PAGE = "campaign.html"
@@ -67,10 +67,10 @@ def campaign_page(found: Results, folder: Path, compare: str = "") -> str:
 
 def _head(found: Results, judged: Sequence[tuple[Measure, Glance]], compared: str) -> str:
     done, failed, total = found.count("done"), found.count("failed"), len(found.made)
-    hours = sum(one.took_s for one in found.made) / 3600.0
+    took = duration(sum(one.took_s or 0.0 for one in found.made))
     eyebrow = (
         f'<p class="eyebrow"><span>campaign <b>{escape(found.plan.name)}</b></span><span><b>{done}</b> of {total} '
-        f"trials, {failed} failed</span><span>{hours:.1f} h of trials</span></p>"
+        f"trials, {failed} failed</span><span>{took} of trials</span></p>"
     )
     cautions = []
     if done + failed < total:

@@ -20,28 +20,32 @@ def plot_degradation(rows: list[dict[str, Any]], title: str, unit: str, path: Pa
     figure = Figure(figsize=(6.4, 4.4), layout="constrained")
     FigureCanvasAgg(figure)
     error, share = figure.subplots(2, 1, sharex=True)
-    good = [row for row in rows if row["failure"] is None]
-    x = [row["level"] for row in good]
-    error.plot(x, [row["rmse_mm"] for row in good], "o-", color="#b2182b", label="RMSE")
-    error.plot(x, [row["accuracy_median_mm"] for row in good], "s--", color="#ef8a62", label="median error")
+    placed = [row for row in rows if row["level"] is not None]
+    good = [row for row in placed if row["failure"] is None]
+    for axes, key, scale, style, colour, label in (
+        (error, "rmse_mm", 1.0, "o-", "#b2182b", "RMSE"),
+        (error, "accuracy_median_mm", 1.0, "s--", "#ef8a62", "median error"),
+        (share, "completeness_pct", 1.0, "o-", "#2166ac", "completeness, 3 mm"),
+        (share, "completeness_visible_pct", 1.0, "s--", "#67a9cf", "of what was visible"),
+        (share, "registered_images", 100.0, "^:", "#4d4d4d", "photographs registered"),
+    ):
+        of = [row["images"] if scale > 1.0 else 1.0 for row in good]
+        points = [
+            (row["level"], scale * row[key] / n) for row, n in zip(good, of, strict=True) if row[key] is not None and n
+        ]
+        axes.plot([x for x, _ in points], [y for _, y in points], style, color=colour, label=label)
     error.set_ylabel("mm")
-    share.plot(x, [row["completeness_pct"] for row in good], "o-", color="#2166ac", label="completeness, 3 mm")
-    share.plot(
-        x, [row["completeness_visible_pct"] for row in good], "s--", color="#67a9cf", label="of what was visible"
-    )
-    registered = [100.0 * (row["registered_images"] or 0) / row["images"] for row in good]
-    share.plot(x, registered, "^:", color="#4d4d4d", label="photographs registered")
     share.set_ylabel("%")
     share.set_ylim(0.0, 103.0)
     share.set_xlabel(f"{title}, {unit}")
     for axes in (error, share):
-        for row in rows:
+        for row in placed:
             if row["failure"] is not None:
                 axes.axvline(row["level"], color="k", lw=1.0, ls="-.", label="no model")
         axes.grid(alpha=0.3)
         axes.legend(fontsize=8, frameon=False)
-    error.set_ylim(0.0, 1.15 * max((row["rmse_mm"] for row in good), default=1.0))
-    steps = [row["level"] for row in rows if row["level"] > 0.0]
+    error.set_ylim(0.0, 1.15 * max((row["rmse_mm"] for row in good if row["rmse_mm"] is not None), default=1.0))
+    steps = [row["level"] for row in placed if row["level"] > 0.0]
     if len(steps) > 2 and max(steps) > LOG_FROM * min(steps):
         share.set_xscale("symlog", linthresh=min(steps))
     if steps:

@@ -48,7 +48,7 @@ def draw_gentle(result: Mapping[str, Any], path: Path) -> None:
             if (row := result["scenarios"][name]["methods"].get(method)) and row["target_speed_mean_m_s"]
         ]
         for place, _, ends in drawn:
-            if ends is not None:
+            if ends is not None and None not in ends:
                 axes.plot(
                     [1e3 * max(end, 1e-5) for end in ends], [place, place], color=colour, linewidth=1.0, alpha=0.5
                 )
@@ -65,7 +65,7 @@ def draw_gentle(result: Mapping[str, Any], path: Path) -> None:
     axes.tick_params(labelsize=8, colors=INK, which="both")
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
-    if names:
+    if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=8, frameon=False, ncols=3)
     with whole_file(path) as temporary:
         figure.savefig(temporary, dpi=150)

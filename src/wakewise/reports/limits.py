@@ -9,7 +9,7 @@ from html import escape
 
 from wakewise.operation.lattice_water import CELL_M
 from wakewise.operation.worlds.makers import WORLDS, flow_name
-from wakewise.reports.page import fold, missing, section
+from wakewise.reports.page import fold, missing, prose, section
 from wakewise.reports.trial import Trial
 from wakewise.tank.limits import ABSENT, limits_table
 
@@ -54,7 +54,7 @@ def _water_html(trial: Trial) -> str:
     flow = flow_name(trial.settings)
     if flow == "tank":
         return _tank_html()
-    return f"<p>{escape(_OTHERS[flow])}</p>" if flow in WORLDS else _from_outside(flow)
+    return f"<p>{prose(_OTHERS[flow])}</p>" if flow in WORLDS else _from_outside(flow)
 
 
 def _from_outside(said: str) -> str:
@@ -70,7 +70,7 @@ def _tank_html() -> str:
         '<th class="num">reached</th><th>what it means for a claim</th></tr></thead>'
         f"<tbody>{''.join(map(_row, rows))}</tbody></table>"
     )
-    absent = "".join(f"<li>{escape(line)}</li>" for line in ABSENT)
+    absent = "".join(f"<li>{prose(line)}</li>" for line in ABSENT)
     return fold("Laws it is held against", table, f"{missed} of {len(rows)} missed, these first") + fold(
         "What it has not at all", f"<ul>{absent}</ul>", f"{len(ABSENT)} things"
     )
@@ -79,7 +79,7 @@ def _tank_html() -> str:
 def _row(row: Mapping[str, str]) -> str:
     said = '<span class="kept">kept</span>' if row["met"] == "yes" else '<strong class="missed">missed</strong>'
     return (
-        f"<tr><td>{said}</td><td><b>{escape(row['name'])}</b><br>{escape(row['law'])} "
+        f"<tr><td>{said}</td><td><b>{escape(row['name'])}</b><br>{prose(row['law'])} "
         f'<span class="null">({escape(row["source"])})</span></td><td class="num">{escape(row["asked"])}</td>'
-        f'<td class="num">{escape(row["reached"])}</td><td class="text">{escape(row["means"])}</td></tr>'
+        f'<td class="num">{escape(row["reached"])}</td><td class="text">{prose(row["means"])}</td></tr>'
     )

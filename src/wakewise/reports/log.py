@@ -14,7 +14,9 @@ from wakewise.files import write_text
 from wakewise.links.logs.folder import FACTS, PAGE, STEPS
 from wakewise.reports import log_plots
 from wakewise.reports.page import missing, plot, section, tile, whole_page
-from wakewise.reports.words import number
+from wakewise.reports.words import NONE, fixed, number, shown
+
+_END = {True: "within a record", False: "after a whole record", None: NONE}
 
 
 def write_log_page(folder: Path, names: Sequence[str]) -> Path:
@@ -56,15 +58,14 @@ def _headline(facts: dict[str, Any]) -> str:
         f"Wash is D, the weighted sum of squared speeds at points {escape(facts['points'])}, by the wake model "
         f"{escape(facts['wake_model'])}; the same forces and moments, shared among the thrusters otherwise."
     )
-    bad = facts["bad_records"]
     depth, volts = facts["depth_max_m"], facts["voltage_min_V"]
     tiles = (
         tile("recorded", number(facts["duration_s"]), "s", f"armed {number(facts['armed_s'])} s")
         + tile("records", number(facts["records"]), "", "whole")
-        + tile("bad records", number(bad), "", _reasons(facts))
-        + tile("deepest", "–" if depth is None else f"{depth:.2f}", "" if depth is None else "m", _source(facts))
-        + tile("battery", "–" if volts is None else f"{volts:.1f}", "" if volts is None else "V", "at its lowest")
-        + tile("spared", "–" if saved is None else number(saved), "" if saved is None else "%", "of D as flown")
+        + tile("bad records", number(facts["bad_records"]), "", _reasons(facts))
+        + tile("deepest", fixed(depth, 2), "" if depth is None else "m", _source(facts))
+        + tile("battery", fixed(volts, 1), "" if volts is None else "V", "at its lowest")
+        + tile("spared", number(saved), "" if saved is None else "%", "of D as flown")
     )
     return (
         f'<p class="eyebrow">{eyebrow}</p><h1><span class="mark"></span>{escape(said)}</h1><p class="why">{why}</p>'
@@ -79,7 +80,7 @@ def _source(facts: dict[str, Any]) -> str:
 def _reasons(facts: dict[str, Any]) -> str:
     if not facts["bad_by_reason"]:
         return "none"
-    return ", ".join(f"{reason}: {count}" for reason, count in facts["bad_by_reason"].items())
+    return ", ".join(f"{reason}: {shown(count)}" for reason, count in facts["bad_by_reason"].items())
 
 
 def _dive(rows: pl.DataFrame, facts: dict[str, Any]) -> str:
@@ -120,7 +121,7 @@ def _spared(rows: pl.DataFrame, facts: dict[str, Any], names: Sequence[str]) -> 
     why = facts.get("why_no_hindsight") or ("" if facts["running_s"] else "no thruster ran while this was recorded")
     if why:
         return section("spared", title, lead, missing("what was to be spared", why))
-    reversed_ = [str(i) for i, d in enumerate(facts["directions"], start=1) if d < 0]
+    reversed_ = [str(i) for i, d in enumerate(facts["directions"], start=1) if d is not None and d < 0]
     turned = f" Motors {', '.join(reversed_)} run the other way (MOT_n_DIRECTION)." if reversed_ else ""
     lead = (
         "At each instant the flown pulses make a force and a moment. Least thrusts make the same with the smallest "
@@ -149,14 +150,16 @@ def _spared(rows: pl.DataFrame, facts: dict[str, Any], names: Sequence[str]) -> 
 
 
 def _file(facts: dict[str, Any]) -> str:
-    jumps = [f"{jump['step_s']:+.1f} s at {jump['time_s']:.1f} s" for jump in facts["clock_jumps"]]
+    jumps = [
+        f"{fixed(jump['step_s'], 1, sign=True)} s at {fixed(jump['time_s'], 1)} s" for jump in facts["clock_jumps"]
+    ]
     told = [
-        ("records", f"{facts['records']} whole, {facts['bad_records']} bad ({_reasons(facts)})"),
-        ("bytes in bad ones", str(facts["bad_bytes"])),
-        ("end of the file", "within a record" if facts["cut_short"] else "after a whole record"),
+        ("records", f"{shown(facts['records'])} whole, {shown(facts['bad_records'])} bad ({_reasons(facts)})"),
+        ("bytes in bad ones", shown(facts["bad_bytes"])),
+        ("end of the file", _END[facts["cut_short"]]),
         ("jumps of the clock", ", ".join(jumps[:8]) + (" …" if len(jumps) > 8 else "") or "none"),
-        ("parameters", f"{facts['parameters']}, in parameters.csv"),
-        ("samples", ", ".join(f"{name} {count}" for name, count in facts["samples"].items())),
+        ("parameters", f"{shown(facts['parameters'])}, in parameters.csv"),
+        ("samples", ", ".join(f"{name} {shown(count)}" for name, count in facts["samples"].items())),
     ]
     listed = "".join(f"<dt>{name}</dt><dd>{escape(value)}</dd>" for name, value in told)
     lead = "A bad record is a packet whose checksum is wrong, or a stretch of bytes that is no record."

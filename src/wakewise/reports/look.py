@@ -10,6 +10,10 @@ from wakewise.files import write_text
 from wakewise.reconstruction.look import Look, PhotoLook
 from wakewise.reports.ink import data_uri
 from wakewise.reports.page import fold, section, tile, whole_page
+from wakewise.reports.words import fixed, shown
+
+MOST_BAD = 0.1
+"""Share of the photographs to look at again up to which a dive is fair, and not bad."""
 
 
 def write_look(look: Look, thumbs: Mapping[str, bytes], path: Path, title: str) -> None:
@@ -28,28 +32,32 @@ def look_page(look: Look, thumbs: Mapping[str, bytes], title: str) -> str:
     bad = [photo for photo in look.photos if photo.faults]
     good = [photo for photo in look.photos if not photo.faults]
     count = len(look.photos)
-    whole = len([size for size in look.groups if size > 1]) == 1 and look.groups[0] >= 0.9 * count
-    state = "good" if whole and len(bad) <= 0.1 * count else "bad"
+    sizes = [size for size in look.groups if size is not None]
+    together = max(sizes, default=None)
+    whole = together is not None and sum(size > 1 for size in sizes) == 1 and together >= 0.9 * count
+    state = "bad" if not whole or len(bad) > MOST_BAD * count else "fair" if bad else "good"
     headline = (
         f"{len(bad)} of {count} photographs to look at again" if bad else f"{count} photographs, nothing to shoot again"
     )
     if not whole:
-        headline = f"The photographs do not hang together: {look.groups[0]} of {count} do"
+        headline = f"The photographs do not hang together: {shown(together)} of {count} do"
     partners = sorted(len(photo.partners) for photo in look.photos)[count // 2]
-    covered = sorted(photo.covered_pct for photo in look.photos)[count // 2]
+    shares = sorted(photo.covered_pct for photo in look.photos if photo.covered_pct is not None)
+    covered = shares[len(shares) // 2] if shares else None
     blurred = sum(any("blurred" in fault for fault in photo.faults) for photo in look.photos)
     light = sum(any("dark" in f or "burnt" in f for f in photo.faults) for photo in look.photos)
+    first = look.photos[0]
     tiles = (
-        tile("photographs", str(count), "", f"{look.photos[0].width} x {look.photos[0].height} px")
-        + tile("hang together", str(look.groups[0]), f"of {count}", "by their overlap", "ok" if whole else "off")
+        tile("photographs", str(count), "", f"{shown(first.width)} x {shown(first.height)} px")
+        + tile("hang together", shown(together), f"of {count}", "by their overlap", "ok" if whole else "off")
         + tile("partners each", str(partners), "", "photos that overlap it, median", "ok" if partners >= 4 else "off")
-        + tile("covered", f"{covered:.0f}", "%", "of a photo is in two others, median")
+        + tile("covered", fixed(covered, 0), "%", "of a photo is in two others, median")
         + tile("blurred", str(blurred), "", "of them", "ok" if blurred == 0 else "off")
         + tile("light", str(light), "", "too dark or burnt out", "ok" if light == 0 else "off")
     )
     advice = "".join(f"<li>{escape(line)}</li>" for line in look.advice)
     again = f"<ul>{advice}</ul>" if advice else "<p>Nothing stands out. Go on.</p>"
-    others = ", ".join(f"{n} of {kind}" for kind, n in look.passed_over.items())
+    others = ", ".join(f"{shown(n)} of {kind}" for kind, n in look.passed_over.items())
     if others:
         again += f"<p>Files that are not read: {escape(others)}.</p>"
     sheets = ""
@@ -65,7 +73,7 @@ def look_page(look: Look, thumbs: Mapping[str, bytes], title: str) -> str:
                   "worse.", again)
         + section("photos", "Every photograph", "Sharpness is in percent of the usual one of this set, and shared "
                   "what two or more other photographs show too.", sheets)
-        + f"</main><footer><p>{look.pairs} pairs were compared.</p></footer>"
+        + f"</main><footer><p>{shown(look.pairs)} pairs were compared.</p></footer>"
     )  # fmt: skip
     return whole_page(f"{title} · a look", body)
 
@@ -78,19 +86,22 @@ def _photo(photo: PhotoLook, thumb: bytes) -> str:
     source = data_uri(thumb, "image/jpeg")
     short = photo.faults[0].split(":")[0] if photo.faults else ""
     tag = f'<span class="tag worst">{escape(short)}</span>' if short else ""
-    best = f"best with {photo.partners[0][0]} ({photo.partners[0][1]} matches)" if photo.partners else "no partner"
+    best = (
+        f"best with {photo.partners[0][0]} ({shown(photo.partners[0][1])} matches)" if photo.partners else "no partner"
+    )
+    sharp, shared = fixed(photo.sharpness_pct, 0), fixed(photo.covered_pct, 0)
     said = [
         photo.name,
-        f"sharpness {photo.sharpness_pct:.0f} %",
-        f"mean grey {photo.mean:.0f}",
-        f"{photo.dark_pct:.0f} % black, {photo.bright_pct:.0f} % white",
+        f"sharpness {sharp} %",
+        f"mean grey {fixed(photo.mean, 0)}",
+        f"{fixed(photo.dark_pct, 0)} % black, {fixed(photo.bright_pct, 0)} % white",
         f"{len(photo.partners)} partners, {best}",
-        f"{photo.covered_pct:.0f} % shared",
+        f"{shared} % shared",
         *photo.faults,
     ]
     facts = (
-        f"<b>{escape(photo.name)}</b><span>sharp {photo.sharpness_pct:.0f} %</span>"
-        f"<span>{len(photo.partners)} partners</span><span>shared {photo.covered_pct:.0f} %</span>"
+        f"<b>{escape(photo.name)}</b><span>sharp {sharp} %</span>"
+        f"<span>{len(photo.partners)} partners</span><span>shared {shared} %</span>"
     )
     words = escape(" · ".join(said), quote=True)
     return (

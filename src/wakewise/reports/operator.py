@@ -83,7 +83,7 @@ def _panel(axes: Axes, lines: Mapping[str, Mapping[str, Mapping[str, Any]]], wor
         "velocity deviation, %   (large: all flights at w_track 5; lines: by w_track)", fontsize=8.5, color=INK
     )
     axes.tick_params(labelsize=8, colors=INK)
-    if most > 0.0:
+    if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=8, frameon=False, loc="lower right")
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)

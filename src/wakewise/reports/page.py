@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from html import escape
 from importlib import resources
@@ -13,6 +14,8 @@ from matplotlib.figure import Figure
 from wakewise.reports.ink import ERROR_LIMIT_MM, ERROR_STOPS, OVER_LIMIT, css_gradient, inline_svg
 from wakewise.reports.trial import Trial
 from wakewise.reports.views import View
+
+_CODE = re.compile(r"`([^`]+)`")
 
 
 def whole_page(title: str, body: str) -> str:
@@ -40,9 +43,14 @@ def plot(figure: Figure | None, title: str, caption: str, absent: str = "", narr
     return f'<figure class="plot">{svg}<figcaption>{caption}</figcaption></figure>'
 
 
+def prose(text: str) -> str:
+    """Words as HTML: what is code between backticks is set as code."""
+    return _CODE.sub(r"<code>\1</code>", escape(text))
+
+
 def missing(what: str, why: str) -> str:
     """An honest gap."""
-    return f'<p class="missing"><b>{escape(what[:1].upper() + what[1:])}</b> cannot be shown: {escape(why)}.</p>'
+    return f'<p class="missing"><b>{escape(what[:1].upper() + what[1:])}</b> cannot be shown: {prose(why)}.</p>'
 
 
 def absence(trial: Trial, *parts: str) -> str:

@@ -14,7 +14,7 @@ from wakewise.reports.draft import Draft
 from wakewise.reports.limits import limits_section
 from wakewise.reports.looks import colours_html, film_html
 from wakewise.reports.model import before_colours, before_mesh, model_section
-from wakewise.reports.page import absence, fold, missing, plot, section, tile, whole_page
+from wakewise.reports.page import absence, fold, missing, plot, prose, section, tile, whole_page
 from wakewise.reports.photos import contact_sheet
 from wakewise.reports.scene3d import vehicle_of
 from wakewise.reports.trial import Trial, read_trial
@@ -95,7 +95,7 @@ def report_page(trial: Trial, draft: Draft | None = None) -> str:
 def _headline(trial: Trial) -> str:
     said = verdict(trial, named=True)
     state = {True: "good", False: "bad", None: ""}[said.good]
-    reasons = "".join(f'<p class="why">{escape(line)}</p>' for line in said.reasons)
+    reasons = "".join(f'<p class="why">{prose(line)}</p>' for line in said.reasons)
     facts = [("trial", trial.name), ("method", trial.method), ("seed", trial.seed)]
     facts += [(key, str(trial.scenario[key])) for key in ("vehicle",) if trial.scenario.get(key)]
     eyebrow = "".join(f"<span>{name} <b>{escape(value)}</b></span>" for name, value in facts)
@@ -272,13 +272,13 @@ def _figures(trial: Trial) -> str:
 def _row(trial: Trial, key: str, told: set[str]) -> str:
     """One figure; `told` are the reasons that the rows above have given, which are not given again."""
     metrics = trial.metrics
-    value, text = metrics.values[key], escape(str(metrics.definitions.get(key, "")))
+    value, text = metrics.values[key], prose(str(metrics.definitions.get(key, "")))
     cell = '<span class="null">–</span>' if value is None else escape(shown(value))
     if value is None:
         why = str(metrics.why.get(key, "no reason was given"))
         said = "not computed, for the reason above" if why in told else f"not computed: {why}"
         told.add(why)
-        text = f'{text}{"<br>" if text else ""}<span class="why-null">{escape(said)}</span>'
+        text = f'{text}{"<br>" if text else ""}<span class="why-null">{prose(said)}</span>'
     return (
         f'<tr><td class="key">{escape(key)}</td><td class="num">{cell}</td><td class="unit">'
         f'{escape(unit(metrics, key))}</td><td class="text">{text}</td></tr>'

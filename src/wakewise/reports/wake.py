@@ -10,6 +10,7 @@ from typing import Any
 from wakewise.files import write_text
 from wakewise.reports.page import missing, plot, section, tile, whole_page
 from wakewise.reports.wake_plots import decays, profiles, scatters
+from wakewise.reports.words import NONE, fixed, number, shown
 from wakewise.studies.wake_validation import WakeValidation
 
 _GOOD, _FAIR = 0.9, 0.5
@@ -73,14 +74,12 @@ def _headline(values: Mapping[str, Any]) -> str:
         tiles += _tiles_of(best, values["models"][best][name], _SEEN.get(name, name))
     seen = _SEEN.get(name, name)
     tiles += [
-        tile("paper claims", f"{paper['r2_core']:g}", "", f"R2 in A, {paper['r2_wake']:g} in B"),
+        tile("paper claims", number(paper["r2_core"]), "", f"R2 in A, {number(paper['r2_wake'])} in B"),
         tile("as printed, A", _floored(printed["r2_core"]), "", f"R2 against the {seen}", "off"),
         tile("as printed, B", _floored(printed["r2_wake"]), "", f"R2 against the {seen}", "off"),
     ]
     grid = values["grid_convergence_pct"]
-    tiles.append(
-        tile("two grids", "—" if grid is None else f"{grid:.1f}", "%", "change of the lattice's speed at 0.3 m")
-    )
+    tiles.append(tile("two grids", fixed(grid, 1), "%", "change of the lattice's speed at 0.3 m"))
     lines.append(
         "As printed, the paper's formula does not describe a thruster's jet."
         if _literal_fails(values)
@@ -133,8 +132,8 @@ def _table(result: WakeValidation, values: Mapping[str, Any]) -> str:
     paper = values["paper"]
     tables = ""
     captions = {
-        "r2_core": f"R2 in region A: |theta| &lt; 15°, 0.1–0.3 m (the paper: {paper['r2_core']:g})",
-        "r2_wake": f"R2 in region B: |theta| &lt; 30°, 0.1–0.5 m (the paper: {paper['r2_wake']:g})",
+        "r2_core": f"R2 in region A: |theta| &lt; 15°, 0.1–0.3 m (the paper: {number(paper['r2_core'])})",
+        "r2_wake": f"R2 in region B: |theta| &lt; 30°, 0.1–0.5 m (the paper: {number(paper['r2_wake'])})",
         "bias_far_pct": "bias beyond 0.4 m on the axis side (|theta| &lt; 15°), in % of what is measured",
     }
     for key, caption in captions.items():
@@ -163,7 +162,8 @@ def _plainly(values: Mapping[str, Any]) -> str:
     for name, cell in values["models"]["paper"].items():
         if cell["r2_core"] is None or cell["r2_core"] >= _FAIR:
             continue
-        far = "" if cell["bias_far_pct"] is None else f", {cell['bias_far_pct']:+.0f} % beyond 0.4 m"
+        bias = cell["bias_far_pct"]
+        far = "" if bias is None else f", {fixed(bias, 0, sign=True)} % beyond 0.4 m"
         gain = values["models"]["paper-calibrated"][name]["r2_core"]
         then = (
             "" if gain is None else f" With its gain fitted it reaches {_number(gain)} in A: the shape is not a jet's."
@@ -177,9 +177,11 @@ def _plainly(values: Mapping[str, Any]) -> str:
 def _value(cell: Mapping[str, Any], key: str) -> str:
     value = cell[key]
     if value is None:
-        return f'<td class="num"><span class="null" title="{escape(cell.get("why", {}).get(key, ""))}">—</span></td>'
+        return (
+            f'<td class="num"><span class="null" title="{escape(cell.get("why", {}).get(key, ""))}">{NONE}</span></td>'
+        )
     if key == "bias_far_pct":
-        return f'<td class="num">{value:+.0f}</td>'
+        return f'<td class="num">{fixed(value, 0, sign=True)}</td>'
     bold = ' style="font-weight:650;color:var(--good)"' if value >= _GOOD else ""
     poor = ' style="color:var(--bad)"' if value < _FAIR else ""
     return f'<td class="num"{bold or poor}>{_number(value)}</td>'
@@ -187,7 +189,7 @@ def _value(cell: Mapping[str, Any], key: str) -> str:
 
 def _number(value: float | None) -> str:
     if value is None:
-        return "—"
+        return NONE
     return f"{value:.3f}" if value > -1 else f"{value:.1f}" if value > -100 else f"{value:.0f}"
 
 
@@ -237,7 +239,7 @@ def _numbers(values: Mapping[str, Any]) -> str:
             found = cell.get("parameters", {})
             if not found:
                 continue
-            shown = (f"{name} {round(each['value'], 9):.3g}{_interval(each)}" for name, each in found.items())
+            shown = (f"{name} {_three(each['value'])}{_interval(each)}" for name, each in found.items())
             words = ", ".join(shown)
             notes = "; ".join(cell.get("warnings", []))
             rows += f"<tr><td>{model}</td><td>{escape(flow)}</td><td>{escape(words)}</td>"
@@ -253,7 +255,11 @@ def _numbers(values: Mapping[str, Any]) -> str:
 def _interval(figure: Mapping[str, Any]) -> str:
     if figure["low"] is None:
         return ""
-    return f" ({round(figure['low'], 9):.3g} to {round(figure['high'], 9):.3g})"
+    return f" ({_three(figure['low'])} to {_three(figure['high'])})"
+
+
+def _three(value: float | None) -> str:
+    return NONE if value is None else f"{round(value, 9):.3g}"
 
 
 def _piv(values: Mapping[str, Any]) -> str:
@@ -262,8 +268,8 @@ def _piv(values: Mapping[str, Any]) -> str:
         return section("piv", "Virtual PIV", "", missing("the round trip", values["why"].get("piv", "not run")))
     rows = "".join(
         f"<tr><td>{escape(t['engine'])}</td><td>{escape(t['field'])}</td>"
-        f'<td class="num">{t["median_px"]:.4f}</td><td class="num">{t["rms_px"]:.3f}</td>'
-        f'<td class="num">{t["bias_px"]:+.4f}</td><td class="num">{t["valid_pct"]:.1f}</td></tr>'
+        f'<td class="num">{fixed(t["median_px"], 4)}</td><td class="num">{fixed(t["rms_px"], 3)}</td>'
+        f'<td class="num">{fixed(t["bias_px"], 4, sign=True)}</td><td class="num">{fixed(t["valid_pct"], 1)}</td></tr>'
         for t in trips
     )
     table = (
@@ -276,10 +282,11 @@ def _piv(values: Mapping[str, Any]) -> str:
         words = missing("the real pairs", values["why"].get("piv.real_pairs", "not there"))
     else:
         gap = real["disagreement_px"]
-        both = "" if gap is None else f" The two engines differ by {gap:.2f} px (median) where the jet is fast."
+        both = "" if gap is None else f" The two engines differ by {fixed(gap, 2)} px (median) where the jet is fast."
         words = (
-            f"<p>{real['pairs']} real pairs of a round jet, by {escape(real['engine'])}: {real['valid_pct']:.0f} % of "
-            f"the vectors kept, the fastest move {real['fastest_px']:.1f} px, {real['along_jet_pct']:.0f} % of the "
+            f"<p>{shown(real['pairs'])} real pairs of a round jet, by {escape(real['engine'])}: "
+            f"{fixed(real['valid_pct'], 0)} % of the vectors kept, the fastest move {fixed(real['fastest_px'], 1)} px, "
+            f"{fixed(real['along_jet_pct'], 0)} % of the "
             f"fast ones along the jet.{both} They come without scale and time: nothing can be said of speed.</p>"
         )
     lead = (
@@ -292,8 +299,8 @@ def _piv(values: Mapping[str, Any]) -> str:
 def _flows(values: Mapping[str, Any]) -> str:
     rows = "".join(
         f"<tr><td>{escape(name)}</td><td>{escape(flow['title'])}</td><td class='text'>{escape(flow['note'])}</td>"
-        f"<td class='text'>{escape(flow['split'])}</td><td class='num'>{flow['points']}</td>"
-        f"<td class='num'>{flow['test_points']}</td></tr>"
+        f"<td class='text'>{escape(flow['split'])}</td><td class='num'>{shown(flow['points'])}</td>"
+        f"<td class='num'>{shown(flow['test_points'])}</td></tr>"
         for name, flow in values["flows"].items()
     )
     absent = {

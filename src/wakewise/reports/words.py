@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from wakewise.evaluation.surface import SUCCESS_COMPLETENESS_PCT, SUCCESS_RMSE_MM
 from wakewise.reports.trial import Metrics, Trial
 
 THIN_SPACE = "\u202f"
+NONE = "–"
+"""What stands in the place of a figure that there is none of."""
 
 # Endings of keys, longest first where one contains another.
 _UNITS = (
@@ -98,8 +101,14 @@ def _sentence(text: str) -> str:
     return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
 
 
-def number(value: float, digits: int = 3) -> str:
-    """A number with three significant digits, thin spaces between thousands, no needless zeros or exponents."""
+def number(value: float | None, digits: int = 3, scale: float = 1.0) -> str:
+    """`scale` times a number with three significant digits, thin spaces between thousands, no needless exponents.
+
+    A dash where there is none: None, NaN or infinity.
+    """
+    if value is None or not math.isfinite(value):
+        return NONE
+    value = scale * value
     if value == 0:
         return "0"
     if float(value).is_integer() and abs(value) >= 1000:
@@ -118,8 +127,26 @@ def number(value: float, digits: int = 3) -> str:
     return f"{int(value)}" if float(value).is_integer() else text
 
 
+def fixed(value: float | None, places: int, *, scale: float = 1.0, sign: bool = False) -> str:
+    """`scale` times a number with so many decimals, and with its sign where `sign`; a dash where there is none."""
+    if value is None or not math.isfinite(value):
+        return NONE
+    return f"{round(scale * value, places) + 0.0:{'+' if sign else ''}.{places}f}"
+
+
+def duration(seconds: float | None) -> str:
+    """A time in the unit that people would say: 40 s, 12 min, 3.5 h."""
+    if seconds is None or not math.isfinite(seconds):
+        return NONE
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5700.0 else f"{seconds / 3600.0:.1f} h"
+
+
 def shown(value: object) -> str:
-    """A figure as text: numbers by `number`, yes and no for truth values."""
+    """A figure as text: numbers by `number`, yes and no for truth values, a dash where there is none."""
+    if value is None:
+        return NONE
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, int | float):

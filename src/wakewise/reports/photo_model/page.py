@@ -19,7 +19,7 @@ from wakewise.reports.page import chip, fold, missing, plot, scene_box, section,
 from wakewise.reports.photo_model.rows import facts_list, table_row
 from wakewise.reports.photo_model.scale import scale_section, scale_tile
 from wakewise.reports.photo_model.scene import model_scene
-from wakewise.reports.words import number
+from wakewise.reports.words import NONE, fixed, number, shown
 
 PARTS = (
     ("model", "Model"),
@@ -64,8 +64,8 @@ def model_page(name: str, figures: dict[str, Any], facts: ModelFacts, scene: str
 
 
 def _headline(name: str, figures: dict[str, Any]) -> str:
-    doubts = figures["doubts"]
-    images, placed = figures["images"], figures["registered_images"]
+    doubts = figures.get("doubts") or []
+    images, placed = _count(figures.get("images")), _count(figures.get("registered_images"))
     said = "The model is doubtful" if doubts else f"A sound model of {placed} of {images} photographs"
     reasons = "".join(f'<p class="why">{escape(line)}</p>' for line in doubts)
     return (
@@ -76,35 +76,35 @@ def _headline(name: str, figures: dict[str, Any]) -> str:
 
 
 def _tiles(figures: dict[str, Any]) -> str:
-    placed, images = figures["registered_images"], figures["images"]
+    placed, images = figures.get("registered_images"), figures.get("images")
     spacing = figures.get("point_spacing_mm")
     dense = figures.get("dense_points")
     faces = figures.get("mesh_faces")
     note = "apart: no scale" if spacing is None else f"{number(spacing, 2)} mm apart"
     surface = "not asked for" if faces is None else "triangles"
-    cut = f"mean; {figures['reprojection_uncut_px']:.2f} before {figures['cut_pct']:.0f} % was cut"
+    uncut, cut = fixed(figures.get("reprojection_uncut_px"), 2), fixed(figures.get("cut_pct"), 0)
+    state = "" if placed is None or images is None else "ok" if placed == images else "off"
     return (
-        tile("photographs placed", str(placed), f"of {images}", "have a place in the model", _state(placed == images))
-        + tile("error", f"{figures['reprojection_px']:.2f}", "px", cut)
+        tile("photographs placed", _count(placed), f"of {_count(images)}", "have a place in the model", state)
+        + tile("error", fixed(figures.get("reprojection_px"), 2), "px", f"mean; {uncut} before {cut} % was cut")
         + scale_tile(figures)
-        + tile("sparse points", _count(figures["points"]), "", f"in {figures['track_length']:.1f} photos each")
-        + tile("dense points", "–" if dense is None else _count(dense), "", "not asked for" if dense is None else note)
-        + tile("surface", "–" if faces is None else _count(faces), "", surface)
+        + tile("sparse points", _count(figures.get("points")), "",
+               f"in {fixed(figures.get('track_length'), 1)} photos each")
+        + tile("dense points", _count(dense), "", "not asked for" if dense is None else note)
+        + tile("surface", _count(faces), "", surface)
     )  # fmt: skip
 
 
-def _state(good: bool) -> str:
-    return "ok" if good else "off"
-
-
-def _count(value: int) -> str:
+def _count(value: int | None) -> str:
+    if value is None:
+        return NONE
     return f"{value:,}".replace(",", " ") if value < 1_000_000 else f"{value / 1e6:.2f} M"
 
 
 def _model(figures: dict[str, Any], facts: ModelFacts, scene: str | None) -> str:
     lead = (
         "Turn it by dragging, come nearer by the wheel. Surface, points and photographs can be switched in the scene's "
-        f"tree. Its cameras were found {figures['mapping']}."
+        f"tree. Its cameras were found {figures.get('mapping') or 'in a way that is not on record'}."
     )
     placed = sum(photo.p_WC is not None for photo in facts.photos)
     legend = chip("#d9562b", f"{placed} photographs") + chip("#8fa0a6", f"{_count(len(facts.points))} sparse points")
@@ -146,7 +146,7 @@ def match_figure(matches: IntArray) -> Figure | None:
 
 
 def _photos(figures: dict[str, Any], facts: ModelFacts) -> str:
-    left = {one["name"]: one for one in figures["left_out"]}
+    left = {one["name"]: one for one in figures.get("left_out") or []}
     head = table_row(
         ("photograph", "place", "features", "points seen", "error", "partners", "focal length"), "th", "tlrrrrr"
     )
@@ -156,10 +156,11 @@ def _photos(figures: dict[str, Any], facts: ModelFacts) -> str:
         place = "yes"
         if photo.p_WC is None:
             best = left.get(photo.name)
-            place = f"none; {best['matches']} matches with {best['partner']}" if best and best["partner"] else "none"
-        error = "–" if photo.error_px is None else f"{photo.error_px:.2f} px"
-        cells = (photo.name, place, str(photo.features), str(photo.observations), error, str(partners),
-                 f"{photo.focal_px:.0f} px")  # fmt: skip
+            found = best is not None and best["partner"]
+            place = f"none; {_count(best['matches'])} matches with {best['partner']}" if best and found else "none"
+        error = f"{fixed(photo.error_px, 2)} px"
+        cells = (photo.name, place, _count(photo.features), _count(photo.observations), error, str(partners),
+                 f"{fixed(photo.focal_px, 0)} px")  # fmt: skip
         rows.append(table_row(cells, "td", "tlrrrrr"))
     table = f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody></table>"
     lead = "Errors are means over the sparse points that a photograph sees, each point's over all that see it."
@@ -168,35 +169,37 @@ def _photos(figures: dict[str, Any], facts: ModelFacts) -> str:
 
 
 def _cut(figures: dict[str, Any]) -> str:
+    before, after = fixed(figures.get("reprojection_uncut_px"), 2), fixed(figures.get("reprojection_px"), 2)
+    left = (str(one["name"]) for one in (figures.get("left_out") or [])[:20])
+    models = (f"{_count(count)} photos" for count in figures.get("sub_models") or [])
+    others = (f"{_count(n)} of {kind}" for kind, n in (figures.get("passed_over") or {}).items())
+    cut = fixed(figures.get("cut_pct"), 1)
     rows = [
-        ("observations cut", f"{figures['cut_pct']:.1f} %, error {figures['reprojection_uncut_px']:.2f} px before and "
-         f"{figures['reprojection_px']:.2f} px after"),
-        ("photographs without a place", ", ".join(one["name"] for one in figures["left_out"][:20]) or "none"),
-        ("copies left out", str(figures["duplicates"])),
-        ("models that came about", ", ".join(f"{count} photos" for count in figures["sub_models"]) or "–"),
-        ("files not read", ", ".join(f"{n} of {kind}" for kind, n in figures["passed_over"].items()) or "none"),
-    ]  # fmt: skip
+        ("observations cut", f"{cut} %, error {before} px before and {after} px after"),
+        ("photographs without a place", ", ".join(left) or "none"),
+        ("copies left out", _count(figures.get("duplicates"))),
+        ("models that came about", ", ".join(models) or NONE),
+        ("files not read", ", ".join(others) or "none"),
+    ]
     return section(
         "cut", "What was cut", "What the model rests on no longer, and why it may be missed.", facts_list(rows)
     )
 
 
 def _figures(figures: dict[str, Any]) -> str:
-    why = figures.get("why", {})
+    why = figures.get("why") or {}
     rows = ""
     for key, value in figures.items():
         if isinstance(value, (dict, list)) or key == "why":
             continue
-        said = why.get(key, "no reason was given") if value is None else _plain(value)
+        said = str(why.get(key) or "no reason was given") if value is None else _plain(value)
         kind = "" if value is None else ' class="num"'
         rows += f'<tr><td class="key">{escape(key)}</td><td{kind}>{escape(said)}</td></tr>'
-    stages = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in figures["stages_s"].items())
+    stages = ", ".join(f"{name} {fixed(took, 0)} s" for name, took in (figures.get("stages_s") or {}).items())
     table = f'<table class="main"><tbody>{rows}</tbody></table>'
     lead = f"As in reconstruction.json. Stages took: {stages}."
     return section("figures", "All figures", escape(lead), fold("All figures", table))
 
 
 def _plain(value: Any) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return number(value) if isinstance(value, float) else str(value)
+    return shown(value) if isinstance(value, bool | float) else str(value)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
 
 
-def facts_list(rows: list[tuple[str, str]]) -> str:
+def facts_list(rows: Sequence[tuple[str, str]]) -> str:
     """Names and values, one below the other."""
     return f'<dl class="facts">{"".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in rows)}</dl>'
 

@@ -10,10 +10,10 @@ from typing import Any
 from wakewise.arrays import Array
 from wakewise.files import write_text
 from wakewise.reports.methods_compared import methods_compared, price, profiles, won
-from wakewise.reports.page import fold, missing, plot, section, whole_page
+from wakewise.reports.page import fold, missing, plot, prose, section, whole_page
 from wakewise.reports.reproduce import plots, words
 from wakewise.reports.trial_pictures import worst_panels
-from wakewise.reports.words import number
+from wakewise.reports.words import NONE, duration, number, shown
 from wakewise.studies.reproduce.flights import read_series
 from wakewise.studies.reproduce.judged import CIRCULAR, JUDGED, glances, tally
 from wakewise.studies.reproduce.quoted import UNKNOWN
@@ -57,9 +57,8 @@ def tables_page(tables: Mapping[str, Mapping[str, Any]], store: Path) -> str:
 
 def _head(tables: Mapping[str, Mapping[str, Any]]) -> str:
     counts = tally({name: table["rows"] for name, table in tables.items()})
-    trials = sum(table["made"] for table in tables.values())
-    failed = sum(table["failed"] for table in tables.values())
-    hours = sum(table["trial_s"] for table in tables.values()) / 3600.0
+    trials, failed = (sum(table[key] or 0 for table in tables.values()) for key in ("made", "failed"))
+    took = duration(sum(table["trial_s"] or 0.0 for table in tables.values()))
     title = (
         f"{counts['met']} of {counts['quoted']} figures of the paper met, {counts['surely'] or 'none'} surely"
         if counts["quoted"]
@@ -72,7 +71,7 @@ def _head(tables: Mapping[str, Mapping[str, Any]]) -> str:
         if circular
         else ""
     )
-    few = max((table["trials"] for table in tables.values() if table["worlds"]), default=0)
+    few = max((table["trials"] or 0 for table in tables.values() if table["worlds"]), default=0)
     if 0 < few < 3:
         words_ = "one trial" if few == 1 else "two trials"
         caution += (
@@ -81,7 +80,7 @@ def _head(tables: Mapping[str, Mapping[str, Any]]) -> str:
         )
     return (
         f'<p class="eyebrow"><span>the paper\'s tables, and ours</span><span><b>{trials}</b> trials, {failed} failed'
-        f"</span><span>{hours:.1f} h of trials</span></p><h1>{escape(title)}</h1>"
+        f"</span><span>{took} of trials</span></p><h1>{escape(title)}</h1>"
         '<p class="why">Met: our mean in some world is as good as the paper\'s. Surely: the whole interval is'
         + (f". In the paper's own water alone: {counts['circular']} more" if counts["circular"] else "")
         + f".</p>{caution}"
@@ -115,10 +114,11 @@ def _table(table: Mapping[str, Any], store: Path) -> str:
         return section(name, name.capitalize(), escape(table["title"]), missing(f"the table of {name}", why))
     lead = (
         f"{escape(_upper(table['title']))}. {escape(_upper(words.met_of({name: rows})))}. "
-        f"{table['made']} {'trial' if table['made'] == 1 else 'trials'}, {table['failed']} failed; configuration "
+        f"{shown(table['made'])} {'trial' if table['made'] == 1 else 'trials'}, {shown(table['failed'])} failed; "
+        "configuration "
         f"{table['config_hash']}."
     )
-    worlds = "".join(f"<dt>{escape(w)}</dt><dd>{escape(water(w).title)}</dd>" for w in table["worlds"])
+    worlds = "".join(f"<dt>{escape(w)}</dt><dd>{prose(water(w).title)}</dd>" for w in table["worlds"])
     parts = [f'<dl class="facts">{worlds}</dl>' if worlds else "", _drawn(table)]
     parts.append(_matrix(rows) if name == "wake" else _rows(rows))
     if name == "station":
@@ -206,6 +206,10 @@ def _matrix(rows: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
+def _two(value: float | None) -> str:
+    return NONE if value is None else f"{value:.2g}"
+
+
 def _mark(row: Mapping[str, Any]) -> str:
     return "" if row["met"] is None else "kept" if row["met"] else "missed"
 
@@ -214,11 +218,11 @@ def _row(row: Mapping[str, Any], several: bool) -> str:
     said = row.get("our_order") or words.value(row["ours"])
     more = [row["how"], f"paper: {row['paper_says']}"]
     if row.get("p_holm") is not None:
-        more.append(f"paired t-test p {row['p_t']:.2g}, Holm {row['p_holm']:.2g}")
+        more.append(f"paired t-test p {_two(row['p_t'])}, Holm {_two(row['p_holm'])}")
     if row.get("p_wilcoxon") is not None:
-        more.append(f"Wilcoxon p {row['p_wilcoxon']:.2g}")
+        more.append(f"Wilcoxon p {_two(row['p_wilcoxon'])}")
     if row.get("d_z") is not None:
-        more.append(f"d {number(row['d_z'])}, probability of improvement {number(100 * row['improvement'])} %")
+        more.append(f"d {number(row['d_z'])}, probability of improvement {number(row['improvement'], scale=100.0)} %")
     if row.get("pairs_for_80_pct"):
         more.append(f"{row['pairs_for_80_pct']} pairs would show it with a chance of 80 %")
     more += [str(reason) for key, reason in row["why"].items() if key == "ours"]
@@ -233,7 +237,7 @@ def _row(row: Mapping[str, Any], several: bool) -> str:
     return (
         f'<tr title="{title}"><td>{_unbroken(row["method"])}</td><td>{escape(row["figure"])}</td>'
         + (f"<td>{escape(row['target'] or '')}</td>" if several else "")
-        + f'{figures}<td class="num">{row["n"]}</td>'
+        + f'{figures}<td class="num">{shown(row["n"])}</td>'
         f'<td><span class="{_mark(row)}">{escape(words.verdict(row))}</span></td></tr>'
     )
 
@@ -264,9 +268,7 @@ def _limits(tables: Mapping[str, Mapping[str, Any]]) -> str:
     could, could_not, unknown = words.reproduced(tables)
 
     def listed(lines: Sequence[str]) -> str:
-        return (
-            "<ul>" + "".join(f"<li>{escape(line.replace('**', '').replace('`', ''))}</li>" for line in lines) + "</ul>"
-        )
+        return "<ul>" + "".join(f"<li>{prose(line.replace('**', ''))}</li>" for line in lines) + "</ul>"
 
     content = ""
     for title, lines in (("Met in some world", could), ("Met in none", could_not), ("Not judged", unknown)):

@@ -23,7 +23,7 @@ from wakewise.reports.ink import CARD, CORAL, INK, LINE, MUTED, SAND, SLATE, TEA
 from wakewise.reports.methods_compared import methods_compared, price, profiles, won
 from wakewise.reports.reproduce import plots, words
 from wakewise.reports.trial_pictures import sheet
-from wakewise.reports.words import number
+from wakewise.reports.words import duration, number, shown
 from wakewise.studies.reproduce.comparison import COLUMNS, command_of
 from wakewise.studies.reproduce.comparison import tables as compared_tables
 from wakewise.studies.reproduce.flights import read_series
@@ -102,7 +102,8 @@ def _index(tables: Mapping[str, Mapping[str, Any]], note: str) -> str:
             else "; ".join(table["why"].values()) or "nothing was made"
         )
         lines.append(
-            f"| [{name}]({name}.md) | {table['title']} | {table['made']} | {table['failed']} | {table['trials']} | "
+            f"| [{name}]({name}.md) | {table['title']} | {shown(table['made'])} | {shown(table['failed'])} | "
+            f"{shown(table['trials'])} | "
             f"{seeds} | {config} | {met} |"
         )
     lines += [
@@ -132,14 +133,15 @@ def _index(tables: Mapping[str, Mapping[str, Any]], note: str) -> str:
         "| | |",
         "|---|---|",
         *(f"| {name} | {value} |" for name, value in words.machine().items()),
-        f"| time of all trials | {sum(table['trial_s'] for table in tables.values()) / 3600.0:.1f} h |",
+        f"| time of all trials | {duration(sum(table['trial_s'] or 0.0 for table in tables.values()))} |",
     ]
     return "\n".join(lines) + "\n"
 
 
 def _power(tables: Mapping[str, Mapping[str, Any]]) -> str:
     """What so many pairs can show at all."""
-    pairs = sorted({row["n"] for table in tables.values() for row in table["rows"] if row["reading"] == "less_pct"})
+    rows = (row for table in tables.values() for row in table["rows"])
+    pairs = sorted({row["n"] for row in rows if row["reading"] == "less_pct" and row["n"] is not None})
     shown = [(n, smallest_effect(n)) for n in pairs if n > 1]
     if not shown:
         return "With a single pair of trials no difference can be shown; read these tables as what to look at next."
@@ -156,8 +158,9 @@ def _page(table: Mapping[str, Any], store: Path, out: Path) -> str:
     if not rows:
         return "\n".join([*lines, f"Not made: {'; '.join(table['why'].values()) or 'no trial gave a figure'}.", ""])
     lines += [
-        f"{words.met_of({name: rows}).capitalize()}. {table['made']} {'trial' if table['made'] == 1 else 'trials'}, "
-        f"{table['failed']} failed, seeds {_seeds(table['seeds'])}, configuration `{table['config_hash']}`."
+        f"{words.met_of({name: rows}).capitalize()}. {shown(table['made'])} "
+        f"{'trial' if table['made'] == 1 else 'trials'}, {shown(table['failed'])} failed, "
+        f"seeds {_seeds(table['seeds'])}, configuration `{table['config_hash']}`."
         + (f" Every trial: [{name}.csv]({name}.csv)." if any(place["figures"] for place in table["places"]) else ""),
         "",
     ]
@@ -197,7 +200,10 @@ def _worst(table: Mapping[str, Any], store: Path, out: Path) -> list[str]:
             lines += [f"![Worst trial of each method, {world}]({file})", ""]
         elif worst:
             figure, unit, scale, _ = JUDGED[name]
-            told = (f"{method} seed {place['seed']} ({_told(place, figure, scale)})" for method, place in worst.items())
+            told = (
+                f"{method} seed {shown(place['seed'])} ({_told(place, figure, scale)})"
+                for method, place in worst.items()
+            )
             lines += [f"- {world}, {unit}: {', '.join(told)}"]
     if not lines:
         return []
@@ -259,7 +265,7 @@ def _table(rows: Any) -> list[str]:
         mark = f"**{words.verdict(row)}**" if row["met"] else words.verdict(row)
         lines.append(
             f"| {row['method']} | {row['figure']} | {row['target'] or ''} | {paper} | {ours} | {words.interval(row)} | "
-            f"{row['n']} | {mark} | {p} | {d} |"
+            f"{shown(row['n'])} | {mark} | {p} | {d} |"
         )
     return [*lines, ""]
 
@@ -390,4 +396,4 @@ def _means(table: Mapping[str, Any], world: str, figure: str, methods: Sequence[
 def _seeds(seeds: Sequence[int]) -> str:
     if not seeds:
         return "none"
-    return str(seeds[0]) if len(seeds) == 1 else f"{seeds[0]} to {seeds[-1]}"
+    return shown(seeds[0]) if len(seeds) == 1 else f"{shown(seeds[0])} to {shown(seeds[-1])}"

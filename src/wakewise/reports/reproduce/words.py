@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from wakewise.reports.words import number
+from wakewise.reports.words import number, shown
 from wakewise.studies.reproduce.judged import tally
 
 Row = Mapping[str, Any]
@@ -93,7 +93,7 @@ def _place(row: Row) -> str:
     ends = interval(row)
     said = row.get("our_order") or f"{value(row['ours'])} {row['unit']}".strip()
     head = f"{where}: " if where else ""
-    return f"{head}{said}" + (f" ({ends})" if ends else "") + f", n = {row['n']}"
+    return f"{head}{said}" + (f" ({ends})" if ends else "") + f", n = {shown(row['n'])}"
 
 
 def machine() -> dict[str, str]:

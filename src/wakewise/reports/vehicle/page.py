@@ -13,6 +13,7 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.reports.vehicle.drawing import drawing_svg
+from wakewise.reports.words import NONE, shown
 from wakewise.vehicles.check import WRENCH_AXES, AnyVehicle
 from wakewise.vehicles.describe import as_draft, describe
 from wakewise.vehicles.draft import VehicleDraft
@@ -76,10 +77,11 @@ def vehicle_page(vehicle: AnyVehicle) -> str:
 
 def _header(draft: VehicleDraft, facts: dict[str, Any]) -> str:
     n, rank = len(draft.thruster_names), facts["rank"]
+    short = "warn" if rank is not None and rank < 6 else ""
     chips = [
         _chip(f"{n} thrusters"),
-        _chip(f"rank {rank} of 6", "warn" if rank < 6 else ""),
-        _chip(facts["actuation"].split(":")[0], "warn" if rank < 6 else ""),
+        _chip(f"rank {shown(rank)} of 6", short),
+        _chip(facts["actuation"].split(":")[0], short),
         _chip("can fly", "good") if not draft.missing else _chip("incomplete, cannot fly", "warn"),
     ]
     parts = [
@@ -101,18 +103,23 @@ def _header(draft: VehicleDraft, facts: dict[str, Any]) -> str:
 def _wrench(facts: dict[str, Any]) -> str:
     wrench = facts["achievable_wrench"]
     if wrench is None:
-        return f"<p>Not known: {escape(facts['why']['achievable_wrench'])}.</p>"
+        return f"<p>Not known: {escape(facts['why'].get('achievable_wrench', 'no reason was given'))}.</p>"
     largest = {
-        unit: max((max(-w["lowest"], w["highest"]) for w in wrench.values() if w["unit"] == unit), default=0.0) or 1.0
+        unit: max(
+            (max(-(w["lowest"] or 0.0), w["highest"] or 0.0) for w in wrench.values() if w["unit"] == unit), default=0.0
+        )
+        or 1.0
         for unit in ("N", "N m")
     }
     rows = []
     for axis, w in wrench.items():
-        left, right = (100.0 * value / largest[w["unit"]] for value in (-w["lowest"], w["highest"]))
+        sides = (-(w["lowest"] or 0.0), w["highest"] or 0.0)
+        left, right = (100.0 * value / largest[w["unit"]] for value in sides)
         rows.append(
-            f'<b>{axis}</b><span class="num">{w["lowest"]:.4g} {w["unit"]}</span>'
+            f'<b>{axis}</b><span class="num">{_told(w["lowest"])} {w["unit"]}</span>'
             f'<span class="left"><i style="width:{left:.1f}%"></i></span>'
-            f'<span class="right"><i style="width:{right:.1f}%"></i></span><span>{w["highest"]:+.4g} {w["unit"]}</span>'
+            f'<span class="right"><i style="width:{right:.1f}%"></i></span>'
+            f"<span>{_told(w['highest'], '+.4g')} {w['unit']}</span>"
         )
     return f'<div class="bars">{"".join(rows)}</div>'
 
@@ -122,7 +129,7 @@ def _null_space(facts: dict[str, Any]) -> str:
         return "<p>None: no thrusts cancel each other.</p>"
     parts = []
     for vector in facts["null_space"]:
-        cells = "".join(_fighter(number, float(thrust)) for number, thrust in enumerate(vector["thrusts"], start=1))
+        cells = "".join(_fighter(number, thrust) for number, thrust in enumerate(vector["thrusts"], start=1))
         parts.append(
             f"<p><b>{escape(vector['name'])}</b><br><span class='muted'>{escape(_sentence(vector['words']))}</span></p>"
             f'<div class="fight">{cells}</div><br>'
@@ -130,7 +137,13 @@ def _null_space(facts: dict[str, Any]) -> str:
     return "".join(parts)
 
 
-def _fighter(number: int, thrust: float) -> str:
+def _told(value: float | None, form: str = ".4g") -> str:
+    return NONE if value is None else f"{value + 0.0:{form}}"
+
+
+def _fighter(number: int, thrust: float | None) -> str:
+    if thrust is None:
+        return f"<span>T{number} {NONE}</span>"
     kind = "plus" if thrust > 1e-6 else "minus" if thrust < -1e-6 else ""
     shown = f"{thrust:+.2f}" if kind else "0"
     return f'<span class="{kind}">T{number} {shown}</span>'
@@ -150,7 +163,7 @@ def _failures(facts: dict[str, Any]) -> str:
             lost_share = 1.0 - min(max(worst, 0.0), 100.0) / 100.0
             cells.append(Cell(f'<td class="cell lost" style="--share:{lost_share:.2f}">{worst:.0f}</td>'))
         lost = ", ".join(failure["lost"]) or "none"
-        rows.append([failure["thruster"], failure["name"], failure["rank"], lost, *cells])
+        rows.append([shown(failure["thruster"]), failure["name"], shown(failure["rank"]), lost, *cells])
     heads = ["", "thruster", "rank left", "axes lost", *WRENCH_AXES]
     return _table(heads, rows)
 
@@ -159,10 +172,16 @@ def _mixing(facts: dict[str, Any]) -> str:
     found = facts["mixing"]
     if found is None:
         return ""
-    lines = [f"<p>{found['agree']} of {found['compared']} entries agree.</p>"]
+    lines = [f"<p>{shown(found['agree'])} of {shown(found['compared'])} entries agree.</p>"]
     if facts["mixing_disagreements"]:
         rows = [
-            [d["row"], f"{d['thruster']} {d['name']}", f"{d['stated']:+.4g}", f"{d['geometry']:+.4g}", d["fault"]]
+            [
+                d["row"],
+                f"{shown(d['thruster'])} {d['name']}",
+                _told(d["stated"], "+.4g"),
+                _told(d["geometry"], "+.4g"),
+                d["fault"],
+            ]
             for d in facts["mixing_disagreements"]
         ]
         lines.append(_table(["row", "thruster", "file says", "geometry says", "fault"], rows))
@@ -173,10 +192,10 @@ def _mixing(facts: dict[str, Any]) -> str:
 def _thrusters(facts: dict[str, Any]) -> str:
     rows = [
         [
-            t["number"],
+            shown(t["number"]),
             t["name"],
-            *(f"{value + 0.0:+.3f}" for value in t["position_m"]),
-            " ".join(f"{value + 0.0:+.3f}" for value in t["axis"]),
+            *(_told(value, "+.3f") for value in t["position_m"]),
+            " ".join(_told(value, "+.3f") for value in t["axis"]),
             *("missing" if t[key] is None else f"{t[key]:g}" for key in ("max_forward_N", "max_reverse_N")),
             "missing" if t["disk_area_m2"] is None else f"{1e4 * t['disk_area_m2']:.3g}",
             "missing" if t["time_constant_s"] is None else f"{t['time_constant_s']:g}",
