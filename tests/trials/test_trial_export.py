@@ -163,6 +163,14 @@ def test_a_bag_without_rosbags_names_the_extra(capsys: Capsys, trial: Path, monk
     assert not (trial / "export").exists()
 
 
+def test_help_says_what_a_bag_holds(capsys: Capsys) -> None:
+    """Whose camera it is, and where its times begin."""
+    assert run(["export", "--help"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "a bag's camera_info is the crew's calibration" in said
+    assert "they begin near 0" in said
+
+
 def test_the_command_says_what_it_wrote(capsys: Capsys, trial: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where and how much, for people and as JSON; a vehicle's matrix lands in the working folder."""
     monkeypatch.chdir(trial.parent)

@@ -34,7 +34,11 @@ Out = Annotated[
 ]
 Poses = Annotated[
     str,
-    typer.Option("--poses", help="nerfstudio, colmap: true poses and camera, or estimated ones as the crew has them."),
+    typer.Option(
+        "--poses",
+        help="nerfstudio, colmap: true poses and camera, or estimated ones as the crew has them. The others hold both "
+        "poses; a bag's camera_info is the crew's calibration, as at sea, beside nerfstudio's true one.",
+    ),
 ]
 Frame = Annotated[
     str,
@@ -97,7 +101,9 @@ def export(
     """Export a trial to other tools: trainers of splats and NeRFs, COLMAP, evo, ROS 2, QGroundControl.
 
     Frames become those of the tool: OpenGL cameras and z up for nerfstudio, ENU and FLU in bags; COLMAP and TUM keep
-    north-east-down. A plan has a waypoint per photograph at its depth; satellites place none of them to a decimetre.
+    north-east-down. A bag's times count from the begin of the flight or the log, so they begin near 0. COLMAP's points
+    have the observations of the trial's own model, and errors with the poses that are written. A plan has a waypoint
+    per photograph at its depth; satellites place none of them to a decimetre.
     With --vehicle, write its allocation matrix as ROS 2's auv_controllers take it.
 
     A data set takes all trials of a folder, what a controller could know apart from the truth, with Croissant metadata,

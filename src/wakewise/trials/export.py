@@ -131,9 +131,13 @@ def _photographs(folder: Path, path: Path, to: str, poses: str) -> dict[str, int
     cloud: Cloud | None = None
     with suppress(FileNotFoundError):
         cloud = read_points(folder / "sparse" / "points3D.bin")
+    holds = {"photographs": len(photographs.files), "points": 0 if cloud is None else len(cloud.points_W_m)}
     with whole_folder(path) as temporary:
-        (write_colmap if to == "colmap" else write_nerfstudio)(temporary, photographs, cloud)
-    return {"photographs": len(photographs.files), "points": 0 if cloud is None else len(cloud.points_W_m)}
+        if to == "colmap":
+            holds["observations"] = write_colmap(temporary, photographs, cloud)
+        else:
+            write_nerfstudio(temporary, photographs, cloud)
+    return holds
 
 
 def _plan(folder: Path, path: Path, origin: Origin | None) -> Exported:

@@ -10,6 +10,7 @@ from wakewise.geometry import Pose
 from wakewise.links.exports import Cloud, Photographs, read_points, write_colmap
 
 pycolmap = pytest.importorskip("pycolmap")
+RNG = np.random.default_rng(7)
 
 
 @pytest.mark.parametrize("where", ["sparse/0", "sparse_text"])
@@ -64,3 +65,67 @@ def test_points_of_a_model_are_read_without_colmap(photographs: Photographs, clo
     path.write_bytes(path.read_bytes()[:-60])
     with pytest.raises(InputError, match="ends before"):
         read_points(path)
+
+
+def _theirs(folder: Path, photographs: Photographs, cloud: Cloud) -> Path:
+    """A sparse model as COLMAP writes it of points that some photographs saw, beside features that belong to none."""
+    (folder / "out").mkdir()
+    write_colmap(folder / "out", photographs)
+    model = pycolmap.Reconstruction(folder / "out" / "sparse" / "0")
+    for image in model.images.values():
+        pixels = RNG.uniform(0.0, 48.0, (7, 2))
+        image.points2D = pycolmap.Point2DList([pycolmap.Point2D(pixel) for pixel in pixels])
+    for k in range(5):
+        track = pycolmap.Track([pycolmap.TrackElement(image_id, k + 1) for image_id in list(model.images)[: k % 3 + 1]])
+        model.add_point3D(cloud.points_W_m[k], track, cloud.colours[k])
+    (folder / "theirs").mkdir()
+    model.write(folder / "theirs")
+    return folder / "theirs"
+
+
+@pytest.mark.parametrize("where", ["sparse/0", "sparse_text"])
+def test_points_keep_what_saw_them(where: str, photographs: Photographs, cloud: Cloud, tmp_path: Path) -> None:
+    """COLMAP reads the observations of its own model back, and reckons the same errors with the poses written here."""
+    theirs = _theirs(tmp_path, photographs, cloud)
+    before = pycolmap.Reconstruction(theirs)
+    (tmp_path / "ours").mkdir()
+    count = write_colmap(tmp_path / "ours", photographs, read_points(theirs / "points3D.bin"))
+    model = pycolmap.Reconstruction(tmp_path / "ours" / where)
+    # A point behind a camera was not seen by it, whatever a track says.
+    ahead = {
+        image.name: [
+            tuple(point.xy)
+            for point in image.points2D
+            if point.has_point3D() and (image.cam_from_world() * before.points3D[point.point3D_id].xyz)[2] > 0.0
+        ]
+        for image in before.images.values()
+    }
+    assert 0 < count == sum(map(len, ahead.values())) == model.compute_num_observations()
+    for image in model.images.values():
+        assert [tuple(p.xy) for p in image.points2D if p.has_point3D()] == ahead[image.name]
+    written = {key: point.error for key, point in model.points3D.items()}
+    lone = [key for key, point in model.points3D.items() if point.track.length() == 0]
+    assert all(written[key] == -1.0 for key in lone)
+    model.update_point_3d_errors()
+    for key, point in model.points3D.items():
+        if key not in lone:
+            assert written[key] == pytest.approx(point.error, rel=1e-9)
+
+
+def test_points_that_nothing_saw_claim_no_error(photographs: Photographs, cloud: Cloud, tmp_path: Path) -> None:
+    """Without observations an error is not known, and COLMAP prints none."""
+    (tmp_path / "out").mkdir()
+    assert write_colmap(tmp_path / "out", photographs, cloud) == 0
+    model = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
+    assert {point.error for point in model.points3D.values()} == {-1.0}
+    assert model.compute_mean_reprojection_error() == 0.0
+
+
+def test_images_that_were_cut_short_are_refused(photographs: Photographs, cloud: Cloud, tmp_path: Path) -> None:
+    """In one line, as points that were."""
+    theirs = _theirs(tmp_path, photographs, cloud)
+    data = (theirs / "images.bin").read_bytes()
+    for length in (4, 30, 200, len(data) - 5):
+        (theirs / "images.bin").write_bytes(data[:length])
+        with pytest.raises(InputError, match="ends before the images"):
+            read_points(theirs / "points3D.bin")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wakewise.arrays import Array, freeze
+from wakewise.arrays import Array, IntArray, freeze
 from wakewise.errors import InputError
 
 
@@ -75,11 +76,15 @@ class Photographs:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cloud:
-    """Points (n, 3) in NED, their colours (n, 3) as RGB bytes, and mean reprojection errors in pixels, shape (n,)."""
+    """Points (n, 3) in NED, their colours (n, 3) as RGB bytes, and mean reprojection errors in pixels, shape (n,).
+
+    `seen` says, by a photograph's name, at which pixels, shape (k, 2), which points, shape (k,), were observed in it.
+    """
 
     points_W_m: Array
     colours: NDArray[np.uint8]
     errors_px: Array
+    seen: Mapping[str, tuple[Array, IntArray]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         n = len(self.points_W_m)
