@@ -7,13 +7,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from wakewise.errors import InputError
 from wakewise.importers.stated_matrix import read_number_matrix
 from wakewise.importers.wrench_rows import (
     ARDUSUB,
     FORCES_FIRST,
     MOMENTS_FIRST,
-    agreeing,
     is_signs,
     nearest,
     told_order,
@@ -144,16 +145,13 @@ def compare_with(vehicle: AnyVehicle, matrix: str, rows: str | None = None) -> C
 
         stated, notes = read_matrix(path, geometry=geometry, rows=rows)
     else:
-        raw, signs_only = read_number_matrix(path)
-        stated, notes = raw, []
-        told = told_order(rows)
+        stated, signs_only = read_number_matrix(path)
+        notes, told = [], told_order(rows)
         if not signs_only:
             orders = [FORCES_FIRST, MOMENTS_FIRST, ARDUSUB] if told is None else [told]
-            best, words = nearest([raw], geometry, orders, ["FRD", "FLU"])
-            if told is not None or not words or agreeing(best, geometry) > agreeing(raw, geometry):
-                stated, notes = best, [f"matrix read as {words}"] if words else []
-            if not words:
-                stated = raw
+            best, words = nearest([stated], geometry, orders, ["FRD", "FLU"])
+            if words and not np.array_equal(best, stated):
+                stated, notes = best, [f"matrix read as {words}"]
     if signs_only or (is_signs(stated) and stated.shape == geometry.shape):
         found = compare_signs(vehicle, stated, path.name)
     else:
