@@ -33,6 +33,15 @@ def test_strata_take_the_difference_between_targets_out_of_the_interval():
     assert narrow.high - narrow.low < 0.1 * (wide.high - wide.low)
 
 
+def test_a_stratum_of_one_is_not_drawn_alone():
+    """Within it nothing could vary, so its spread would be left out: all are drawn from together instead."""
+    rows = np.array([1.0, 1.1, 1.2, 9.0])
+    single = stratified_bootstrap(rows, ["a", "a", "a", "b"])
+    assert single == stratified_bootstrap(rows)
+    assert single[1].high - single[1].low > 2.0
+    assert stratified_bootstrap(rows, ["a", "a", "b", "b"]) != single
+
+
 def test_columns_of_a_pair_stay_together():
     """A ratio that is the same in every pair has no spread, however different the pairs are."""
     theirs = np.array([1.0, 10.0, 100.0])

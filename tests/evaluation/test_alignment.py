@@ -1,5 +1,7 @@
 """Laws of alignment: it undoes what was done, ignores what is wrong, and refuses what it cannot know."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -103,3 +105,39 @@ def test_icp_refuses_a_cloud_elsewhere():
     surface, normals = bumpy(5_000, rng)
     with pytest.raises(StageError, match="ICP"):
         refine_icp(surface + 0.5, surface, normals)
+
+
+@pytest.mark.parametrize(("shift_m", "refused"), [(0.012, False), (0.028, True)])
+def test_icp_refuses_to_move_a_cloud_far(shift_m, refused):
+    """More than 20 mm is no refinement, though the cloud would fit: the alignment before it was wrong."""
+    rng = np.random.default_rng(0)
+    surface, normals = bumpy(20_000, rng)
+    cloud = bumpy(10_000, rng)[0] + np.array([shift_m, 0.0, 0.0])
+    wide = (0.08, 0.02, 0.004)
+    if refused:
+        with pytest.raises(StageError, match="at most 20 mm is allowed"):
+            refine_icp(cloud, surface, normals, distances_m=wide)
+        wide_limit = refine_icp(cloud, surface, normals, distances_m=wide, limit_m=0.2)
+        assert wide_limit.displacement_mm == pytest.approx(1e3 * shift_m, abs=4.0)
+    else:
+        found = refine_icp(cloud, surface, normals, distances_m=wide)
+        assert found.displacement_mm == pytest.approx(1e3 * shift_m, abs=2.0)
+
+
+@pytest.mark.parametrize(("back", "accepted"), [(-1.0, True), (1.0, False)])
+def test_icp_that_fits_no_better_moves_nothing(monkeypatch, back, accepted):
+    """A registration that takes the cloud farther from the surface is not taken: the cloud stays where it was."""
+    import small_gicp
+
+    rng = np.random.default_rng(0)
+    surface, normals = bumpy(20_000, rng)
+    shift = np.array([0.001, 0.0, 0.0])
+    T = np.eye(4)
+    T[:3, 3] = back * shift
+    answer = SimpleNamespace(num_inliers=1000, T_target_source=T)
+    monkeypatch.setattr(small_gicp, "align", lambda *_, **__: answer)
+    cloud = bumpy(10_000, rng)[0] + shift
+    found = refine_icp(cloud, surface, normals)
+    assert found.accepted is accepted
+    np.testing.assert_allclose(found.apply(cloud), cloud + (back * shift if accepted else 0.0), atol=1e-12)
+    assert found.displacement_mm == pytest.approx(1.0 if accepted else 0.0)

@@ -188,3 +188,36 @@ def test_what_counts_as_seen_is_what_the_definition_says():
     angle_deg = np.degrees(np.arccos(np.clip(surface.normals[:, 0], -1, 1)))
     assert angle_deg[seen].max() == pytest.approx(said_deg, abs=1.0)
     assert seen[angle_deg < said_deg - 1.0].all()
+
+
+def test_seen_is_by_as_many_cameras_as_the_definitions_say():
+    """One fewer than the number in their words, and nothing counts as seen, nothing being set."""
+    numbers = {"one": 1, "two": 2, "three": 3, "four": 4}
+    said = {
+        numbers[text.split("at least ")[1].split(" camera")[0]]
+        for key, (_, text) in SURFACE_DEFINITIONS.items()
+        if "visible" in key
+    }
+    (enough,) = said
+    cloud = shell(100_000, RADIUS, np.random.default_rng(0))
+    for views in (enough - 1, enough):
+        centres = np.array([[100.0, k, 0.0] for k in range(views)])
+        score = evaluate_surface(cloud, ball(), camera_centres_W_m=centres, icp=False, samples=5_000)
+        assert (score.visible_pct > 30.0) == (views == enough)
+        assert (score.completeness_visible_pct is not None) == (views == enough)
+
+
+def test_a_surface_is_sampled_evenly():
+    """Each quarter of a triangle gets a quarter of its samples, and each triangle its share of the area."""
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.2, 3.0, 0.0], [0.2, -1.0, 0.0]])
+    mesh = SimpleNamespace(vertices_m=corners, faces=np.array([[0, 1, 2], [1, 0, 3]]))
+    points = sample_surface(mesh, Crop(), np.random.default_rng(0), 40_000).points_m
+    upper = points[points[:, 1] > 0.0]
+    assert len(upper) == pytest.approx(30_000, abs=2)
+    # Barycentric coordinates: a quarter of the area lies at each corner, where that corner's is above one half.
+    share = np.linalg.solve(
+        np.vstack([corners[:3, :2].T, np.ones(3)]), np.vstack([upper[:, :2].T, np.ones(len(upper))])
+    )
+    quarters = [*(share > 0.5).mean(axis=1), (share <= 0.5).all(axis=0).mean()]
+    np.testing.assert_allclose(quarters, 0.25, atol=0.01)
+    np.testing.assert_allclose(share.mean(axis=1), 1.0 / 3.0, atol=0.005)
