@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import io
+import pickle
 import time
 
 import cv2
 import numpy as np
 import pytest
 
+from wakewise.cockpit import frames
 from wakewise.cockpit.frames import DRAWN_WITHIN_S, WIDTHS_PX, LiveCamera, View, Width
 from wakewise.errors import StageError
 from wakewise.imaging import photograph
@@ -50,6 +53,25 @@ def test_a_picture_is_the_photograph_but_for_what_is_left_out() -> None:
     finally:
         camera.close()
     assert camera.draw(view) is None
+
+
+def test_it_is_ready_once_a_picture_was_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first picture reads kernels, for seconds: it is drawn before anybody is told that there are pictures."""
+    done: list[str] = []
+
+    class Slow:
+        def __init__(self, *_: object) -> None:
+            done.append("lit")
+
+        def warm(self) -> None:
+            done.append("drawn")
+
+    monkeypatch.setattr(frames, "Easel", Slow)
+    monkeypatch.setattr(frames.os, "nice", lambda _: 0)
+    monkeypatch.setattr(frames, "_write", lambda _, message: done.append(message.decode()))
+    begin = pickle.dumps((None, None, 480))
+    frames.serve(io.BytesIO(len(begin).to_bytes(8, "little") + begin), io.BytesIO())
+    assert done == ["lit", "drawn", "ready"]
 
 
 def test_pictures_get_narrower_where_the_cores_are_busy_and_wide_again_where_they_are_not() -> None:

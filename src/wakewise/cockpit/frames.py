@@ -209,6 +209,12 @@ class Easel:
         self._silt: ScalarGrid | None = None
         self._seen: deque[float] = deque(maxlen=_METERED)
         self._rng = np.random.default_rng(parts.scenario.seed)
+        self._first = View(X_WC=parts.start.X_WB @ parts.vehicle.X_BC)
+
+    def warm(self) -> None:
+        """Draw a picture for nobody: the first one reads kernels, which takes as long as dozens of others."""
+        self.draw(self._first)
+        self._seen.clear()
 
     def settings(self, width_px: int) -> ImagingSettings:
         """Settings of a picture of this width."""
@@ -249,6 +255,7 @@ def serve(pipe: IO[bytes], answers: IO[bytes]) -> None:
     if first is None:
         return
     easel = Easel(*pickle.loads(first))
+    easel.warm()
     _write(answers, b"ready")
     with suppress(OSError):
         os.nice(NICER)

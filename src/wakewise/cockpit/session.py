@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -247,7 +247,7 @@ class Session:
             self._described = described(parts, self._gauges)
         self._say_preparing("making pilot and controllers")
         flown = assisted(parts, self.seat, self.desk)
-        pilot = flown.pilot
+        pilot = cast("AssistedPilot", flown.pilot)
         self._gauges.disturbances(parts.start, np.full(len(parts.vehicle.thrusters), 0.1))  # kernels are read now
         self._gauges.predicted_m_s(parts.start, np.full(len(parts.vehicle.thrusters), 0.1))
         lookout = Lookout(

@@ -119,7 +119,8 @@ class Instruments:
     @property
     def saved_pct(self) -> float | None:
         """How much less D the flown thrusts made than direct allocation over ten seconds; None where that leaves the
-        water as good as still (`STILL_M_S`), so that there is nothing to save."""
+        water as good as still (`STILL_M_S`), so that there is nothing to save.
+        """
         if not self._both:
             return None
         flown, direct = np.mean(self._both, axis=0)
