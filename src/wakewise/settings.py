@@ -9,6 +9,7 @@ from typing import Annotated, Any, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 
+from wakewise.checks import quoted, whole_number
 from wakewise.errors import InputError
 
 MAX_SEED = 2**63 - 1
@@ -36,6 +37,17 @@ class Settings(BaseModel):
             if bool not in meant and meant & {int, float}:
                 raise ValueError("must be a number, not true or false")
         return value
+
+
+def seed_number(value: object, name: str = "seed") -> int:
+    """The value as a seed of random draws: a whole number from 0 to 2^63 - 1.
+
+    Raises
+    ------
+    InputError
+        If it is another.
+    """
+    return whole_number(value, name, 0, MAX_SEED)
 
 
 def guess(word: str, known: list[str] | tuple[str, ...]) -> str:
@@ -87,8 +99,7 @@ def _words(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
         return "missing, it is required"
     found = fault["input"]
     plain = isinstance(found, (str, int, float, bool, type(None)))
-    text = " ".join(repr(found).split())
-    shown = f"found {text if len(text) <= 80 else text[:80] + '...'}, " if plain else ""
+    shown = f"found {quoted(found)}, " if plain else ""
     message = str(fault["msg"]).removeprefix("Value error, ").replace("Input should", "should").replace("\n", " ")
     message = message.replace("a valid tuple", "a list in square brackets")
     message = message.removesuffix(", unable to parse string as a number").replace(

@@ -134,5 +134,5 @@ def test_the_labyrinth_has_the_wavelength_asked_for():
 @pytest.mark.parametrize(("kind", "seed"), [("sponge", 0), ("brain", -1)])
 def test_an_unknown_kind_or_seed_is_refused(kind, seed):
     """The message says what is allowed."""
-    with pytest.raises(InputError, match=r"branching|0 or greater"):
+    with pytest.raises(InputError, match=r"branching|allowed 0 to"):
         coral(kind, seed)

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 from wakewise.arrays import frozen
 from wakewise.checks import finite_number, instance_of
 from wakewise.control import MAKERS
+from wakewise.errors import InputError
 from wakewise.plugins import names
-from wakewise.targets import find_target
+from wakewise.targets import find_target, is_mesh_file
 
 if TYPE_CHECKING:
     from wakewise.evaluation import SurfaceScore
@@ -132,11 +133,11 @@ def load_target(kind: str, *, bed_z_m: float = 1.5, seed: int = 0, size_m: float
     kind : str
         "branching", "brain", "plate", the path of a mesh file, a plug-in's name, or ``package.module:make``.
     bed_z_m : float
-        Depth of the bed.
+        Depth of the bed, more than 0.
     seed : int
-        Which individual of a procedural one.
+        Which individual of a procedural one; a mesh file has but one.
     size_m : float, optional
-        Scale a mesh file's largest extent to this.
+        Scale a mesh file's largest extent to this; a procedural target has its own size.
 
     Raises
     ------
@@ -149,6 +150,8 @@ def load_target(kind: str, *, bed_z_m: float = 1.5, seed: int = 0, size_m: float
     >>> ww.load_target("plate").bed_z_m
     1.5
     """
+    if seed != 0 and is_mesh_file(kind):
+        raise InputError(f"seed: {seed}, a mesh file has but one individual, leave it out")
     return find_target(kind, bed_z_m, seed, size_m)
 
 

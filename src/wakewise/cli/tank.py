@@ -179,9 +179,9 @@ def _target(name: str | None, floor_z_m: float | None) -> Target | None:
     if name is None:
         return None
     from wakewise.errors import InputError
-    from wakewise.targets import coral, coral_kinds, load_mesh, place_on_bed
+    from wakewise.targets import find_mesh, place_on_bed
 
     if floor_z_m is None:
         raise InputError("--target: stands on a floor, give --floor Z too")
-    mesh = coral(name) if name in coral_kinds() else load_mesh(Path(name).expanduser())
-    return place_on_bed(Path(name).stem, mesh, floor_z_m)
+    called, mesh = find_mesh(name)
+    return place_on_bed(called, mesh, floor_z_m)

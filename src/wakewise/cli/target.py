@@ -62,10 +62,9 @@ def show(
     from wakewise.errors import InputError
     from wakewise.extras import need
     from wakewise.targets import (
-        coral,
-        coral_kinds,
         delicacy,
-        load_mesh,
+        find_mesh,
+        is_mesh_file,
         place_on_bed,
         read_marks,
         read_vertex_scores,
@@ -77,11 +76,8 @@ def show(
     if out is not None:
         need("--out", "reports", "photos", only=("matplotlib", "cv2", "embreex"))
     given = read_marks(marks) if marks is not None else None
-    if target in coral_kinds():
-        name, mesh, scores = target, coral(target, seed), None
-    else:
-        name, mesh = Path(target).stem, load_mesh(target, target_size)
-        scores = read_vertex_scores(target, mesh)
+    name, mesh = find_mesh(target, seed, target_size)
+    scores = read_vertex_scores(Path(target).expanduser(), mesh) if is_mesh_file(target) else None
     marked = given.scores(mesh) if given is not None else None
     if marked is not None and scores is not None:
         marked = np.maximum(marked, scores)

@@ -7,8 +7,8 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from wakewise.settings import Settings
-from wakewise.targets import TISSUES, Tissue, coral_kinds
+from wakewise.settings import Seed, Settings
+from wakewise.targets import TISSUES, Tissue, coral_kinds, is_mesh_file
 
 
 class LooseSettings(Settings):
@@ -30,8 +30,10 @@ class TargetSettings(Settings):
     """What is looked at: a procedural coral by name, or a mesh file."""
 
     kind: str = Field("branching", description=f"one of {', '.join(coral_kinds())}, or the path of a mesh file")
-    size_m: float | None = Field(None, gt=0.0, le=3.0, description="scale the largest extent of a mesh file to this")
-    seed: int = Field(0, ge=0, description="which individual of a procedural coral")
+    size_m: float | None = Field(
+        None, ge=0.02, le=2.0, description="scale the largest extent of a mesh file to this; not of a procedural one"
+    )
+    seed: Seed = Field(0, description="which individual of a procedural coral")
     points: int = Field(300, ge=20, le=10000, description="sample points that stand for the target's water in D")
     delicate_gain: float = Field(
         0.0, ge=0.0, le=100.0, description="points on thin or sharp places weigh 1 + this; 0 is the paper's weighting"
@@ -62,6 +64,12 @@ class TargetSettings(Settings):
             "damping": self.damping,
         }
         return dataclasses.replace(TISSUES[name], **{key: value for key, value in own.items() if value is not None})
+
+    @model_validator(mode="after")
+    def _size_has_a_use(self) -> Self:
+        if self.size_m is not None and not is_mesh_file(self.kind):
+            raise ValueError(f"size_m scales a mesh file, {self.kind} has its own size: leave it out")
+        return self
 
     @model_validator(mode="after")
     def _tissue_has_a_use(self) -> Self:

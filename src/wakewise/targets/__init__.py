@@ -11,7 +11,7 @@ says how a soft one bends, `tissues.py` what it is made of.
 from wakewise.targets.corals import coral, coral_kinds, soft_kinds, stony_kinds
 from wakewise.targets.delicate import Delicacy, delicacy
 from wakewise.targets.distance import MeshDistance
-from wakewise.targets.find import find_target
+from wakewise.targets.find import find_mesh, find_target, is_mesh_file
 from wakewise.targets.marks import Marks, read_marks, read_vertex_scores
 from wakewise.targets.mesh import Mesh, load_mesh, read_mesh, write_mesh
 from wakewise.targets.region import Measure, Region, region_measure, sample_region
@@ -34,7 +34,9 @@ __all__ = [
     "coral",
     "coral_kinds",
     "delicacy",
+    "find_mesh",
     "find_target",
+    "is_mesh_file",
     "load_mesh",
     "place_on_bed",
     "read_marks",

@@ -13,6 +13,7 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
+from wakewise.settings import seed_number
 from wakewise.targets.fields import (
     BURIED_M,
     Grid,
@@ -55,9 +56,7 @@ def coral(kind: str, seed: int = 0) -> Mesh:
     """
     if kind not in coral_kinds():
         raise InputError(f"coral '{kind}': unknown, allowed: {', '.join(coral_kinds())}")
-    if seed < 0:
-        raise InputError(f"coral seed {seed}: must be 0 or greater")
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed_number(seed, "coral seed"))
     if kind == "seagrass":
         return _SOFT[kind](rng)  # drawn to size: how a blade bends goes with the fourth power of its length
     return _to_size(zero_surface(_STONY[kind](rng)) if kind in _STONY else _SOFT[kind](rng))

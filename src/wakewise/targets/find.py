@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from wakewise.checks import finite_number
+from wakewise.errors import InputError
 from wakewise.plugins import find, offered
+from wakewise.settings import guess, seed_number
 from wakewise.targets.corals import coral, coral_kinds
 from wakewise.targets.mesh import Mesh, load_mesh
 from wakewise.targets.target import Target, place_on_bed
@@ -23,21 +26,43 @@ def find_target(kind: str, bed_z_m: float, seed: int = 0, size_m: float | None =
         A procedural coral, the path of a mesh file, a name that an installed package offers (entry points
         `wakewise.targets`), or ``package.module:make``; see `MeshMaker`.
     bed_z_m : float
-        Depth of the bed.
+        Depth of the bed, more than 0.
     seed : int
-        Which individual of a procedural one.
+        Which individual of a procedural one, 0 to 2^63 - 1.
     size_m : float, optional
-        Scale a mesh file's largest extent to this.
+        Scale a mesh file's largest extent to this; a procedural one has its own size.
 
     Raises
     ------
     InputError
-        If there is no such target, or its file is not usable.
+        If there is no such target, its file is not usable, or a number is none that it can have.
     """
-    if kind in coral_kinds():
-        return place_on_bed(kind, coral(kind, seed), bed_z_m)
+    depth_m = finite_number(bed_z_m, "bed_z_m", above=0.0)
+    name, mesh = find_mesh(kind, seed, size_m)
+    return place_on_bed(name, mesh, depth_m)
+
+
+def find_mesh(kind: str, seed: int = 0, size_m: float | None = None) -> tuple[str, Mesh]:
+    """Name and mesh of the same target, with z up and its bed at z = 0; as `find_target`."""
+    individual = seed_number(seed)
     path = Path(kind).expanduser()
-    if not path.exists() and (kind in offered("target") or ":" in kind):
+    if not is_mesh_file(kind):
+        if size_m is not None:
+            raise InputError(f"target '{kind}': size_m {size_m:g} scales a mesh file, this one has its own size")
+        if kind in coral_kinds():
+            return kind, coral(kind, individual)
         maker: MeshMaker = find("target", kind, {}).maker
-        return place_on_bed(kind.rpartition(":")[2], maker(seed), bed_z_m)
-    return place_on_bed(path.stem, load_mesh(path, size_m), bed_z_m)
+        return kind.rpartition(":")[2], maker(individual)
+    if not path.exists() and path.name == kind and not path.suffix:
+        known = [*coral_kinds(), *offered("target")]
+        raise InputError(
+            f"target '{kind}': unknown, {guess(kind, known)}allowed are {', '.join(known)}, or a mesh file"
+        )
+    return path.stem, load_mesh(path, size_m)
+
+
+def is_mesh_file(kind: str) -> bool:
+    """Whether a target's name is taken as that of a mesh file, not of a procedural target or one from outside."""
+    if kind in coral_kinds():
+        return False
+    return Path(kind).expanduser().exists() or not (kind in offered("target") or ":" in kind)
