@@ -47,9 +47,10 @@ def read_yaml(root: Item, name: str, found: Found, rows: Order | None = None) ->
     require_same_count(entries, found)
     found.claims += claims_in(entries)
     parameters = read_parameters(entries, found)
-    alike = [(path, item) for path, item in root.unread() if LOOKS_LIKE_THRUSTERS.search(path[-1]) and item.items()]
+    alike = [(path, item) for path, item in entries if LOOKS_LIKE_THRUSTERS.search(path[-1]) and _holds_figures(item)]
     if not (geometry or matrix or parameters):
-        said = f"; {_title(alike[0][0])} ({alike[0][1].place.line}) is of a form that is not known" if alike else ""
+        where = f" (line {alike[0][1].place.line})" if alike else ""
+        said = f"; {_title(alike[0][0])}{where} is of a form that is not known" if alike else ""
         raise PlacedError(
             f"{root.place}: {name} holds no allocation matrix, no thruster positions with directions, "
             f"and no vehicle parameters under a key that is known{said}"
@@ -83,6 +84,14 @@ def read_matrix_only(root: Item, found: Found, rows: Order | None = None) -> Non
 
 
 _TURNING = re.compile(r"flip|revers|invert|(^|_)sign|polarity|spin", re.IGNORECASE)
+
+
+def _holds_figures(item: Item) -> bool:
+    """Whether an item that no reader took is a list of numbers, of lists or of tables, or a table of tables."""
+    if item.seen or any(below.seen for _, below in item.walk_all()):
+        return False
+    tables = [member for member in item.table().values() if member.table()]
+    return item.is_numbers() or any(not isinstance(member.value, str) for member in item.items()) or len(tables) > 1
 
 
 def _title(path: tuple[str, ...]) -> str:

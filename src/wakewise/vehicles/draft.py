@@ -312,7 +312,9 @@ class VehicleDraft:
         if self.thrusters:
             return frozen(np.stack([t.wrench_per_newton_B for t in self.thrusters], axis=1), (6, None), "matrix")
         if self.shipped_matrix is None:
-            raise InputError(f"vehicle {self.name}: neither thrusters nor an allocation matrix")
+            doubts = [note.partition(": ")[2] for note in self.notes if note.startswith("QUESTIONED: ")]
+            why = f" ({'; '.join(doubts[:3])})" if doubts else ""
+            raise InputError(f"vehicle {self.name}: neither thrusters nor an allocation matrix{why}")
         return self.shipped_matrix
 
     @cached_property
