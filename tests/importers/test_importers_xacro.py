@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wakewise.errors import InputError
+from wakewise.importers import import_vehicle
 from wakewise.importers.expressions import evaluate
 from wakewise.importers.packages import Folders
 from wakewise.importers.scopes import literal, parse_parameters
@@ -232,3 +233,21 @@ def test_parameters_and_literals() -> None:
         ("j", "", False, "5"),
     ]
     assert [literal(t) for t in ("1", "1.5", "true", "1_000", "'1'", "a b")] == [1, 1.5, True, "1_000", "1", "a b"]
+
+
+def test_a_macro_of_a_namesake_says_where_it_is_from(tmp_path: Path) -> None:
+    """A package found by its name may be another project's: a macro that does not fit names it and the option."""
+    for name in ("mine", "other"):
+        (tmp_path / name / "urdf").mkdir(parents=True)
+        (tmp_path / name / "package.xml").write_text(f"<package><name>{name}</name></package>")
+    head = '<robot xmlns:xacro="http://ros.org/wiki/xacro">'
+    (tmp_path / "other/urdf/parts.xacro").write_text(
+        f'{head}<xacro:macro name="part" params="namespace"><link name="l"/></xacro:macro></robot>'
+    )
+    path = tmp_path / "mine/urdf/mine.xacro"
+    for call, fault in (("", "needs the parameter namespace"), (' namespace="a" foo="1"', "has no parameter foo")):
+        path.write_text(f'{head}<xacro:include filename="$(find other)/urdf/parts.xacro"/><xacro:part{call}/></robot>')
+        with pytest.raises(
+            InputError, match=rf"macro part {fault} \(defined in parts.xacro:1; package other .*--package other=DIR"
+        ):
+            import_vehicle(path)

@@ -76,7 +76,9 @@ def test_lists_that_look_like_thrusters_are_named(tmp_path: Path, key: str) -> N
     listed = f"a: {{{key}: [0.28, 0.25, 0.0, 0.0, -45.0, 0.28, -0.25, 0.0, 0.0, 45.0]}}\n"
     draft = imported(tmp_path, f"{listed}center_of_buoyancy: [0, 0, 0]")
     (doubt,) = unread(draft)
-    assert doubt.startswith(f"QUESTIONED: not read: a.{key}, which look like thrusters in a form") and "t.yaml:1" in doubt
+    assert (
+        doubt.startswith(f"QUESTIONED: not read: a.{key}, which look like thrusters in a form") and "t.yaml:1" in doubt
+    )
     with pytest.raises(InputError, match=rf"neither thrusters nor an allocation matrix.*not read: a.{key}"):
         _ = draft.allocation_matrix
     with pytest.raises(InputError, match=rf"holds no allocation matrix.*a.{key} \(line 1\)"):

@@ -60,6 +60,13 @@ class Folders:
                 self.allowed.append(found)
         return self._found[name]
 
+    def whence(self, path: Path) -> str:
+        """Which package a file is of, if it was found by its name alone: a namesake may be meant; "" if told or own."""
+        for name, folder in self._found.items():
+            if folder is not None and folder != self.root and path.resolve().is_relative_to(folder.resolve()):
+                return f"; package {name} was found by its name in {folder}, --package {name}=DIR names another"
+        return ""
+
     def inside(self, path: Path, place: Place) -> Path:
         """The real path, links followed.
 

@@ -222,7 +222,9 @@ class Xacro:
             for parameter in macro.parameters:
                 if parameter.block:
                     if not blocks:
-                        raise PlacedError(f"{element.place}: macro {name} needs a block {parameter.name}")
+                        raise PlacedError(
+                            f"{element.place}: macro {name} needs a block {parameter.name}{self._by(macro)}"
+                        )
                     inner.blocks[parameter.name] = (blocks.pop(0), parameter.block == "**")
                 elif parameter.name in given:
                     raw = given.pop(parameter.name)
@@ -232,11 +234,18 @@ class Xacro:
                 elif parameter.default is not None:
                     inner.values[parameter.name] = literal(self.texts.value(parameter.default, scope, element.place))
                 else:
-                    raise PlacedError(f"{element.place}: macro {name} needs the parameter {parameter.name}")
+                    raise PlacedError(
+                        f"{element.place}: macro {name} needs the parameter {parameter.name}{self._by(macro)}"
+                    )
             extra = [key for key in given if not key.startswith("xmlns")]
             if extra:
-                raise PlacedError(f"{element.place}: macro {name} has no parameter {', '.join(extra)}")
+                raise PlacedError(f"{element.place}: macro {name} has no parameter {', '.join(extra)}{self._by(macro)}")
             return self._children(macro.body, inner)
+
+    def _by(self, macro: Macro) -> str:
+        """Where a macro was defined, if in another package than the file's own."""
+        whence = self.folders.whence(macro.body.place.file)
+        return f" (defined in {macro.body.place.file.name}:{macro.body.place.line}{whence})" if whence else ""
 
     def _read_beside_missing(self) -> None:
         """Take macros from the files that lie where a missing include should be."""
