@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from wakewise.extras import EXTRAS
+from wakewise.extras import EXTRAS, how_to_install
 
 BLOCKED = sorted({module for modules in EXTRAS.values() for module in modules})
 _WITHOUT = f"""

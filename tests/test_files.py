@@ -11,11 +11,15 @@ import polars as pl
 import pytest
 from PIL import Image
 
-from wakewise.errors import FileFailure, is_full
-from wakewise.files import whole_file, whole_folder, write_bytes, write_json
+from wakewise.api import compare as compare_flights
+from wakewise.campaigns.definition import check_campaign
+from wakewise.errors import FileFailure, InputError, is_full
+from wakewise.files import named, whole_file, whole_folder, write_bytes, write_json
 from wakewise.film.encode import film_writer
+from wakewise.operation import Scenario
 from wakewise.operation.telemetry import write_mcap
 from wakewise.targets import Mesh, write_mesh
+from wakewise.trials import compare_methods
 
 
 def test_a_block_that_fails_leaves_nothing(tmp_path: Path) -> None:
@@ -141,6 +145,30 @@ def test_a_full_disk_leaves_no_part_of_a_file_whichever_library_writes(
     assert is_full(told.value)
     assert str(told.value) == f"{full_disk / name}: the disk is full"
     assert not list(full_disk.iterdir())
+
+
+BAD_NAMES = ("../../evil", "/etc/x", "a/b", "a\\b", "..", ".", ".hidden", "", " a", "a ", "a\nb", "a\0b", "x" * 201)
+
+
+@pytest.mark.parametrize("name", BAD_NAMES)
+def test_a_name_stands_for_a_place_in_its_folder_and_nowhere_else(name: str, tmp_path: Path) -> None:
+    """Whatever is named: a campaign, a scenario, what is compared. One rule refuses, before anything is made."""
+    with pytest.raises(InputError, match="names a folder, so"):
+        named(tmp_path, name, "compare")
+    for refuse in (lambda: Scenario.preset("quick", name=name), lambda: check_campaign({"name": name})):
+        with pytest.raises(InputError, match="name: found"):
+            refuse()
+    flights = dict.fromkeys((name, "dp"), Scenario.preset("quick"))
+    for compare in (compare_flights, compare_methods):
+        with pytest.raises(InputError, match=r"compare: .* names a folder"):
+            compare(flights, tmp_path / "out")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["dp", "package.module:make", "first comparison", "Äxt-1", "a..b"])
+def test_names_as_people_give_them_are_places(name: str, tmp_path: Path) -> None:
+    """Spaces within, letters of any script, and the colon of a plug-in."""
+    assert named(tmp_path, name, "x").parent == tmp_path
 
 
 def test_a_place_that_cannot_be_written_is_told_by_its_own_name(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Kernels are kept where they can be: beside the source, in the user's cache, or in a folder for temporary files."""
 
 import os
+import shutil
 import stat
 import subprocess
 import sys
@@ -38,6 +39,38 @@ def test_a_place_can_be_written_if_what_stands_there_can(tmp_path: Path) -> None
     (tmp_path / "file").touch()
     assert not can_be_written(tmp_path / "file" / "below")
     assert not can_be_written(Path("/proc/self"))
+
+
+def test_a_home_that_cannot_be_looked_into_is_no_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another user's, as of a service with HOME=/root: that is no error, whatever asking for it raises."""
+
+    def refused(_: Path) -> bool:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "exists", refused)
+    assert not can_be_written(Path("/root/.cache/numba"))
+
+
+def test_a_user_who_cannot_read_the_home_imports_and_runs(tmp_path: Path) -> None:
+    """A service's user with HOME=/root: kernels go to the folder for temporary files."""
+    source = Path(sys.modules["wakewise"].__file__ or "").parents[1]
+    home, tmp = tmp_path / "home", tmp_path / "tmp"
+    home.mkdir(mode=0o700)
+    tmp.mkdir()
+    tmp.chmod(0o777)
+    code = "import wakewise.allocation, wakewise.numba_cache as c; print(c.CHOSEN)"
+    words = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", sys.executable, "-c", code]
+    environment = os.environ | {"HOME": str(home), "TMPDIR": str(tmp), "PYTHONPATH": str(source)}
+    for name in (VARIABLE, "XDG_CACHE_HOME"):
+        environment.pop(name, None)
+    for folder in (tmp_path, *tmp_path.parents):  # of the test's own, which only its user may enter
+        if "pytest" in folder.as_posix():
+            folder.chmod(0o711)
+    if not shutil.which("setpriv") or subprocess.run([*words[:4], "true"], check=False, capture_output=True).returncode:
+        pytest.skip("another user can be taken by root alone")
+    done = subprocess.run(words, cwd=tmp, capture_output=True, text=True, env=environment, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == f"{tmp / 'wakewise-kernels-65534'}\n"
 
 
 def test_the_folder_is_the_users_alone(package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

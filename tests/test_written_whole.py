@@ -17,7 +17,7 @@ WRITERS = {
     *("save", "savez", "savez_compressed", "savetxt", "tofile", "memmap", "open_memmap"),
     *("imwrite", "imsave", "savefig", "VideoWriter", "export", "open_mcap"),
     *("write_text", "write_bytes", "touch", "to_csv", "to_parquet", "dump"),
-    *("copy", "copy2", "copyfile", "copyfileobj", "copytree", "ZipFile", "Writer", "FileHandler"),
+    *("copy", "copy2", "copyfile", "copyfileobj", "copytree", "Writer", "FileHandler"),
 }
 _GUARDS = {"whole_file", "whole_folder", "TemporaryDirectory", "workroom"}
 # Whole by other means, or no result. A line here needs a reason that is true of every write of that function.
@@ -30,7 +30,7 @@ ALLOWED |= dict.fromkeys(
     "a log that grows while something runs",
 )
 ALLOWED |= dict.fromkeys(
-    ("campaigns.claims._one_at_a_time", "numba_kernels._alone", "processes._take"),
+    ("campaigns.claims._locked", "numba_kernels._alone", "processes._take"),
     "a lock, which holds no result",
 )
 ALLOWED |= dict.fromkeys(
@@ -100,7 +100,7 @@ def _name(node: ast.AST) -> str:
 def _writes(call: ast.Call, buffers: frozenset[str]) -> bool:
     name = _name(call)
     method = isinstance(call.func, ast.Attribute)
-    if name == "open":
+    if name in ("open", "ZipFile", "TarFile", "GzipFile"):
         return _opens_to_write(call)
     if name not in WRITERS or (not method and name in ("write_text", "write_bytes", "copy", "dump", "export", "save")):
         return False  # those of `wakewise.files`, and of a module's own
@@ -162,6 +162,8 @@ def test_no_result_is_written_under_its_final_name() -> None:
         ("shutil.copyfile(a, b)", True),
         ("path.write_text('x')", True),
         ("write_text(path, 'x')", False),
+        ("zipfile.ZipFile(path, 'w')", True),
+        ("zipfile.ZipFile(path)", False),
         ("path.open('rb')", False),
         ("values.copy()", False),
         ("text = table.write_csv()", False),

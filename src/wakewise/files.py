@@ -12,10 +12,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from wakewise.errors import FULL, FileFailure, WakewiseError, environment_failure
+from wakewise.checks import quoted
+from wakewise.errors import FULL, FileFailure, InputError, WakewiseError, environment_failure
 from wakewise.processes import half_done
 
 _LEAST_BYTES = 65_536
+_LONGEST_NAME = 200
 _MOST_HEAD_LINES, _LONGEST_LINE = 1000, 10_000
 
 
@@ -131,6 +133,27 @@ def write_text(path: Path, text: str, lasting: bool = False) -> None:
 def write_json(path: Path, value: Any, lasting: bool = False) -> None:
     """Write JSON whole or not at all; NaN and infinity are refused, since JSON has none. `lasting` as above."""
     write_text(path, json.dumps(value, indent=2, allow_nan=False) + "\n", lasting)
+
+
+def not_a_name(name: str) -> str | None:
+    """What is wrong with a name that a file or folder is to have in its place; None if nothing is."""
+    if not name or name.strip() != name or name.startswith(".") or not name.isprintable() or set(name) & set("/\\"):
+        return "no slash, no dot first, no space around it and nothing unprintable"
+    return None if len(name.encode()) <= _LONGEST_NAME else f"at most {_LONGEST_NAME} bytes"
+
+
+def named(folder: Path, name: str, what: str) -> Path:
+    """The place in a folder that a name stands for, and no place elsewhere.
+
+    Raises
+    ------
+    InputError
+        If it cannot be a name; `what` has it, for the message.
+    """
+    fault = not_a_name(name)
+    if fault is not None:
+        raise InputError(f"{what}: {quoted(name)} names a folder, so {fault}")
+    return folder / name
 
 
 def broken_promise(path: Path) -> str | None:

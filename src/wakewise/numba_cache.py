@@ -43,9 +43,12 @@ def needs_folder(package: Path, environment: MutableMapping[str, str], can_write
 
 
 def can_be_written(folder: Path) -> bool:
-    """Whether files can be made in a folder, or it can be made itself."""
-    there = next((place for place in (folder, *folder.parents) if place.exists()), folder)
-    return there.is_dir() and os.access(there, os.W_OK | os.X_OK)
+    """Whether files can be made in a folder, or it can be made itself; not where it cannot even be looked for."""
+    try:
+        there = next((place for place in (folder, *folder.parents) if place.exists()), folder)
+        return there.is_dir() and os.access(there, os.W_OK | os.X_OK)
+    except OSError:  # a home of another user's
+        return False
 
 
 def private_folder() -> Path | None:

@@ -12,6 +12,11 @@ import yaml
 
 from wakewise.errors import InputError
 
+MOST_BYTES = 4_000_000
+"""A file that a person wrote is smaller, with tables of measured values in it, too."""
+MOST_DIGITS = 100
+"""Longest whole number that is read as one."""
+
 
 class YamlError(ValueError):
     """Text that is not YAML, or says one thing twice.
@@ -31,8 +36,11 @@ def read_yaml(text: str) -> Any:
     Raises
     ------
     YamlError
-        If it is not YAML, nests too deep to be read, or gives a key twice, which YAML forbids.
+        If it is not YAML, is longer than `MOST_BYTES`, nests too deep to be read or refers to itself, or gives a key
+        twice, which YAML forbids.
     """
+    if len(text) > MOST_BYTES:
+        raise YamlError(f"{1e-6 * len(text):.1f} million characters, at most {1e-6 * MOST_BYTES:g}", None)
     try:
         return deepcopy(_loaded(text))
     except yaml.MarkedYAMLError as fault:
@@ -48,7 +56,48 @@ def read_yaml(text: str) -> Any:
 @lru_cache(maxsize=64)
 def _loaded(text: str) -> Any:
     """Presets, worlds and vehicles are read again and again in one process; a copy costs a fiftieth of the reading."""
-    return yaml.load(text, Loader=_StrictLoader)
+    tree = yaml.load(text, Loader=_StrictLoader)
+    if _refers_to_itself(tree):
+        raise YamlError("an alias stands within what it refers to", None)
+    return tree
+
+
+def _refers_to_itself(tree: Any) -> bool:
+    """Whether a list or mapping holds itself, however deep."""
+    above: set[int] = set()
+    done: set[int] = set()
+    waiting: list[tuple[Any, bool]] = [(tree, False)]
+    while waiting:
+        node, is_left = waiting.pop()
+        if not isinstance(node, dict | list):
+            continue
+        if is_left:
+            above.discard(id(node))
+            done.add(id(node))
+        elif id(node) in above:
+            return True
+        elif id(node) not in done:
+            above.add(id(node))
+            waiting.append((node, True))
+            waiting += [(inner, False) for inner in (node.values() if isinstance(node, dict) else node)]
+    return False
+
+
+def text_of(path: Path) -> str:
+    """Text of a file that a person wrote.
+
+    Raises
+    ------
+    OSError, UnicodeDecodeError
+        If it cannot be read as text.
+    YamlError
+        If it is larger than `MOST_BYTES`.
+    """
+    with path.open("rb") as file:
+        data = file.read(MOST_BYTES + 1)
+    if len(data) > MOST_BYTES:
+        raise YamlError(f"larger than {1e-6 * MOST_BYTES:g} MB, which no such file is", None)
+    return data.decode("utf-8")
 
 
 def yaml_file(path: Path) -> Any:
@@ -60,13 +109,22 @@ def yaml_file(path: Path) -> Any:
         If it cannot be read, or see `read_yaml`.
     """
     try:
-        return read_yaml(path.read_text(encoding="utf-8"))
+        return read_yaml(text_of(path))
     except (OSError, UnicodeDecodeError, YamlError) as fault:
         raise InputError(f"{path}: cannot be read as YAML ({' '.join(str(fault).split())})") from fault
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """Safe YAML that refuses a key given twice, which the plain loader lets pass, the last one winning."""
+    """Safe YAML that refuses a key given twice, which the plain loader lets pass, the last one winning.
+
+    Whole numbers of more than `MOST_DIGITS` digits are refused, too: to write one in a message takes minutes.
+    """
+
+    def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
+        if len(node.value) > MOST_DIGITS:
+            words = f"a number of {len(node.value)} digits, at most {MOST_DIGITS}"
+            raise yaml.constructor.ConstructorError(None, None, words, node.start_mark)
+        return int(super().construct_yaml_int(node))
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         seen: set[str] = set()
@@ -80,6 +138,7 @@ class _StrictLoader(yaml.SafeLoader):
         return dict(super().construct_mapping(node, deep=deep))
 
 
+_StrictLoader.add_constructor("tag:yaml.org,2002:int", _StrictLoader.construct_yaml_int)
 # YAML 1.1 reads 12:30 as 750, a number of base sixty, as no one expects: such texts stay texts.
 _SIXTY = re.compile(r"^[-+]?[0-9][0-9_]*(:[0-5]?[0-9])+(\.[0-9_]*)?$")
 for _first in "-+0123456789":

@@ -91,6 +91,16 @@ def test_a_damaged_claim_is_nobodys(tmp_path: Path, text: str) -> None:
     assert claims.take(tmp_path)
 
 
+def test_what_holds_others_off_is_gone_after_a_take_over(tmp_path: Path) -> None:
+    """One that a kill left behind, too."""
+    trial = tmp_path / "trial"
+    trial.mkdir()
+    (tmp_path / ".taking-over").touch()
+    (trial / claims.CLAIM).write_text("damaged")
+    assert claims.take(trial)
+    assert [path.name for path in tmp_path.iterdir()] == ["trial"]
+
+
 def test_of_many_who_take_over_one_succeeds(tmp_path: Path) -> None:
     """However many see the same stale claim at once."""
     code = (

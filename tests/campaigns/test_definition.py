@@ -96,6 +96,7 @@ def test_the_example_is_a_campaign(tmp_path: Path) -> None:
         ({"methods": ["dp", "dp"]}, "methods: 'dp' is named twice"),
         ({"timeout_s": 0}, "timeout_s: found 0, should be greater than 0"),
         ({"retries": -1}, "retries"),
+        ({"name": "../../evil"}, "name: found '../../evil', names a folder, so no slash, no dot first"),
     ],
 )
 def test_a_fault_of_the_file_is_told_with_what_would_be_right(

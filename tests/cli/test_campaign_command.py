@@ -15,6 +15,8 @@ import polars as pl
 import pytest
 
 from wakewise.campaigns import definition, versions
+from wakewise.campaigns.plan import keep_plan
+from wakewise.campaigns.store import open_store
 from wakewise.cli.main import run as command
 
 FILE = "name: small\nstages: fly\nmethods: [dp, unaware]\ntargets: [branching, brain]\nseeds: 2\n"
@@ -92,6 +94,32 @@ def test_trials_that_the_computer_failed_are_told_and_made_by_the_same_command(
     Path("room").touch()
     assert command(["campaign", "run", "small.yaml", "--workers", "2", "--json"]) == 0
     assert _json(capsys)["done"] == 8
+
+
+def test_no_cell_of_a_csv_is_a_formula(cheap_work: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Names that spreadsheets would run have an apostrophe before them there; Parquet keeps them as they are."""
+    names = ("=cmd|' /C calc'!A0", "+1", "-1", "@sum", "as it is")
+    told = ", ".join(f'"{name}": {{}}' for name in names)
+    Path("small.yaml").write_text(f"{FILE}variations: {{{told}}}\n")
+    campaign = definition.load_campaign(Path("small.yaml"))
+    open_store(Path("runs/small"))
+    keep_plan(Path("runs/small"), campaign, definition.planned(campaign))
+    for suffix in ("csv", "parquet"):
+        assert command(["campaign", "table", "small.yaml", "--write", f"all.{suffix}", "--json"]) == 0
+    capsys.readouterr()
+    assert set(pl.read_csv("all.csv")["variation"]) == {*(f"'{name}" for name in names[:4]), "as it is"}
+    assert set(pl.read_parquet("all.parquet")["variation"]) == set(names)
+
+
+def test_a_name_that_leaves_its_folder_makes_nothing(cheap_work: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Exit code 2 in a line, and no folder anywhere."""
+    Path("small.yaml").write_text(FILE.replace("name: small", "name: ../../evil"))
+    before = {path.name for path in cheap_work.parent.iterdir()}
+    for words in (["campaign", "run", "small.yaml"], ["campaign", "status", "small.yaml"]):
+        assert command(words) == 2
+        assert "small.yaml: name: found '../../evil', names a folder" in capsys.readouterr().err
+    assert not Path("runs").exists()
+    assert {path.name for path in cheap_work.parent.iterdir()} == before
 
 
 def test_people_see_tables_and_reasons(cheap_work: Path, capsys: pytest.CaptureFixture[str]) -> None:

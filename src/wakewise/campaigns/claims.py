@@ -124,15 +124,35 @@ def _is_left(folder: Path, abandoned_beat: int | None) -> bool:
 @contextmanager
 def _one_at_a_time(folder: Path) -> Iterator[None]:
     """Hold others off while a claim is taken over: between the look at it and its replacement no other may do so."""
-    handle = os.open(folder / _TAKING_OVER, os.O_RDWR | os.O_CREAT, 0o644)
+    path = folder / _TAKING_OVER
+    handle = _locked(path)
+    while not _is_still(handle, path):  # its holder removed it between the opening and the locking
+        os.close(handle)
+        handle = _locked(path)
     try:
-        with suppress(ImportError, OSError):  # systems, and file systems, without locks
-            import fcntl
-
-            fcntl.flock(handle, fcntl.LOCK_EX)
         yield
     finally:
+        with suppress(OSError):  # Windows removes no open file
+            path.unlink(missing_ok=True)
         os.close(handle)
+
+
+def _locked(path: Path) -> int:
+    """An open file that no other process has locked."""
+    handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    with suppress(ImportError, OSError):  # systems, and file systems, without locks
+        import fcntl
+
+        fcntl.flock(handle, fcntl.LOCK_EX)
+    return handle
+
+
+def _is_still(handle: int, path: Path) -> bool:
+    """Whether an open file is the one that has the name."""
+    try:
+        return os.fstat(handle).st_ino == path.stat().st_ino
+    except FileNotFoundError:
+        return False
 
 
 @cache

@@ -18,8 +18,9 @@ from wakewise.campaigns.outside import check_there, outside_of
 from wakewise.campaigns.task import Task
 from wakewise.campaigns.versions import FLIES, PHOTOGRAPHS
 from wakewise.errors import InputError
+from wakewise.files import not_a_name
 from wakewise.operation.scenario import PRESETS, Scenario, describe_fault, load_scenario
-from wakewise.settings import Settings
+from wakewise.settings import Seed, Settings
 from wakewise.targets import coral_kinds
 from wakewise.yaml_text import yaml_file
 
@@ -55,7 +56,7 @@ class Campaign(Settings):
     variations: dict[str, dict[str, Any]] = Field(
         default={}, description="by name, fields of the scenario that a variation changes; {} changes nothing"
     )
-    seeds: int | tuple[int, ...] = Field(3, description="seeds 1 to this, or a list of seeds")
+    seeds: int | tuple[Seed, ...] = Field(3, description="seeds 1 to this, or a list of seeds")
     timeout_s: float | None = Field(1800.0, gt=0.0, description="a trial that takes longer is ended; null: never")
     memory_MB: float | None = Field(None, gt=0.0, description="a trial that takes more memory is ended; null: never")
     retries: int = Field(
@@ -81,8 +82,15 @@ class Campaign(Settings):
         if isinstance(value, int):
             if not 1 <= value <= MOST_TRIALS:
                 raise ValueError(f"allowed are 1 to {MOST_TRIALS}, or a list of seeds")
-        elif not value or min(value) < 0 or len(set(value)) < len(value):
-            raise ValueError("a list of seeds needs at least one, none twice, none below 0")
+        elif not value or len(set(value)) < len(value):
+            raise ValueError("a list of seeds needs at least one, none twice")
+        return value
+
+    @field_validator("name")
+    @classmethod
+    def _names_a_folder(cls, value: str) -> str:
+        if fault := not_a_name(value):
+            raise ValueError(f"names a folder, so {fault}")
         return value
 
     @property

@@ -12,6 +12,7 @@ import polars as pl
 from wakewise.errors import InputError, StageError
 from wakewise.evaluation import Crop, compare_surface
 from wakewise.files import whole_file, write_json
+from wakewise.pictures import read_picture
 from wakewise.reconstruction import read_cloud
 from wakewise.targets import Target
 
@@ -66,7 +67,7 @@ def _keep_photographs(place: Path, folder: Path) -> None:
     kept = []
     for wished in PICTURES_AT_S:
         row = int(np.argmin(np.abs(times - wished)))
-        image = cv2.imread(str(place / "images" / listed["name"][row]), cv2.IMREAD_COLOR)
+        image = read_picture(place / "images" / listed["name"][row])
         if image is None:
             continue
         size = (WIDE_PX, round(WIDE_PX * image.shape[0] / image.shape[1]))

@@ -167,6 +167,8 @@ def group_table(found: Results, by: Sequence[str] = (), figures: Sequence[str] =
 def write_table(found: Results, path: Path) -> None:
     """Write all trials as a Parquet or CSV table: a row each, factors, state and figures as columns.
 
+    In CSV a word that a spreadsheet would read as a formula has an apostrophe before it.
+
     Raises
     ------
     InputError
@@ -184,9 +186,14 @@ def write_table(found: Results, path: Path) -> None:
     table = pl.DataFrame(rows, infer_schema_length=None)
     with whole_file(path, lasting=True) as temporary:
         if path.suffix == ".csv":
-            table.write_csv(temporary)
+            table.with_columns(_as_text(pl.col(pl.String))).write_csv(temporary)
         else:
             table.write_parquet(temporary)
+
+
+def _as_text(words: pl.Expr) -> pl.Expr:
+    """Words as spreadsheets take them for words: an apostrophe before what they would read as a formula."""
+    return pl.when(words.str.contains("^[=+@\t\r-]")).then("'" + words).otherwise(words).name.keep()
 
 
 def _state(store: Store, key: str, told: Attempts) -> State:

@@ -110,6 +110,7 @@ def run_campaign(
     from wakewise.campaigns.table import group_table, results, status
     from wakewise.errors import EnvironmentFailure, InputError
     from wakewise.extras import need
+    from wakewise.files import named
     from wakewise.operation.flying import FLIGHT_JOBS
     from wakewise.warming import warm
 
@@ -129,7 +130,7 @@ def run_campaign(
     with bars.stage("plan") as progress:
         progress(0, 1, "checking every combination")
         trials = planned(campaign, str(file))
-    folder = out or Path("runs") / campaign.name
+    folder = out or named(Path("runs"), campaign.name, f"{file}: name")
     open_store(folder)
     keep_plan(folder, campaign, trials)
     with bars.stage("compile") as progress:  # else each of the workers would
@@ -255,8 +256,9 @@ def _folder(path: Path) -> Path:
     """The folder of a campaign, where its file was given."""
     if path.is_file():
         from wakewise.campaigns import load_campaign
+        from wakewise.files import named
 
-        return Path("runs") / load_campaign(path).name
+        return named(Path("runs"), load_campaign(path).name, f"{path}: name")
     return path
 
 

@@ -50,8 +50,10 @@ TargetSize = Annotated[
 
 def default_folder(scenario: Scenario, what: str) -> Path:
     """Folder of a trial that was given none: another target, method or seed goes elsewhere."""
-    named = f"{scenario.name}-{Path(scenario.target.kind).stem}-{what}-{scenario.seed}"
-    return Path("runs") / named.replace(":", "-")
+    from wakewise.files import named
+
+    name = f"{scenario.name}-{Path(scenario.target.kind).stem}-{what}-{scenario.seed}"
+    return named(Path("runs"), name.replace(":", "-"), "--out")
 
 
 def overrides(

@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_va
 from wakewise.control import MAKERS, ControlSettings
 from wakewise.errors import InputError
 from wakewise.estimation import FilterSettings
-from wakewise.files import write_text
+from wakewise.files import not_a_name, write_text
 from wakewise.imaging import ImagingSettings
 from wakewise.imaging.settings import CAMERAS
 from wakewise.missions import MissionSettings
@@ -30,7 +30,7 @@ from wakewise.settings import Seed, Settings, describe_faults, guess
 from wakewise.tank import TankSettings
 from wakewise.tank.beds import SILTS
 from wakewise.vehicles.ballast import Block
-from wakewise.yaml_text import YamlError, read_yaml
+from wakewise.yaml_text import YamlError, read_yaml, text_of
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
@@ -90,8 +90,8 @@ class Scenario(Settings):
     @field_validator("name")
     @classmethod
     def _names_a_folder(cls, value: str) -> str:
-        if value.strip() != value or value.startswith(".") or not value.isprintable() or set(value) & set("/\\"):
-            raise ValueError("names a folder, so no slash, no dot first, no space around it and nothing unprintable")
+        if fault := not_a_name(value):
+            raise ValueError(f"names a folder, so {fault}")
         return value
 
     @field_validator("vehicle")
@@ -281,7 +281,7 @@ def differences(a: BaseModel, b: BaseModel, prefix: str = "") -> list[str]:
 
 def _read_yaml(path: Path) -> dict[str, Any]:
     try:
-        tree = read_yaml(path.read_text(encoding="utf-8"))
+        tree = read_yaml(text_of(path))
     except FileNotFoundError:
         raise InputError(f"{path}: no such file, a scenario YAML file is needed") from None
     except (OSError, UnicodeDecodeError):

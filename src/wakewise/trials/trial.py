@@ -16,7 +16,7 @@ from wakewise.arrays import Array
 from wakewise.errors import InputError, StageError
 from wakewise.evaluation import SWAY_FIGURES, Crop, compare_surface, evaluate_surface, flight_figures
 from wakewise.extras import need
-from wakewise.files import write_json
+from wakewise.files import named, write_json
 from wakewise.geometry import matrix_from_quat
 from wakewise.missions import SETTLING
 from wakewise.operation import (
@@ -30,7 +30,7 @@ from wakewise.operation import (
 from wakewise.operation.by_hand.live_folder import gather
 from wakewise.operation.by_hand.replay import fly_hands
 from wakewise.operation.flight_log import has_parts
-from wakewise.operation.flying import FLIGHT_JOBS
+from wakewise.operation.flying import FLIGHT_JOBS, parts_of
 from wakewise.operation.trial_folder import BY_HAND, as_flown, check_place, claim, write_plan
 from wakewise.processes import alone
 from wakewise.reconstruction import read_cloud, read_lens, reconstruct
@@ -104,7 +104,7 @@ def run_trial(
     """
     need("a trial", "photos", "logs")
     watch = watch or Quiet()
-    parts = flight if isinstance(flight, Parts) else flight.parts()
+    parts = parts_of(flight)
     scenario = as_flown(parts)
     check_place(folder, scenario)
     if not is_warm(JOBS):
@@ -199,10 +199,16 @@ def compare_methods(
     `meanwhile` is that of `run_trial`, with the method's name before.
     """
     for flight in flights.values():  # what does not fit is refused before the first of them flies
-        _ = (flight if isinstance(flight, Parts) else flight.parts()).preflight
+        _ = parts_of(flight).preflight
     result = comparison(
         {
-            name: run_trial(flight, folder / name, watch, None, None if meanwhile is None else partial(meanwhile, name))
+            name: run_trial(
+                flight,
+                named(folder, name, "compare"),
+                watch,
+                None,
+                None if meanwhile is None else partial(meanwhile, name),
+            )
             for name, flight in flights.items()
         }
     )

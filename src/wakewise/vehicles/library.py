@@ -15,7 +15,7 @@ from wakewise.vehicles.draft import VehicleDraft
 from wakewise.vehicles.needs import BLANK, NEEDED_FIELDS
 from wakewise.vehicles.vehicle import Vehicle
 from wakewise.vehicles.vehicle_file import VehicleFile
-from wakewise.yaml_text import YamlError, read_yaml
+from wakewise.yaml_text import YamlError, read_yaml, text_of
 
 
 @functools.cache
@@ -67,8 +67,8 @@ def load_draft(name_or_path: str) -> VehicleDraft:
         hint, names = guess(name_or_path, draft_names()), ", ".join(draft_names())
         raise InputError(f"vehicle {name_or_path!r}: not in the library, {hint}allowed {names} or the path of a file")
     try:
-        text = path.read_text("utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        text = text_of(path)
+    except (OSError, UnicodeDecodeError, YamlError) as error:
         raise InputError(f"vehicle file {name_or_path}: not readable as UTF-8 text ({error})") from error
     return parse_vehicle(text, name_or_path, path.stem)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from wakewise.errors import InputError
-from wakewise.settings import Settings
+from wakewise.settings import Seed, Settings
 
 
 class FieldSettings(Settings):
@@ -51,7 +51,7 @@ class FieldSettings(Settings):
     agreeing_views: int = Field(default=2, ge=1, le=10, description="other depth maps that must agree with a point")
     checkpoint_every: int = Field(default=500, ge=1, description="steps between checkpoints")
     threads: int = Field(default=2, ge=1, le=64, description="threads on a CPU; their number changes the last digits")
-    random_seed: int = Field(default=0, ge=0, description="seed of every random choice")
+    random_seed: Seed = Field(default=0, description="seed of every random choice")
 
 
 PROFILES = {
