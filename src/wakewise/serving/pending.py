@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Callable
 from ipaddress import IPv6Address, ip_address
 
-PER_ADDRESS, IN_ALL = 48, 192
+PER_ADDRESS, IN_ALL = 128, 384
 """A page asks for its thirty files over at most six connections at a time; several pages may share an address."""
 
 
