@@ -4,18 +4,18 @@ import sys
 
 import wakewise as ww
 from wakewise.allocation import least_thrusts
-from wakewise.control import make_tracker, vehicle_layout
+from wakewise.control import TrackerState as State, make_tracker, vehicle_layout
 
 
 class Mine:
-    def __init__(self, parts):
+    def __init__(self, parts: ww.Parts) -> None:
         self.name, self.layout = "mine", vehicle_layout(parts.vehicle)
         self.tracker = make_tracker(parts.vehicle, parts.control)
 
-    def init(self):
+    def init(self) -> State:
         return self.tracker.init()
 
-    def step(self, state, dt_s, estimate, goal):
+    def step(self, state: State, dt_s: float, estimate: ww.BodyState, goal: ww.Goal) -> tuple[State, ww.Command]:
         state, wrench = self.tracker.wrench(state, dt_s, estimate, goal)
         return state, ww.Command(thrusts_N=least_thrusts(self.layout, wrench).thrusts_N, wrench_B=wrench)
 

@@ -18,7 +18,8 @@ else:  # photographs of a coral, rendered, so that the truth is known
     target, rng = scenario.parts().target, np.random.default_rng(1)
     views = planned_views(target, scenario.mission, scenario.imaging.exposure_s, rng)
     photos = write_photos(out, views, None, scenario.imaging, target).folder
-    known = {"reference_cameras": out / "poses.csv", "region": (target.centre_W_m, 1.25 * target.radius_m)}
-    print(ww.reconstruct(photos, out / "model", settings=scenario.reconstruction, **known).summary())
+    settings, region = scenario.reconstruction, (target.centre_W_m, 1.25 * target.radius_m)
+    centres = out / "poses.csv"
+    print(ww.reconstruct(photos, out / "model", settings=settings, reference_cameras=centres, region=region).summary())
     score = ww.evaluate(out / "model" / "dense.ply", target.mesh, bed_z_m=target.bed_z_m)
     print(f"against the true surface: {score.rmse_mm:.2f} mm rms, {score.completeness_pct:.0f} % complete")

@@ -15,9 +15,9 @@ for method in ("dp", "wake-aware"):
     for standoff_m in standoffs_m:
         flights.append(ww.fly(parts.replace(method=method, **{"mission.standoff_m": standoff_m}), duration_s=seconds))
         print(f"{standoff_m} m: {flights[-1]}")
-    axes[0].plot(standoffs_m, [1e3 * flight.figures["target_speed_mean_m_s"] for flight in flights], "o-", label=method)
+    axes[0].plot(standoffs_m, [flight.figures["target_speed_mean_m_s"] for flight in flights], "o-", label=method)
     axes[1].plot(standoffs_m, [flight.figures["position_rmse_mm"] for flight in flights], "o-", label=method)
-axes[0].set(xlabel="standoff (m)", ylabel="water at the target (mm/s)", title="one seed: one draw of the water")
+axes[0].set(xlabel="standoff (m)", ylabel="water at the target (m/s)", title="one seed: one draw of the water")
 axes[1].set(xlabel="standoff (m)", ylabel="position error (mm)")
 for panel in axes:
     panel.set_ylim(0)

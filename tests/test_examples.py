@@ -7,6 +7,7 @@ import re
 import runpy
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -44,9 +45,36 @@ def is_picture(path):
     return path.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n" and path.stat().st_size > 10_000
 
 
-def test_there_are_nine():
-    """Nine questions."""
-    assert len(list(EXAMPLES.glob("*.py"))) == 9
+def test_there_are_ten():
+    """Ten questions."""
+    assert len(list(EXAMPLES.glob("*.py"))) == 10
+
+
+def test_types_of_the_examples_are_checked():
+    """Mypy looks at the examples and at the cookbook, strictly, each time that it looks at the package."""
+    settings = tomllib.loads((EXAMPLES.parent / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["mypy"]
+    assert settings["strict"] and {"src", "examples", "tests/cookbook/reef_parts.py"} <= set(settings["files"])
+
+
+@pytest.mark.slow
+def test_the_examples_and_the_cookbook_pass_mypy():
+    """`mypy --strict` has nothing to say of them: parts, figures and functions have the types that they claim."""
+    looked = [sys.executable, "-m", "mypy", "--strict", "examples", "tests/cookbook/reef_parts.py"]
+    done = subprocess.run(looked, cwd=EXAMPLES.parent, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+
+
+def test_the_wake_is_drawn_and_its_speeds_are_those_of_the_disturbance(tmp_path):
+    """The picture is there; squares of the velocity, weighted, add up to D."""
+    import wakewise as ww
+
+    run("wake_field.py", tmp_path)
+    assert is_picture(tmp_path / "wake_field.png")
+    parts = ww.Scenario.preset("quick", vehicle="bluerov2-heavy").parts()
+    pose, thrusts = [-0.6, 0.0, 1.3, 0.0, 0.1, 0.6], np.array([3.0, -2.0, -4.0, 1.0, 0.5, -1.0, 2.0, 0.0])
+    water = ww.velocity(parts.vehicle, thrusts, pose, parts.region.points_W_m)
+    D = float(parts.region.weights @ (water**2).sum(axis=1))
+    assert pytest.approx(D, rel=1e-9) == ww.disturbance(parts.vehicle, thrusts, pose, parts.region)
 
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.stem)

@@ -24,7 +24,7 @@ from wakewise.control.receding import PlanningController, planning_controller
 from wakewise.control.safeguard import Safeguard, safeguarded
 from wakewise.control.settings import ControlSettings
 from wakewise.control.stability import Gains, vehicle_axes, wished_gains
-from wakewise.control.tracker import make_tracker
+from wakewise.control.tracker import Tracker, TrackerState, make_tracker
 
 __all__ = [
     "MAKERS",
@@ -35,6 +35,8 @@ __all__ = [
     "LeverSettings",
     "PlanningController",
     "Safeguard",
+    "Tracker",
+    "TrackerState",
     "in_pulses",
     "make_controller",
     "make_tracker",

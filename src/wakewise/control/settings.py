@@ -7,7 +7,8 @@ from typing import Annotated
 from pydantic import Field
 
 from wakewise.control.levers import LeverSettings
-from wakewise.planning.problem import DISTURBANCE_WEIGHT, EFFORT_WEIGHT, PlanSettings
+from wakewise.defaults import DISTURBANCE_WEIGHT, EFFORT_WEIGHT
+from wakewise.planning.problem import PlanSettings
 from wakewise.settings import Settings
 from wakewise.wake import WakeSettings
 from wakewise.wake.gradients import Superposition

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+import os
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, cast
 
 import polars as pl
 
-from wakewise.errors import StageError, WakewiseError
+from wakewise.checks import finite_number, quoted
+from wakewise.errors import InputError, StageError, WakewiseError
 from wakewise.evaluation import flight_figures
 from wakewise.extras import has
 from wakewise.imaging.settings import METERED
@@ -40,6 +43,55 @@ _IN_WORDS = (
 )
 
 
+class FlightFigures(TypedDict):
+    """What a flight is judged by; the unit is in the name, each is defined at `wakewise.evaluation.flight_figures`.
+
+    None where it is not known: with no witness (at sea), before the first exposure, of a target that nothing moves.
+    """
+
+    method: str
+    seed: int
+    duration_s: float
+    target_speed_mean_m_s: float | None
+    target_speed_p95_m_s: float | None
+    bed_speed_p95_m_s: float | None
+    turbidity_mean_per_m: float | None
+    target_pressure_mean_Pa: float | None
+    target_pressure_p95_Pa: float | None
+    bed_shear_p95_Pa: float | None
+    tracer_speed_mean_m_s: float | None
+    ray_optical_depth: float | None
+    disturbance: float | None
+    exceedance_1cm_s_pct: float | None
+    exceedance_ambient_pct: float | None
+    exposure_speed_mean_m_s: float | None
+    exposure_speed_p95_m_s: float | None
+    exposure_pressure_mean_Pa: float | None
+    exposure_pressure_p95_Pa: float | None
+    exposure_optical_depth: float | None
+    exposure_exceedance_1cm_s_pct: float | None
+    silt_lifted_g: float | None
+    silt_suspended_max_g: float | None
+    sway_rms_mm: float | None
+    sway_peak_mm: float | None
+    sway_mean_mm: float | None
+    sway_about_mean_mm: float | None
+    sway_wash_mm: float | None
+    target_stress_peak_Pa: float | None
+    shifted_mm: float | None
+    position_rmse_mm: float | None
+    path_rmse_mm: float | None
+    estimate_rmse_mm: float | None
+    tracking_rmse_mm: float | None
+    velocity_deviation_pct: float | None
+    roll_pitch_rms_deg: float | None
+    attitude_rmse_deg: float | None
+    energy_kJ: float | None
+    sign_flips_per_s: float | None
+    collisions: int | None
+    fallbacks: int | None
+
+
 @dataclass(frozen=True, eq=False)
 class Flight:
     """What a flight was: its parts and its record.
@@ -57,24 +109,26 @@ class Flight:
         return self.recorder.frame()
 
     @cached_property
-    def figures(self) -> dict[str, Any]:
+    def figures(self) -> FlightFigures:
         """What the flight is judged by, from the first leg on: wash at the target, errors, energy.
 
         A flight that was ended before its first leg is judged by all of it.
         """
         frame = self.steps.filter(pl.col("leg") != SETTLING)
         judged = frame if frame.height else self.steps
-        return {"method": self.parts.method, "seed": self.parts.scenario.seed, **flight_figures(judged)}
+        named = {"method": self.parts.method, "seed": self.parts.scenario.seed}
+        return cast("FlightFigures", named | flight_figures(judged))
 
     def __str__(self) -> str:
         """The flight in one line: the water at the target, the error of position, the energy, what went amiss."""
+        figures: dict[str, Any] = dict(self.figures)
         words = [
             text.format(scale * float(value))
             for key, scale, text in _IN_WORDS
-            if (value := self.figures[key]) is not None and math.isfinite(value)
+            if (value := figures[key]) is not None and math.isfinite(value)
         ]
-        amiss = [f"{self.figures[key]} {key}" for key in ("collisions", "fallbacks") if self.figures[key]]
-        return f"{self.figures['method']}, seed {self.figures['seed']}: {', '.join([*words, *amiss])}"
+        amiss = [f"{figures[key]} {key}" for key in ("collisions", "fallbacks") if figures[key]]
+        return f"{figures['method']}, seed {figures['seed']}: {', '.join([*words, *amiss])}"
 
     def write(self, folder: Path) -> None:
         """Write exposures.npz, timings.parquet; last steps.parquet, which says that the flight is whole.
@@ -106,7 +160,7 @@ def fly(
     duration_s : float, optional
         Only the first part of the mission.
     progress : callable
-        Called as `(done, total, note)`.
+        Called as `(done, total, note)`. Without it, compiling, which happens once, is told of on standard error.
     checked : bool
         Hold the parts against each other first (see `Parts.preflight`).
     water_every_s : float
@@ -123,7 +177,7 @@ def fly(
     Raises
     ------
     InputError
-        If the parts do not fit each other.
+        If the parts do not fit each other, or the duration is not at least one control step.
     StageError
         If a part from outside, other than the controller, ends the flight.
 
@@ -134,9 +188,14 @@ def fly(
     >>> flight.steps.height, flight.parts.method
     (50, 'dp')
     """
-    parts = flight if isinstance(flight, Parts) else flight.parts()
+    parts = parts_of(flight)
     route, _ = parts.route, parts.vehicle  # what cannot be used is refused before minutes of compiling
-    warm(FLIGHT_JOBS, progress)
+    dt_s = 1.0 / parts.scenario.control.rate_hz
+    lasts_s = route.duration_s if duration_s is None else finite_number(duration_s, "duration_s")
+    if round(lasts_s / dt_s) < 1:
+        raise InputError(f"duration_s: {lasts_s:g}, must be at least one control step, {dt_s:g} s")
+    finite_number(water_every_s, "water_every_s", above=0.0)
+    warm(FLIGHT_JOBS, _Notice() if progress is no_progress else progress)
     if checked:
         _ = parts.preflight
     else:
@@ -151,10 +210,40 @@ def fly(
             watch(step, witness)
 
     with blamed(parts, recorder):
-        loop_of(parts, plant, witness, record)(
-            duration_s=route.duration_s if duration_s is None else duration_s, progress=progress
-        )
+        loop_of(parts, plant, witness, record)(duration_s=lasts_s, progress=progress)
     return Flight(parts, recorder)
+
+
+def parts_of(flight: Parts | Scenario) -> Parts:
+    """The parts themselves, or those of a scenario.
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    """
+    if isinstance(flight, Scenario):
+        return flight.parts()
+    if not isinstance(flight, Parts):
+        raise InputError(f"flight: {quoted(flight)}, must be Parts or a Scenario")
+    return flight
+
+
+class _Notice:
+    """Progress of compiling for somebody who gave no way to show it: a line on standard error, the first time."""
+
+    told = False
+
+    def __call__(self, done: float, total: float, note: str = "") -> None:  # noqa: ARG002  (progress is called so)
+        """Say once that kernels are compiled, and about how long that takes."""
+        if not self.told and total > done:
+            self.told = True
+            minutes = max(1, round((total - done) / 60.0 / min(4, os.cpu_count() or 1)))
+            print(
+                f"wakewise: compiling kernels, some {minutes} min; only this time (wakewise warm does so beforehand)",
+                file=sys.stderr,
+                flush=True,
+            )
 
 
 def recorder_of(parts: Parts, witness: Witness | None, timetable: Timetable, **more: Any) -> FlightRecorder:

@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar, overload
 
 from wakewise.arrays import Array
+from wakewise.checks import able, instance_of, quoted
 from wakewise.control import ControlSettings, in_pulses, make_controller
 from wakewise.control.settings import flown_by
 from wakewise.errors import InputError
@@ -45,12 +46,19 @@ T = TypeVar("T")
 class part(cached_property[T]):  # noqa: N801  (a decorator, like cached_property)
     """A part that is made when first asked for, unless another one was given in its place."""
 
-    def __get__(self, instance: Any, owner: type | None = None) -> Any:
+    @overload
+    def __get__(self, instance: None, owner: type[Any] | None = None) -> Self: ...
+
+    @overload
+    def __get__(self, instance: object, owner: type[Any] | None = None) -> T: ...
+
+    def __get__(self, instance: Any, owner: type[Any] | None = None) -> Self | T:
         """The part that was given, or the scenario's own, made once."""
         if instance is None:
-            return super().__get__(instance, owner)
+            return self
         if self.attrname in instance.given:
-            return instance.given[self.attrname]
+            given: T = instance.given[self.attrname]
+            return given
         once = instance.scenario.replaced.get(self.attrname or "")
         if once is not None:  # the scenario of a trial that was flown with another part than it can name
             raise InputError(
@@ -58,6 +66,10 @@ class part(cached_property[T]):  # noqa: N801  (a decorator, like cached_propert
                 f"give it again with replace({self.attrname}=...)"
             )
         return super().__get__(instance, owner)
+
+    def __repr__(self) -> str:
+        """What `help(Parts)` shows of it: its type, and what it is."""
+        return f"<part, {self.func.__annotations__.get('return', '')}: {(self.__doc__ or '').partition('.')[0]}>"
 
 
 class Parts:
@@ -73,6 +85,31 @@ class Parts:
         is flown.
     given : mapping
         Names of parts and what stands in their place; see `replace`.
+
+    Attributes
+    ----------
+    vehicle : Vehicle
+        As the controller believes it to be, with its ballast.
+    target : Target
+        What is looked at.
+    region : Region
+        Points and weights that stand for the water to spare.
+    route : Route
+        Camera poses over time, and when the shutter opens.
+    pilot : Pilot
+        Where goals come from: by default the route.
+    wake : WakeModel
+        What the controller believes its jets do.
+    surroundings : Surroundings
+        What a planner keeps clear of.
+    controller : Controller
+        From an estimate and a goal to thrusts.
+    estimator : Estimator
+        From measurements to an estimate.
+    world : World
+        Where the vehicle really flies.
+    start : BodyState
+        Where the mission begins.
 
     Examples
     --------
@@ -104,9 +141,13 @@ class Parts:
         Raises
         ------
         InputError
-            If there is no such part or field.
+            If there is no such part or field, or what is given cannot be that part.
         """
         scenario = given.pop("scenario", self.asked)
+        if not (hasattr(scenario, "drawn") and hasattr(scenario, "parts")):
+            raise InputError(f"scenario: {quoted(scenario)}, must be a Scenario")
+        for name in given.keys() & set(PARTS):
+            fits(name, given[name])
         fields = {name: given.pop(name) for name in list(given) if name not in PARTS}
         if fields:
             scenario = scenario.replace(**fields)
@@ -293,3 +334,34 @@ PARTS: tuple[str, ...] = tuple(name for name, value in vars(Parts).items() if is
 
 _MADE_BY = {"method": ("controller",)}
 """Parts that give way when this field of the scenario is replaced."""
+
+_RECORDS: dict[str, type] = {
+    "vehicle": Vehicle,
+    "target": Target,
+    "region": Region,
+    "route": Route,
+    "start": BodyState,
+    "surroundings": Surroundings,
+}
+_METHODS: dict[str, tuple[str, ...]] = {
+    "pilot": ("goal",),
+    "wake": ("unit_velocity",),
+    "controller": ("init", "step"),
+    "estimator": ("init", "step"),
+    "world": ("begin",),
+}
+"""What a part of a kind that is a Protocol must have at least (see `wakewise.interfaces`)."""
+
+
+def fits(name: str, given: object) -> None:
+    """Refuse what cannot be the part of that name.
+
+    Raises
+    ------
+    InputError
+        Naming what it is instead, or the methods that it lacks.
+    """
+    if name in _RECORDS:
+        instance_of(given, _RECORDS[name], name)
+    else:
+        able(given, _METHODS[name], name, name)

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 
 from wakewise.arrays import Array, BoolArray
+from wakewise.interfaces import WakeModel
+from wakewise.wake.disturbance import unit_velocity
 from wakewise.wake.jets import AxialJet
 from wakewise.wake.samples import CORE, FAR, WAKE, JetSamples
 
@@ -43,12 +45,18 @@ class Scores:
         return asdict(self)
 
 
-def predicted_speed(model: AxialJet, samples: JetSamples) -> Array:
-    """Axial speed in m/s of a model at the points and thrusts of samples, shape (n,)."""
-    return model.speed(samples.x_m, samples.r_m, samples.thrust_N, samples.disk_area_m2)
+def predicted_speed(model: WakeModel, samples: JetSamples) -> Array:
+    """Axial speed in m/s of a model, ours or one from outside, at the points and thrusts of samples, shape (n,)."""
+    if isinstance(model, AxialJet):
+        return model.speed(samples.x_m, samples.r_m, samples.thrust_N, samples.disk_area_m2)
+    areas, which = np.unique(samples.disk_area_m2, return_inverse=True)
+    ahead = np.tile([1.0, 0.0, 0.0], (len(areas), 1))
+    points = np.column_stack([samples.x_m, samples.r_m, np.zeros(len(samples))])
+    unit = unit_velocity(model, points, np.zeros((len(areas), 3)), ahead, areas)
+    return np.asarray(np.sqrt(samples.thrust_N) * unit[which, np.arange(len(samples)), 0])
 
 
-def score(model: AxialJet, samples: JetSamples) -> Scores:
+def score(model: WakeModel, samples: JetSamples) -> Scores:
     """Scores of a model on samples."""
     return score_speeds(predicted_speed(model, samples), samples)
 
