@@ -252,7 +252,8 @@ def test_the_page_of_a_log(monkeypatch):
         "duration_s": 60.0, "armed_s": 30.0, "records": 1000, "bad_records": 3, "bad_by_reason": {"checksum": 3},
         "bad_bytes": 12, "cut_short": True, "clock_jumps": [{"time_s": 3.0, "step_s": 1.0}], "samples": {"servo": 5},
         "parameters": 7, "rate_hz": 20.0, "depth_from": "pressure", "depth_max_m": 3.0, "voltage_min_V": 14.0,
-        "running_s": 20.0, "saved_pct": 12.0, "motors": [1, 2], "directions": [1, -1], "total_weight": 3.0,
+        "identity": "ArduSub", "unread_records": {"CTUN": 2}, "running_s": 20.0, "saved_pct": 12.0, "motors": [1, 2],
+        "directions": [1, -1], "total_weight": 3.0,
     }  # fmt: skip
     every_hole(facts, lambda found: log_page(rows, found, ["a", "b"]))
     without_hindsight = {key: facts[key] for key in list(facts)[:-4]} | {"why_no_hindsight": "no servo outputs"}

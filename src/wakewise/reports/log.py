@@ -46,6 +46,8 @@ def _headline(facts: dict[str, Any]) -> str:
         said = "Gentler thrusts would have spared nothing."
     elif facts.get("running_s"):
         said = "No jet reached the points that were to be spared."
+    elif "height_max_m" in facts:
+        said = "Another vehicle than an ArduSub: what needs no table of ArduSub's."
     elif "why_no_hindsight" in facts:
         said = "The dive, without its thrusts."
     else:
@@ -58,12 +60,13 @@ def _headline(facts: dict[str, Any]) -> str:
         f"Wash is D, the weighted sum of squared speeds at points {escape(facts['points'])}, by the wake model "
         f"{escape(facts['wake_model'])}; the same forces and moments, shared among the thrusters otherwise."
     )
-    depth, volts = facts["depth_max_m"], facts["voltage_min_V"]
+    what, deepest = ("highest", "height_max_m") if "height_max_m" in facts else ("deepest", "depth_max_m")
+    depth, volts = facts[deepest], facts["voltage_min_V"]
     tiles = (
         tile("recorded", number(facts["duration_s"]), "s", f"armed {number(facts['armed_s'])} s")
         + tile("records", number(facts["records"]), "", "whole")
         + tile("bad records", number(facts["bad_records"]), "", _reasons(facts))
-        + tile("deepest", fixed(depth, 2), "" if depth is None else "m", _source(facts))
+        + tile(what, fixed(depth, 2), "" if depth is None else "m", _source(facts))
         + tile("battery", fixed(volts, 1), "" if volts is None else "V", "at its lowest")
         + tile("spared", number(saved), "" if saved is None else "%", "of D as flown")
     )
@@ -78,9 +81,11 @@ def _source(facts: dict[str, Any]) -> str:
 
 
 def _reasons(facts: dict[str, Any]) -> str:
-    if not facts["bad_by_reason"]:
-        return "none"
-    return ", ".join(f"{reason}: {shown(count)}" for reason, count in facts["bad_by_reason"].items())
+    return _counts(facts["bad_by_reason"])
+
+
+def _counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{name}: {shown(count)}" for name, count in counts.items()) or "none"
 
 
 def _dive(rows: pl.DataFrame, facts: dict[str, Any]) -> str:
@@ -154,8 +159,10 @@ def _file(facts: dict[str, Any]) -> str:
         f"{fixed(jump['step_s'], 1, sign=True)} s at {fixed(jump['time_s'], 1)} s" for jump in facts["clock_jumps"]
     ]
     told = [
+        ("vehicle, as it says", facts["identity"] or NONE),
         ("records", f"{shown(facts['records'])} whole, {shown(facts['bad_records'])} bad ({_reasons(facts)})"),
         ("bytes in bad ones", shown(facts["bad_bytes"])),
+        ("of other fields, not read", _counts(facts["unread_records"])),
         ("end of the file", _END[facts["cut_short"]]),
         ("jumps of the clock", ", ".join(jumps[:8]) + (" …" if len(jumps) > 8 else "") or "none"),
         ("parameters", f"{shown(facts['parameters'])}, in parameters.csv"),

@@ -19,7 +19,9 @@ DEFAULT_SYSTEM: Final = 1
 """System id of a vehicle (SYSID_THISMAV, from 4.7 MAV_SYSID), which its companion shares."""
 AUTOPILOT_COMPONENT: Final = 1
 COMPANION_COMPONENT: Final = 191
-"""MAV_COMP_ID_ONBOARD_COMPUTER. A companion is never a ground station: its heartbeats would hide the pilot's loss."""
+"""MAV_COMP_ID_ONBOARD_COMPUTER. A companion is never a ground station: its heartbeats would hide the pilot's loss.
+Their custom_mode is the number of its session, so that two companions know each other apart. It is no flight mode: a
+ground station that logs modes of all components writes it down as one of component 191."""
 HEARTBEAT_PERIOD_S: Final = 1.0
 
 # Thrusts, companion to script.
