@@ -100,7 +100,7 @@ def test_copies_of_a_photo_are_left_out(tmp_path):
 @given(st.binary(max_size=200))
 def test_no_bytes_crash_the_decoder(data):
     """Any bytes are an image or None."""
-    image = decode(data)
+    image = decode(data, "a.png")
     assert image is None or (image.ndim == 3 and image.dtype == np.uint8)
     assert jpeg_is_whole(b"\xff\xd8" + data) in (True, False)
 
@@ -146,6 +146,14 @@ def test_any_bytes_are_cameras_or_an_input_error(tmp_path, data):
         except InputError:
             continue
         assert all(np.all(np.isfinite(p)) and p.shape == (3,) for p in found.values())
+
+
+def test_a_camera_that_is_there_twice_is_refused(tmp_path):
+    """Neither of two places is taken in silence; the line is named."""
+    path = tmp_path / "cameras.csv"
+    path.write_text("name,x_m,y_m,z_m\na.jpg,0,0,0\nb.jpg,1,0,0\na.jpg,2,0,0\n")
+    with pytest.raises(InputError, match=r"line 4: a\.jpg is there twice"):
+        read_reference_cameras(path)
 
 
 def test_folders_without_cameras_and_nothing_at_all(tmp_path):
@@ -198,7 +206,7 @@ def test_images_of_other_kinds_and_folders_of_folders_are_told(tmp_path):
 def test_a_store_decodes_once_and_only_as_much_as_it_may_keep(tmp_path):
     """What is kept outlives its file; what has no room is read again, and a file that went is told."""
     put(tmp_path, "a.png", "b.png")
-    size = decode((tmp_path / "a.png").read_bytes()).nbytes
+    size = decode((tmp_path / "a.png").read_bytes(), "a.png").nbytes
     store = PhotoStore(tmp_path, most_bytes=size)
     assert [photo.name for photo in read_photos(tmp_path, store, threads=1)] == ["a.png", "b.png"]
     kept, other = store.image("a.png"), store.image("b.png")

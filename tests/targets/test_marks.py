@@ -70,7 +70,15 @@ def test_a_bad_mark_is_named_with_its_line(tmp_path, row, said):
         read_marks(path)
 
 
-@pytest.mark.parametrize(("text", "said"), [("", "no column"), ("x_m,y_m\n", "no column z_m"), (HEADER, "no marks")])
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "no column"),
+        ("x_m,y_m\n", "no column z_m"),
+        (HEADER, "no marks"),
+        ("x_m,y_m,z_m,radius_m,weigth\n1,2,3,1,0.5\n", "unknown column 'weigth'"),
+    ],
+)
 def test_a_file_without_marks_is_refused(tmp_path, text, said):
     """Empty, wrong header, header only."""
     path = tmp_path / "none.csv"

@@ -61,6 +61,8 @@ def _read_csv(path: Path) -> dict[str, Array]:
             if missing:
                 raise InputError(f"{path}: has no column {', '.join(missing)}; needed are {', '.join(wanted)}")
             for row in reader:
+                if row["name"] in out:
+                    raise InputError(f"{path}: line {reader.line_num}: {row['name']} is there twice")
                 out[row["name"]] = _position(path, reader.line_num, [row[c] for c in wanted[1:]])
     except (UnicodeDecodeError, csv.Error):
         raise InputError(f"{path}: is no CSV text; needed is a table with columns {', '.join(wanted)}") from None

@@ -63,7 +63,7 @@ def read_marks(path: Path | str) -> Marks:
     Raises
     ------
     InputError
-        If the file is missing or empty, a column is missing, or a value is no number, not finite or out of range; the
+        If the file is missing or empty, a column is missing or unknown, or a value is no number, not finite or out of range; the
         message names the line.
     """
     path = Path(path)
@@ -81,6 +81,8 @@ def read_marks(path: Path | str) -> Marks:
     missing = [name for name in COLUMNS[:4] if name not in header]
     if missing:
         raise InputError(f"{path}: no column {', '.join(missing)}, the columns are {', '.join(COLUMNS)}")
+    if unknown := [name for name in header if name not in COLUMNS]:
+        raise InputError(f"{path}: unknown column '{unknown[0]}', the columns are {', '.join(COLUMNS)}")
     place = {name: header.index(name) for name in COLUMNS if name in header}
     values = [
         [_value(path, line, name, row, place) for name in COLUMNS]
