@@ -72,11 +72,55 @@ def test_bad_input_is_one_line_and_code_two(data, capsys, options, words):
     assert said.err.count("\n") == 1
 
 
-def test_rows_with_nan_are_named(data, capsys):
-    """NaN is refused with its line; nothing is fitted silently."""
-    data.write_text(data.read_text(encoding="utf-8") + "0.1,0.0,1.0,nan\n", encoding="utf-8")
-    assert run(["wake", "fit", str(data), "--disk-diameter-m", "0.06"]) == 2
-    assert "line 302: u_m_s is nan" in capsys.readouterr().err
+def test_vectors_that_are_nan_are_counted_and_a_place_that_is_nan_is_refused(data, tmp_path, capsys):
+    """A velocity that nobody measured leaves its row out, which is said; a place that is no number is a fault."""
+    whole = data.read_text(encoding="utf-8")
+    data.write_text(whole + "0.1,0.0,1.0,nan\n0.1,0.0,1.0,\n", encoding="utf-8")
+    out = tmp_path / "wake.yaml"
+    words = ["wake", "fit", str(data), "--disk-diameter-m", "0.06", "--bootstrap", "0"]
+    assert run([*words, "--out", str(out)]) == 0
+    assert "warning: 2 vectors NaN or empty left out" in capsys.readouterr().out
+    assert "2 vectors NaN or empty left out" in out.read_text(encoding="utf-8")
+    data.write_text(whole + "nan,0.0,1.0,0.5\n", encoding="utf-8")
+    assert run(words) == 2
+    assert "line 302: x_m is nan" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("unit", "newtons"), [("kgf", 9.80665), ("lbf", 4.448), ("g", 9.80665e-3)])
+@pytest.mark.parametrize("model", ["fitted", "jet"])
+def test_a_thrust_in_another_unit_is_refused_by_the_law_of_momentum(data, tmp_path, capsys, unit, newtons, model):
+    """Whatever model is fitted: no file is written, and the line says how far the flux is off the thrust."""
+    head, *rows = data.read_text(encoding="utf-8").splitlines()
+    parted = [row.split(",") for row in rows]
+    text = "\n".join([head, *(f"{x},{r},{float(t) / newtons},{u}" for x, r, t, u in parted)])
+    data.write_text(text + "\n", encoding="utf-8")
+    out = tmp_path / "wake.yaml"
+    words = ["wake", "fit", str(data), "--disk-diameter-m", "0.06", "--model", model, "--bootstrap", "0"]
+    assert run([*words, "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert "units?" in said
+    assert said.count("\n") == 1
+    assert not out.exists()
+    # The same numbers, with the unit in the column's name.
+    if unit != "g":
+        data.write_text(text.replace("thrust_N", f"thrust_{unit}") + "\n", encoding="utf-8")
+        assert run([*words, "--json"]) == 0
+        law = json.loads(capsys.readouterr().out)["momentum_flux_over_thrust"]
+        assert law["measured"] == pytest.approx(1.04, abs=0.05)
+
+
+def test_a_flux_that_is_unlikely_is_marked(data, tmp_path, capsys):
+    """Speeds half as large again: fitted, and marked on the screen and in the file."""
+    head, *rows = data.read_text(encoding="utf-8").splitlines()
+    parted = [row.split(",") for row in rows]
+    data.write_text("\n".join([head, *(f"{x},{r},{t},{1.5 * float(u)}" for x, r, t, u in parted)]), encoding="utf-8")
+    out = tmp_path / "wake.yaml"
+    words = ["wake", "fit", str(data), "--disk-diameter-m", "0.06", "--bootstrap", "0", "--out", str(out)]
+    assert run(words) == 0
+    told = capsys.readouterr().out
+    assert "momentum flux over thrust: 2.43 by the points" in told
+    assert "units? a jet in water has 0.5 to 1.3" in told
+    assert "units?" in out.read_text(encoding="utf-8")
 
 
 @pytest.mark.slow

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from wakewise.cli.console import Bars, print_json, print_table, shown
+from wakewise.cli.console import Bars, print_json, print_table, shown, write_page
 from wakewise.cli.options import Json
 
 app = typer.Typer(
@@ -20,14 +21,21 @@ Data = Annotated[
     Path,
     typer.Argument(
         help="CSV file with columns x_m, r_m (or y_m, z_m), thrust_N, u_m_s, optionally v_m_s, w_m_s, "
-        "disk_diameter_m, in the jet's frame (x along the jet from the disk's middle); or a folder of image pairs *A, "
-        "*B with a piv.yaml."
+        "disk_diameter_m, in the jet's frame (x along the jet from the disk's middle); a text file of PIVlab, DaVis or "
+        "Tecplot with units in its names (x [mm], u [m/s]), of a plane through the jet's axis; or a folder of image "
+        "pairs *A, *B with a piv.yaml."
     ),
 ]
 Model = Annotated[str, typer.Option("--model", help="fitted, jet, jet-fitted or paper-calibrated.")]
 Diameter = Annotated[
     float | None,
     typer.Option("--disk-diameter-m", help="Diameter of the disk, if the CSV has no such column.", show_default=False),
+]
+Thrust = Annotated[
+    float | None,
+    typer.Option(
+        "--thrust", metavar="N", help="Thrust of all points in newtons, if no column says it.", show_default=False
+    ),
 ]
 Held = Annotated[
     list[float] | None,
@@ -45,42 +53,56 @@ def fit(
     data: Data,
     model: Model = "fitted",
     disk_diameter_m: Diameter = None,
+    thrust: Thrust = None,
     test_thrust: Held = None,
     seed: Seed = 0,
     bootstrap: Resamples = 200,
     out: FitOut = None,
     json: Json = False,
 ) -> None:
-    """Calibrate a wake model: parameters with uncertainty, fitted on some thrusts and positions, tested on others."""
+    """Calibrate a wake model: parameters with uncertainty, fitted on some thrusts and positions, tested on others.
+
+    The momentum flux of a jet is its thrust, which is printed as a share: 0.5 to 1.3 in water. What lies far outside is
+    refused, since a unit is another than the column's name says.
+    """
     import numpy as np
 
+    from wakewise.errors import InputError
     from wakewise.wake.calibration import calibrate, split_samples
     from wakewise.wake.families import family
     from wakewise.wake.fit_file import fit_figures, write_fit
+    from wakewise.wake.momentum import momentum_law
     from wakewise.wake.samples import read_samples
 
     chosen = family(model)
     if data.is_dir():
         from wakewise.studies.piv import samples_of_folder
 
+        if thrust is not None:
+            raise InputError(f"--thrust {thrust:g}: not with a folder of image pairs, whose piv.yaml says the thrust")
         samples = samples_of_folder(data)
     else:
-        samples = read_samples(data, disk_diameter_m)
+        samples = read_samples(data, disk_diameter_m, thrust)
     rng = np.random.default_rng(seed)
     split = split_samples(samples, rng, test_thrusts_N=tuple(test_thrust or ()))
     found = calibrate(chosen, samples, rng, split=split, bootstrap=bootstrap)
+    law = momentum_law(samples, chosen.model(found.values))
     if out is not None:
-        write_fit(out, found, data.name, samples.disk_diameter_m)
-    result = fit_figures(found) | {"points": len(samples), "disk_diameter_m": samples.disk_diameter_m}
+        write_fit(out, found, data.name, samples.disk_diameter_m, law)
+    result = fit_figures(found) | {
+        "points": len(samples),
+        "disk_diameter_m": samples.disk_diameter_m,
+        "momentum_flux_over_thrust": asdict(law),
+    }
     if json:
         print_json(result | {"out": None if out is None else str(out)})
         return
-    _show_fit(result)
+    _show_fit(result, law.words)
     if out is not None:
         typer.echo(f"written: {out}")
 
 
-def _show_fit(result: dict[str, Any]) -> None:
+def _show_fit(result: dict[str, Any], law: str) -> None:
     from rich.table import Table
 
     table = Table(title=f"{result['model']}, {result['points']} points")
@@ -99,6 +121,7 @@ def _show_fit(result: dict[str, Any]) -> None:
         row = (shown(scores[key]) for key in ("r2_core", "r2_wake", "bias_far_pct", "points"))
         table.add_row(part, *row)
     print_table(table)
+    typer.echo(f"momentum flux over thrust: {law}")
     typer.echo(f"split: {result['split']}")
     for warning in result["warnings"]:
         typer.echo(f"warning: {warning}")
@@ -148,7 +171,7 @@ def validate(
         from wakewise.reports.wake import write_wake_report
 
         write_json(out / "wake.json", values)
-        write_wake_report(result, values, out)
+        write_page("report", lambda: write_wake_report(result, values, out))
     if json:
         print_json(values)
         return
@@ -281,3 +304,6 @@ def calibrate_flight(
             shown(row["error_share"]),
         )
     print_table(table)
+    if result["curve"]:
+        law = shown(result["curve"][-1]["gain"] ** 2)
+        typer.echo(f"momentum flux over thrust: {law} at the end, strength squared; the law says 1")

@@ -129,6 +129,11 @@ def calibrate(
     parts = split or split_samples(samples, rng)
     fit_rows = parts.train & region.holds(samples) if region else parts.train
     train = samples.take(fit_rows)
+    if not len(train) or not parts.test.any():
+        part, region_words = ("test", "") if len(train) else ("fit", f" in region {region.name}" if region else "")
+        raise InputError(
+            f"{samples.title}: none of {len(samples)} rows is left to {part}{region_words} ({parts.words})"
+        )
     warnings = list(samples.warnings)
     free, held = _identifiable(family, train, warnings)
     needed = max(10, _ROWS_PER_PARAMETER * int(free.sum()))
@@ -169,17 +174,30 @@ def calibrate(
     )
 
 
+def calibrated_values(family: Family, samples: JetSamples) -> tuple[Array, tuple[str, ...]]:
+    """Parameters fitted to all rows, shape (p,), without a test, and the names of those that were held.
+
+    Raises
+    ------
+    InputError
+        If the points tell none of them.
+    """
+    free, held = _identifiable(family, samples, [])
+    values, _, _ = _solve(family, samples, family.start, free)
+    return values, held
+
+
 def _identifiable(family: Family, train: JetSamples, warnings: list[str]) -> tuple[BoolArray, tuple[str, ...]]:
     """Which parameters the data can tell, shape (p,); the others are held at their start, which is said."""
     free = np.ones(len(family.parameters), dtype=np.bool_)
-    angle = float(train.angle_rad.max()) if len(train) else 0.0
+    angle = float(train.angle_rad.max())
     distance = train.distance_m
-    reach = float(distance.max() / distance.min()) if len(train) else 1.0
+    reach = float(distance.max() / distance.min())
     reasons = {
         "angle": (angle < AXIS_ANGLE_RAD, f"no point is farther than {math.degrees(angle):.1f} deg off the axis"),
         "reach": (
             reach < 1.2,
-            f"all points are about as far from the disk ({distance.mean():.2g} m)" if len(train) else "",
+            f"all points are about as far from the disk ({distance.mean():.2g} m)",
         ),
     }
     for shapes, (unknown, reason) in reasons.items():

@@ -13,16 +13,18 @@ from wakewise.files import write_text
 from wakewise.settings import describe_faults
 from wakewise.wake.calibration import Calibration
 from wakewise.wake.models import WakeSettings
+from wakewise.wake.momentum import MomentumLaw
 from wakewise.yaml_text import YamlError, read_yaml
 
 
-def fit_yaml(fit: Calibration, source: str, disk_diameter_m: float) -> str:
+def fit_yaml(fit: Calibration, source: str, disk_diameter_m: float, law: MomentumLaw | None = None) -> str:
     """YAML text with the fields of `WakeSettings` where a scenario has them, and the quality of the fit as comments."""
     scores = ((f"R2 in region {name}, test", value) for name, value in _tested(fit))
     lines = [
         f"# Wake model calibrated on {source}, disk diameter {disk_diameter_m:g} m.",
         f"# Split: {fit.split}.",
         *(f"# {name}: {'not known' if value is None else f'{value:.3f}'}" for name, value in scores),
+        *([] if law is None else [f"# Momentum flux over thrust: {law.words}."]),
         *(f"# Note: {warning}." for warning in fit.warnings),
         "# A scenario as it stands: wakewise scan THIS_FILE; or put these lines into one of your own.",
         "control:",
@@ -37,9 +39,11 @@ def fit_yaml(fit: Calibration, source: str, disk_diameter_m: float) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_fit(path: Path, fit: Calibration, source: str, disk_diameter_m: float) -> None:
+def write_fit(
+    path: Path, fit: Calibration, source: str, disk_diameter_m: float, law: MomentumLaw | None = None
+) -> None:
     """Write a calibrated model whole or not at all."""
-    write_text(path, fit_yaml(fit, source, disk_diameter_m))
+    write_text(path, fit_yaml(fit, source, disk_diameter_m, law))
 
 
 def read_wake_settings(path: Path) -> WakeSettings:

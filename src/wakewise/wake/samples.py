@@ -6,9 +6,8 @@ direction and the distance is from the disk's middle, as in the paper.
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,21 +15,11 @@ import numpy as np
 
 from wakewise.arrays import Array, BoolArray, freeze
 from wakewise.errors import InputError
+from wakewise.wake.point_files import COLUMNS, PointTable, read_point_table
 
-COLUMNS: dict[str, str] = {
-    "x_m": "along the jet from the disk's middle",
-    "r_m": "distance from the jet's axis; or y_m and z_m",
-    "y_m": "across the jet",
-    "z_m": "across the jet",
-    "thrust_N": "magnitude of the thrust that made the jet",
-    "u_m_s": "speed along the jet",
-    "v_m_s": "optional, velocity along y (or along r)",
-    "w_m_s": "optional, velocity along z (or around the axis)",
-    "disk_diameter_m": "optional, the same on every row",
-}
-"""Columns of a data file and what they hold."""
+__all__ = ["COLUMNS", "CORE", "FAR", "WAKE", "JetRegion", "JetSamples", "joined", "read_samples"]
+
 _REQUIRED = ("x_m", "thrust_N", "u_m_s")
-_LIMIT_M, _LIMIT_M_S, _LIMIT_N = 100.0, 100.0, 1e6
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -130,88 +119,75 @@ FAR = JetRegion(name="far", angle_rad=math.radians(15.0), nearest_m=0.4, farthes
 """The paper's regions: r below 0.3 m (from 0.1 m, where its measurements begin), 0.1-0.5 m, and beyond 0.4 m."""
 
 
-def read_samples(path: Path, disk_diameter_m: float | None = None) -> JetSamples:
-    """Samples of a CSV file with the columns of `COLUMNS`; lines that start with # are comments.
+def read_samples(path: Path, disk_diameter_m: float | None = None, thrust_N: float | None = None) -> JetSamples:
+    """Samples of a file of velocities at points (`wakewise.wake.point_files`); lines that start with # are comments.
+
+    Vectors that are NaN, empty or masked, and points upstream of the disk, are left out with a warning that counts
+    them.
 
     Parameters
     ----------
     path : Path
     disk_diameter_m : float, optional
         Needed if the file has no column of that name.
+    thrust_N : float, optional
+        Thrust of all rows; needed if the file has no column of that name.
 
     Raises
     ------
     InputError
-        If the file is missing, a needed column is not there or is unknown, or a row holds something that is not a
-        finite number, a negative radius or a thrust that is not positive; the message names the line.
+        If the file is missing, a needed column is not there or is unknown, a row holds something that is not a finite
+        number, a negative radius or a thrust that is not positive (the message names the line), or no row is left.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as fault:
-        reason = fault.strerror if isinstance(fault, OSError) else "it is no text"
-        raise InputError(f"{path}: cannot be read ({reason})") from None
-    lines = [(n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
-    if len(lines) < 2:
-        raise InputError(f"{path}: no rows, needs a line of column names and one line per point")
-    names = [name.strip() for name in next(csv.reader([lines[0][1]]))]
-    _check_columns(path, names)
-    table = np.array([_row(path, n, next(csv.reader([line])), names) for n, line in lines[1:]])
-    numbers = np.array([n for n, _ in lines[1:]])
-    column = {name: table[:, i] for i, name in enumerate(names)}
-    return _samples(path, column, numbers, disk_diameter_m)
+    table = read_point_table(path)
+    column = table.columns
+    for name, value, option in (
+        ("disk_diameter_m", disk_diameter_m, "--disk-diameter-m"),
+        ("thrust_N", thrust_N, "--thrust"),
+    ):
+        if name in column and value is not None and np.any(np.abs(column[name] - value) > 1e-9):
+            raise InputError(f"{path}: {name} is {column[name][0]:g} in the file and {value:g} in the option {option}")
+        if name not in column and value is not None:
+            column[name] = np.full(len(table.lines), value)
+    _check_columns(path, table)
+    return _samples(path, table)
 
 
-def _check_columns(path: Path, names: list[str]) -> None:
+def _check_columns(path: Path, table: PointTable) -> None:
+    names = table.columns
     wanted = ", ".join(_REQUIRED) + " and r_m (or y_m, z_m)"
-    unknown = [name for name in names if name not in COLUMNS]
-    if unknown:
-        raise InputError(f"{path}: unknown column '{unknown[0]}', allowed {', '.join(COLUMNS)}")
-    if len(set(names)) < len(names):
-        raise InputError(f"{path}: a column is there twice, each must be there once")
     missing = [name for name in _REQUIRED if name not in names]
     if missing:
-        raise InputError(f"{path}: column {missing[0]} is missing, needed are {wanted}")
-    if ("r_m" in names) == ("y_m" in names and "z_m" in names) or ("y_m" in names) != ("z_m" in names):
+        way = "; --thrust gives one thrust for all rows" if missing == ["thrust_N"] else ""
+        raise InputError(f"{path}: column {missing[0]} is missing, needed are {wanted}{way}")
+    across = ("r_m" in names) != ("y_m" in names and "z_m" in names) and ("y_m" in names) == ("z_m" in names)
+    if not across and not table.plane:
         raise InputError(f"{path}: place across the jet unclear, needed is either r_m or both y_m and z_m")
+    if "disk_diameter_m" not in names:
+        raise InputError(f"{path}: the disk's diameter is not known, give a column or the option --disk-diameter-m")
 
 
-def _row(path: Path, line: int, cells: list[str], names: list[str]) -> list[float]:
-    if len(cells) != len(names):
-        raise InputError(f"{path} line {line}: {len(cells)} values, needs {len(names)}")
-    values = []
-    for name, cell in zip(names, cells, strict=True):
-        try:
-            value = float(cell)
-        except ValueError:
-            raise InputError(f"{path} line {line}: {name} is '{cell.strip()[:20]}', must be a number") from None
-        limit = _LIMIT_N if name == "thrust_N" else _LIMIT_M_S if name.endswith("_m_s") else _LIMIT_M
-        if not abs(value) <= limit:
-            raise InputError(
-                f"{path} line {line}: {name} is {value:g}, must be a number between -{limit:g} and {limit:g}"
-            )
-        values.append(value)
-    return values
-
-
-def _samples(path: Path, column: Mapping[str, Array], numbers: Array, diameter_m: float | None) -> JetSamples:
+def _samples(path: Path, table: PointTable) -> JetSamples:
+    column = table.columns
     for name, low in (("r_m", "not be negative"), ("thrust_N", "be greater than 0 (a magnitude)")):
         bad = (column[name] < 0 if name == "r_m" else column[name] <= 0) if name in column else np.zeros(1, np.bool_)
         if bad.any():
             k = int(np.argmax(bad))
-            raise InputError(f"{path} line {numbers[k]}: {name} is {column[name][k]:g}, must {low}")
-    if "disk_diameter_m" in column:
-        found = np.unique(column["disk_diameter_m"])
-        if len(found) > 1:
-            raise InputError(f"{path}: disk_diameter_m takes {len(found)} values, must be the same on every row")
-        if diameter_m is not None and abs(found[0] - diameter_m) > 1e-9:
-            raise InputError(f"{path}: disk_diameter_m is {found[0]:g} in the file and {diameter_m:g} in the option")
-        diameter_m = float(found[0])
-    if diameter_m is None:
-        raise InputError(f"{path}: the disk's diameter is not known, give a column or the option --disk-diameter-m")
-    radius = column["r_m"] if "r_m" in column else np.hypot(column["y_m"], column["z_m"])
-    zero = np.zeros_like(radius)
+            raise InputError(f"{path} line {table.lines[k]}: {name} is {column[name][k]:g}, must {low}")
+    diameters = np.unique(column["disk_diameter_m"])
+    if len(diameters) > 1:
+        raise InputError(f"{path}: disk_diameter_m takes {len(diameters)} values, must be the same on every row")
+    zero = np.zeros(len(table.lines))
+    radius = column["r_m"] if "r_m" in column else np.hypot(column["y_m"], column.get("z_m", zero))
     downstream = column["x_m"] > 0.0
-    warnings = []
+    warnings = list(table.notes)
+    if table.plane:
+        warnings.append("one plane: taken to hold the jet's axis, with x along it from the disk's middle and y across")
+    if not downstream.any():
+        raise InputError(
+            f"{path}: no point downstream of the disk, all {len(zero)} have x_m <= 0; x must count along the jet from "
+            "the disk's middle"
+        )
     if not downstream.all():
         warnings.append(
             f"{int((~downstream).sum())} points upstream of the disk (x_m <= 0) left out: no model holds there"
@@ -222,7 +198,7 @@ def _samples(path: Path, column: Mapping[str, Array], numbers: Array, diameter_m
         thrust_N=column["thrust_N"],
         speed_m_s=column["u_m_s"],
         across_m_s=np.hypot(column.get("v_m_s", zero), column.get("w_m_s", zero)),
-        disk_diameter_m=diameter_m,
+        disk_diameter_m=float(diameters[0]),
         title=path.name,
         warnings=tuple(warnings),
     )
