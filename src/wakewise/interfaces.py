@@ -259,11 +259,11 @@ class Plant(Protocol):
 
     One whose camera has a joint may have a method `aim(tilt_rad)`, which is called before each step with the wished
     angle, and hands the angle that it measured over with the step's measurements. Without it the camera is fixed.
+    `push(wrench_B)`, where there is one, pushes it from outside the water until the next call: N, N m, body frame.
     """
 
     def step(self, thrusts_N: Array, dt_s: float) -> tuple[Measurement, ...]:
         """Hold the commanded thrusts for `dt_s` and return what the sensors said meanwhile, oldest first."""
-        ...
 
 
 class Pilot(Protocol):
@@ -271,7 +271,6 @@ class Pilot(Protocol):
 
     def goal(self, time_s: float, estimate: BodyState) -> Goal:
         """Say what is wanted at `time_s`."""
-        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -351,15 +350,12 @@ class Witness(Protocol):
 
     def observe(self) -> Truth:
         """Vehicle, thrusters and collisions now."""
-        ...
 
     def water(self) -> WaterTruth:
         """Water at the target now; dearer than `observe`, so asked less often."""
-        ...
 
     def silt(self) -> ScalarGrid:
         """Silt concentration around the target now, kg/m3."""
-        ...
 
 
 class World(Protocol):
@@ -372,14 +368,12 @@ class World(Protocol):
     @property
     def name(self) -> str:
         """Name used in scenario files and tables."""
-        ...
 
     def begin(self) -> tuple[Plant, Witness | None]:
         """The vehicle in its water at the start of a flight, and who knows the truth of it; a fresh one at each call.
 
         A simulated world begins alike each time, so that flights in it can be compared.
         """
-        ...
 
 
 class Current(Protocol):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import json
 import socket
@@ -16,8 +17,11 @@ pytest.importorskip("pymavlink", reason="the extra `links` is not installed")
 pytest.importorskip("lupa", reason="the extra `links` is not installed")
 
 from wakewise.cli.main import run
+from wakewise.links.ardusub.motor_results import MotorResults, MotorSeen, write_results
+from wakewise.links.ardusub.parameters import read_parameter_file
 from wakewise.links.ardusub.protocol import SCRIPT_VERSION
 from wakewise.links.ardusub.script import parameters_text, script_text
+from wakewise.links.autopilot.own_parameters import own_parameters
 from wakewise.links.autopilot.rim import Embedded, Link
 from wakewise.links.autopilot.rim import run as run_stand_in
 from wakewise.links.autopilot.stand_in import StandIn
@@ -86,7 +90,7 @@ def test_a_live_check_says_go_or_no_go(stand_in: tuple[StandIn, str], capsys: Ca
         "pilot's sticks",
     }
     assert rows["firmware"]["found"] == "4.5.3"
-    assert set(rows["firmware"]) == {"what", "asked", "found", "verdict", "do", "needed"}
+    assert set(rows["firmware"]) == {"what", "asked", "found", "verdict", "do", "needed", "unseen"}
 
 
 def test_a_motor_turns_only_by_consent(
@@ -155,13 +159,60 @@ def _file(tmp_path: Path, **changed: float) -> str:
 
 def test_a_parameter_file_is_checked_without_a_vehicle(capsys: Capture, tmp_path: Path) -> None:
     """A good one ends with 0 and says what stays open; a wrong value ends with 1 and says what to do."""
-    none = ["--motor-results", str(tmp_path / "none.json")]
+    none = ["--motor-results", str(tmp_path / "none.json"), "--without-motor-test"]
     assert run(["link", "ardusub", "--params", _file(tmp_path), *none]) == 0
     assert "go, as far as parameters say" in capsys.readouterr().out
     assert run(["link", "ardusub", "--params", _file(tmp_path, FS_GCS_ENABLE=0), *none]) == 1
     told = capsys.readouterr().out
     assert "set FS_GCS_ENABLE to 2" in " ".join(told.replace("│", " ").split())
     assert "no-go: 1 wrong, 0 not known" in told
+
+
+def test_go_wants_motors_that_were_seen_to_turn(capsys: Capture, tmp_path: Path) -> None:
+    """All else right it ends with 2 and names the motors, until each was seen or --without-motor-test accepts it."""
+    results = tmp_path / "motors.json"
+    asked = ["link", "ardusub", "--params", _file(tmp_path), "--motor-results", str(results)]
+    assert run(asked) == 2
+    assert "but nobody has seen the motors turn" in capsys.readouterr().out
+    seen = {
+        motor: MotorSeen(motor=motor, pulse_us=1560, direction=1.0, expected="ahead", answer="as expected")
+        for motor in range(1, 8)
+    }
+    write_results(results, MotorResults(vehicle="bluerov2-heavy", time="2026-11-26T12:00:00Z", seen=seen))
+    assert run(asked) == 2
+    assert "but nobody has seen motor 8 turn" in capsys.readouterr().out
+    assert run([*asked, "--json"]) == 2
+    assert json.loads(capsys.readouterr().out)["verdict"] == "unseen"
+    assert run([*asked, "--without-motor-test"]) == 0
+    capsys.readouterr()
+    eighth = dataclasses.replace(seen[1], motor=8)
+    write_results(
+        results, MotorResults(vehicle="bluerov2-heavy", time="2026-11-26T12:00:00Z", seen={**seen, 8: eighth})
+    )
+    assert run(asked) == 0
+
+
+def test_buttons_are_checked_with_the_rest(capsys: Capture, tmp_path: Path) -> None:
+    """Of a file with ArduSub's own table: 4 is refused with what is free, 0 and 15 are go."""
+    known = _file(tmp_path, **{name: value for name, value in own_parameters().items() if name.startswith("BTN")})
+    asked = ["link", "ardusub", "--params", known, "--motor-results", str(tmp_path / "none.json"), "--json"]
+    assert run([*asked, "--without-motor-test", "--buttons", "engage=0,scan=15"]) == 0
+    capsys.readouterr()
+    assert run([*asked, "--buttons", "engage=4,scan=6"]) == 1
+    rows = {row["what"]: row for row in json.loads(capsys.readouterr().out)["rows"]}
+    assert rows["button 4 (engage)"]["found"] == "BTN4_FUNCTION is 4 (disarm)"
+    assert rows["button 6 (scan)"]["do"] == "free are 0 and 15"
+
+
+def test_the_simulators_parameters_are_written_beside_the_script(capsys: Capture, tmp_path: Path) -> None:
+    """What a vehicle is asked to be set to, its frame, and a quiet depth sensor; every line is read."""
+    assert run(["link", "script", "--out", str(tmp_path / "scripts"), "--sitl"]) == 0
+    capsys.readouterr()
+    found = read_parameter_file(tmp_path / "scripts" / "sitl.params")
+    asked = read_parameter_file(tmp_path / "scripts" / "wakewise.params")
+    assert found == {**asked, "FRAME_CONFIG": 2.0, "SIM_BARO_RND": 0.01, "SIM_BAR2_RND": 0.01}
+    assert run(["link", "script", "--sitl"]) == 2
+    assert "--out DIR" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

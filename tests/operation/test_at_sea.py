@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
+from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState
 from wakewise.links.ardusub.journal import Journal, read_journal
 from wakewise.links.ardusub.listening import attitude_of
+from wakewise.links.ardusub.protocol import ALT_HOLD, STABILIZE
 from wakewise.links.autopilot.aboard import Aboard
 from wakewise.links.autopilot.rehearsal import Rehearsal
 from wakewise.operation.at_sea.join import SEA, at_sea
 from wakewise.operation.at_sea.rehearsal import rehearse
-from wakewise.operation.at_sea.target import ball, ball_points
+from wakewise.operation.at_sea.session import SeaSession
+from wakewise.operation.at_sea.target import WhatToSpare, ball, ball_points
 from wakewise.operation.by_hand.shutter import Shutter
 from wakewise.operation.flying import loop_of, recorder_of
 from wakewise.operation.scenario import Scenario
@@ -134,6 +139,84 @@ def test_arm_engage_fly_an_orbit_capture_release_disarm(tmp_path):
     states = [line["after"] for line in lines if line["event"] == "state"]
     assert states.count("engaged") == 1
     assert "refused" not in states
+
+
+def test_depth_is_held_while_engaged_in_alt_hold_and_after_hand_back():
+    """Sticks let go: within 3 cm under the controller's thrusts, and 7 cm after the autopilot's ALT_HOLD has it back.
+
+    Those are what ALT_HOLD, entered at rest, sags by itself before its sum holds a vehicle that is 1 N too heavy.
+
+    Between them the sticks take the vehicle down by more than 20 cm; so ALT_HOLD holds another depth than it had.
+    """
+    companion = aboard()
+    flight = companion.flight.run(1.0)
+    flight.set_mode(ALT_HOLD)
+    flight.arm(True)
+    flight.set("WKW_ENABLE", 1.0)
+    flight.run(3.0)
+    sea, _ = afloat(companion)
+    rehearse(sea)
+    depths: dict[str, list[float]] = {"held": [], "after": []}
+    at = {"engaged": 0.0, "released": 0.0}
+
+    def direct(time_s: float) -> None:
+        """Consent, down by the stick for 4 s, 6 s to come to rest and 5 s of holding, then hand back."""
+        if not at["engaged"] and time_s > 1.5:
+            assert companion.warden.press() == "engaged"
+            at["engaged"] = time_s
+        since_s = time_s - at["engaged"] if at["engaged"] else -1.0
+        flight.sticks = (0, 0, 200, 0) if 0.5 < since_s < 4.5 else (0, 0, 500, 0)
+        if since_s > 10.5:
+            depths["held"].append(float(flight.stand_in.motion.p_WB_m[2]))
+        if since_s > 15.5 and not at["released"]:
+            assert "released" in companion.warden.press()
+            at["released"] = time_s
+
+    before_m = float(flight.stand_in.motion.p_WB_m[2])
+    plant, witness = sea.parts.world.begin()
+    fly = loop_of(sea.parts, plant, witness, sea.figures)
+    fly(duration_s=None, pace=direct, stop=lambda: bool(at["released"]))
+    assert flight.stand_in.mode in (ALT_HOLD, STABILIZE)
+    for _ in range(100):
+        flight.run(0.1)
+        depths["after"].append(float(flight.stand_in.motion.p_WB_m[2]))
+    assert flight.stand_in.mode == ALT_HOLD
+    assert not flight.moments[-1].overridden
+    held = np.array(depths["held"])
+    assert held.mean() - before_m > 0.2
+    assert np.ptp(held) < 0.03
+    assert np.abs(np.array(depths["after"]) - held[-1]).max() < 0.07
+
+
+def test_a_session_with_a_button_of_the_autopilots_ends_in_one_line(tmp_path, monkeypatch):
+    """The stand-in's default table, whose button 4 disarms: no parts are made, and the fault names what is free."""
+    monkeypatch.setattr("wakewise.operation.at_sea.session.warm", lambda jobs, progress: None)
+    companion = Aboard(Rehearsal(load_vehicle("bluerov2-heavy"), loop_hz=50.0), buttons={"engage": 4})
+
+    class Deaf:
+        """A connection on which nothing comes: the warden is told by hand."""
+
+        def receive(self, timeout_s):
+            time.sleep(timeout_s)
+            return [], 0
+
+    session = SeaSession(
+        scenario=Scenario(vehicle="bluerov2-heavy", method="dp").replace(**SEA),
+        receiving=Deaf(),
+        send=lambda name, fields: None,
+        folder=tmp_path / "sea",
+        spare=WhatToSpare(),
+        session=1,
+        wardens={"buttons": {"engage": 4, "scan": 0}},
+    )
+    companion.flight.run(3.0)
+    session.warden.known = companion.warden.known
+    session.start()
+    session._thread.join(60.0)
+    session.stop("over")
+    assert isinstance(session.fault, InputError)
+    assert str(session.fault) == "--buttons engage=4: BTN4_FUNCTION is 4 (disarm) on this autopilot; free is 15"
+    assert not (tmp_path / "sea" / "steps.parquet").exists()
 
 
 def test_sticks_never_break_the_surface_at_sea():

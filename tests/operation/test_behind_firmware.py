@@ -9,10 +9,16 @@ from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_from_euler
 from wakewise.interfaces import BodyState, Truth
 from wakewise.links.physics import Physics, PulseTable, Request, read_reply, write_request
+from wakewise.links.physics.surface import Surface
 from wakewise.operation.behind_firmware import BehindFirmware, FlownBody
+from wakewise.operation.instant_water import InstantWater
+from wakewise.operation.lattice_water import LatticeWater
 from wakewise.operation.scenario import Scenario
 from wakewise.physics import GRAVITY_M_S2
+from wakewise.tank.tank import Tank
+from wakewise.vehicles import load_vehicle
 
+HEAVY = load_vehicle("bluerov2-heavy")
 TURNED = quat_from_euler(0.3, -0.2, 1.1)
 
 
@@ -74,6 +80,62 @@ def test_each_start_is_the_same_and_a_world_without_truth_is_refused() -> None:
     assert again.p_WB_m == pytest.approx([0.01, 0.0, 0.0])
     with pytest.raises(InputError, match="nobody knows the truth"):
         BehindFirmware(parts=parts.replace(world=World(witnessed=False))).begin()
+
+
+class Buoy(Sledge):
+    """A sledge that can be pushed: the vehicle's mass and added mass, neither weight nor buoyancy left over."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.p, self.v, self.wrench_B = np.array([0.0, 0.0, 1.0]), np.zeros(3), np.zeros(6)
+
+    def push(self, wrench_B: np.ndarray) -> None:
+        self.wrench_B = wrench_B
+
+    def step(self, thrusts_N: np.ndarray, dt_s: float) -> tuple[()]:
+        lift = Pose(self.p, TURNED).R @ (HEAVY.allocation_matrix @ thrusts_N + self.wrench_B)[:3]
+        self.v = self.v + dt_s * (lift - 60.0 * np.abs(self.v) * self.v - 10.0 * self.v) / 26.0
+        self.p = self.p + dt_s * self.v
+        return ()
+
+
+def test_a_vehicle_cannot_leave_the_water() -> None:
+    """All thrusters up for a minute: it never has more than its hull above the surface; without a surface it flies."""
+    up = np.linalg.pinv(HEAVY.allocation_matrix) @ np.concatenate(
+        [Pose(np.zeros(3), TURNED).R.T @ [0.0, 0.0, -80.0], np.zeros(3)]
+    )
+    highest = {}
+    for surface in (Surface.of(HEAVY), None):
+        buoy = Buoy()
+        body = FlownBody(buoy, buoy, surface)
+        highest[surface is not None] = min(float(body.step(up, 0.02).p_WB_m[2]) for _ in range(3000))
+    assert highest[True] > -0.5 * float(np.linalg.norm(HEAVY.size_m))
+    assert highest[False] < -5.0
+
+
+@pytest.mark.parametrize("water", [Tank, InstantWater, LatticeWater])
+def test_every_plant_of_this_package_can_be_given_a_surface(water: type) -> None:
+    """Each world begins with one of these; a plant of others without `push` has none, which is said."""
+    assert BehindFirmware.has_surface(water)  # type: ignore[arg-type]
+    assert not BehindFirmware.has_surface(Sledge())
+    parts = Scenario.preset("quick").parts()
+    assert "can rise out of its water" in BehindFirmware(parts=parts.replace(world=World())).ready(lambda *_: None)
+
+
+@pytest.mark.slow
+def test_a_push_moves_the_true_vehicle_and_the_surface_holds_it() -> None:
+    """In the paper's water: 10 N more of weight sink it; all verticals up, it stays in the water for 20 s."""
+    parts = Scenario.preset("quick", world="still-tank", vehicle="bluerov2-heavy", flow="paper").parts()
+    plant, witness = parts.world.begin()
+    begun = witness.observe().state.X_WB.p_m[2]
+    plant.push(np.array([0.0, 0.0, 10.0, 0.0, 0.0, 0.0]))
+    plant.step(np.zeros(8), 1.0)
+    assert witness.observe().state.X_WB.p_m[2] - begun > 0.05
+    body = BehindFirmware(parts=parts).begin()
+    up = np.linalg.pinv(HEAVY.allocation_matrix) @ np.array([0.0, 0.0, -100.0, 0.0, 0.0, 0.0])
+    depths = [float(body.step(up, 0.02).p_WB_m[2]) for _ in range(1000)]
+    assert min(depths) > -0.3
+    assert max(depths[-100:]) < 0.3
 
 
 @pytest.mark.slow

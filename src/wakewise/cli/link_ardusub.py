@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.cli.console import print_json
+from wakewise.cli.console import print_json, status_line
 from wakewise.cli.link_ardusub_check import (
     DEFAULT_MOTOR_RESULTS,
     Check,
@@ -18,6 +18,7 @@ from wakewise.cli.link_ardusub_check import (
     MotorTest,
     Params,
     Results,
+    Untested,
     check_vehicle,
     test_vehicle_motors,
 )
@@ -135,6 +136,7 @@ def ardusub(
     motor_test: MotorTest = False,
     motors: Motors = None,
     motor_results: Results = DEFAULT_MOTOR_RESULTS,
+    untested: Untested = False,
     json: Json = False,
 ) -> None:
     """Fly a real ArduSub vehicle beside its pilot: sticks ask for motion, thrusts are chosen to spare the target.
@@ -152,11 +154,11 @@ def ardusub(
         raise InputError("--motors: goes with --motor-test")
     meant = _buttons(buttons)
     if params is not None:
-        check_vehicle(connection, vehicle, system, params, motor_results, buttons=meant, json=json)
+        check_vehicle(connection, vehicle, system, params, motor_results, buttons=meant, untested=untested, json=json)
         return
     need("wakewise link ardusub", "links", only=("pymavlink",))
     if check:
-        check_vehicle(connection, vehicle, system, None, motor_results, buttons=meant, json=json)
+        check_vehicle(connection, vehicle, system, None, motor_results, buttons=meant, untested=untested, json=json)
         return
     if motor_test:
         test_vehicle_motors(connection, vehicle, system, motors, motor_results, json=json)
@@ -207,9 +209,8 @@ def ardusub(
         try:
             session.start()
             _watch(session, vehicle_at.words)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt:  # how a session ends: nothing of it could be gone on with
             why = "Ctrl-C"
-            raise
         finally:
             session.stop(why)
             _say(f"let go of the vehicle ({why}); kept: {folder}")
@@ -257,10 +258,14 @@ def _watch(session: SeaSession, where: str) -> None:
     """Show how it stands and hand key presses over, until the session is over."""
     import select
 
+    from wakewise.errors import InputError
+
     _say(f"listening at {where}; Enter consents and takes back, Ctrl-C ends")
     terminal, told, due_s = sys.stderr.isatty(), "", 0.0
     keys = sys.stdin if sys.stdin is not None and sys.stdin.isatty() else None
     while session.running:
+        if session.warden.buttons_amiss:
+            raise InputError(session.warden.buttons_amiss)
         if keys is None:
             time.sleep(LINE_S)
         elif select.select([keys], [], [], LINE_S)[0] and keys.readline():
@@ -269,7 +274,7 @@ def _watch(session: SeaSession, where: str) -> None:
             _say(f"{chr(13) if terminal else ''}{said}")
         line = session.line()
         if terminal:
-            typer.echo(f"\r\x1b[2K{line[:160]}", nl=False, err=True)
+            status_line(line)
         elif line.split("  ")[0] != told or time.monotonic() >= due_s:
             told, due_s = line.split("  ")[0], time.monotonic() + 5.0
             _say(line)

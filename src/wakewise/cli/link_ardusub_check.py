@@ -22,7 +22,7 @@ Check = Annotated[
     typer.Option(
         "--check",
         help="Only say whether this vehicle may be driven: its motors, mixer, firmware, script, failsafes and what is "
-        "heard, go or no-go line by line. Ends with 1 if not.",
+        "heard, go or no-go line by line. Ends with 1 if not, with 2 if nobody has seen the motors turn.",
     ),
 ]
 Params = Annotated[
@@ -48,6 +48,10 @@ Results = Annotated[
         "--motor-results", metavar="FILE", help="Where --motor-test keeps what was seen and --check reads it."
     ),
 ]
+Untested = Annotated[
+    bool,
+    typer.Option("--without-motor-test", help="Let --check say go although nobody has seen the motors turn."),
+]
 DEFAULT_MOTOR_RESULTS = Path("runs/motor-test.json")
 _MARKS = {"go": "[green]go[/]", "no-go": "[bold red]no-go[/]", "unknown": "[yellow]?[/]"}
 
@@ -60,9 +64,10 @@ def check_vehicle(
     motor_results: Path,
     *,
     buttons: Mapping[str, int],
+    untested: bool,
     json: bool,
 ) -> None:
-    """Print every row and the verdict; end with 1 unless it is go."""
+    """Print every row and the verdict; end with 1 unless it is go, with 2 where motors were not seen to turn."""
     from wakewise.importers import any_vehicle
     from wakewise.links.ardusub.checks import Facts, check, verdict
     from wakewise.links.ardusub.motor_results import read_results
@@ -80,14 +85,14 @@ def check_vehicle(
         with _connected(connection, system, "--check") as link, Bars().stage("asking") as advance:
             facts = survey(link, chosen, results=results, buttons=buttons, progress=advance)
     rows = check(facts)
-    said = verdict(rows)
+    said = verdict(rows, motors_seen=not untested)
     if json:
         where = {"params": str(params)} if params is not None else {"connection": connection}
         print_json({"verdict": said, "vehicle": chosen.name, **where, "rows": [asdict(row) for row in rows]})
     else:
         _show(rows, said, facts)
     if said != "go":
-        raise typer.Exit(1)
+        raise typer.Exit(2 if said == "unseen" else 1)
 
 
 def test_vehicle_motors(
@@ -195,11 +200,21 @@ def _show(rows: tuple[Row, ...], said: str, facts: Facts) -> None:
     print_table(table)
     wrong = sum(row.verdict == "no-go" for row in rows)
     open_rows = sum(row.verdict == "unknown" and row.needed for row in rows)
+    rest = "" if facts.heard is not None else ", as far as parameters say: what is heard needs a connection"
     if said == "go":
-        rest = "" if facts.heard is not None else ", as far as parameters say: what is heard needs a connection"
         typer.echo(f"go{rest}")
+    elif said == "unseen":
+        typer.echo(
+            f"go{rest}, but nobody has seen {_unseen(rows)} turn; one wired the wrong way round shows nowhere else: "
+            "--motor-test, or --without-motor-test to accept it"
+        )
     else:
         typer.echo(f"no-go: {wrong} wrong, {open_rows} not known")
+
+
+def _unseen(rows: tuple[Row, ...]) -> str:
+    numbers = [row.what.removeprefix("motor ").removesuffix(" seen") for row in rows if row.unseen]
+    return "the motors" if numbers == ["motors"] else f"motor {', '.join(numbers)}"
 
 
 def _say(words: Any) -> None:

@@ -30,6 +30,10 @@ Start = Annotated[
         "--start", help="With --upload: also set SCR_ENABLE to 1 and reboot the autopilot, if it is disarmed."
     ),
 ]
+Sitl = Annotated[
+    bool,
+    typer.Option("--sitl", help="With --out: also write sitl.params, for --defaults of ArduSub's simulator."),
+]
 Print = Annotated[bool, typer.Option("--params", help="Print what the autopilot is to be set to, and why.")]
 
 
@@ -37,6 +41,7 @@ def script(
     out: Folder = None,
     upload: Upload = None,
     start: Start = False,
+    sitl: Sitl = False,
     system: System = 1,
     params: Print = False,
     json: Json = False,
@@ -47,10 +52,12 @@ def script(
     """
     from wakewise.errors import InputError
     from wakewise.links.ardusub.protocol import ENABLE_PARAMETER, SCRIPT_VERSION
-    from wakewise.links.ardusub.script import BY_HAND, parameters_text, write_parameters, write_script
+    from wakewise.links.ardusub.script import BY_HAND, parameters_text, write_parameters, write_script, write_sitl
 
     if start and upload is None:
         raise InputError("--start: of the autopilot that --upload CONNECTION reaches")
+    if sitl and out is None:
+        raise InputError("--sitl: writes sitl.params into the folder that --out DIR names")
     if params and (out is not None or upload is not None):
         raise InputError(
             "--params: prints what --out writes into wakewise.params, and goes with neither it nor --upload"
@@ -63,7 +70,7 @@ def script(
     if upload is not None:
         uploaded = _uploaded(upload, system, start=start)
     if out is not None:
-        written = [str(write_script(out)), str(write_parameters(out))]
+        written = [str(write_script(out)), str(write_parameters(out)), *([str(write_sitl(out))] if sitl else [])]
     if json:
         facts = {"version": SCRIPT_VERSION, "uploaded": uploaded, "written": written}
         print_json(facts | ({"params": parameters_text()} if params else {}))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
@@ -12,17 +11,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.cli.console import Bars, print_json, shown
+from wakewise.cli.console import Bars, print_json, shown, status_line
 from wakewise.cli.options import Json, Preset, ScenarioFile, Sets, Vehicle, World, overrides
 
 if TYPE_CHECKING:
     from wakewise.links.autopilot.rim import Behind
     from wakewise.links.autopilot.stand_in import StandIn
     from wakewise.links.physics import PhysicsFigures
+    from wakewise.links.physics.depth_watch import DepthWatch
     from wakewise.vehicles import Vehicle as AnyVehicle
 
 DEFAULT_VEHICLE = "bluerov2-heavy"
-_STATION, _COMPANION = "127.0.0.1:14550", "127.0.0.1:14560"
+_STATION, _COMPANION, _WATCH = "127.0.0.1:14550", "127.0.0.1:14560", "127.0.0.1:14570"
 
 Port = Annotated[int, typer.Option("--port", help="UDP port that physics listens on; 0 lets the system choose.")]
 Host = Annotated[str, typer.Option("--host", help="Address it listens on; 0.0.0.0 lets other computers in.")]
@@ -42,6 +42,24 @@ Params = Annotated[
 OwnClock = Annotated[
     bool, typer.Option("--fast", help="Let the firmware run as fast as both can, not by the clock on the wall.")
 ]
+Held = Annotated[
+    float,
+    typer.Option(
+        "--held",
+        metavar="S",
+        min=0.0,
+        help="How long the vehicle is held at the surface, so that ArduSub calibrates its depth sensor there, before "
+        "it is let down to its start; 0: it begins under water.",
+    ),
+]
+Watch = Annotated[
+    str,
+    typer.Option(
+        "--watch",
+        metavar="HOST:PORT",
+        help="Where a copy of the autopilot's MAVLink comes, whose depth is held against the truth; none: it is not.",
+    ),
+]
 Seconds = Annotated[
     float | None, typer.Option("--seconds", min=0.1, help="End by itself after so long.", show_default=False)
 ]
@@ -50,8 +68,8 @@ Out = Annotated[
     typer.Option(
         "--out",
         metavar="HOST:PORT",
-        help=f"Where MAVLink goes; may be repeated. {_STATION} (ground station) and {_COMPANION} (companion) if not "
-        "given.",
+        help=f"Where MAVLink goes; may be repeated. {_STATION} (ground station), {_COMPANION} (companion) and {_WATCH} "
+        "(`wakewise link sitl`, which compares depths) if not given.",
         show_default=False,
     ),
 ]
@@ -92,13 +110,15 @@ def sitl(
     rate: Rate = None,
     params: Params = None,
     own_clock: OwnClock = False,
+    held: Held = 15.0,
+    watch: Watch = _WATCH,
     seconds: Seconds = None,
     json: Json = False,
 ) -> None:
     """Put a vehicle in its water behind ArduSub: ArduPilot's JSON physics link (`--model JSON`), until Ctrl-C.
 
     Start the firmware, or `wakewise link stand-in --physics 127.0.0.1:9002`, beside it. The vehicle starts anew when
-    the firmware does.
+    the firmware does: at the surface, and then let down to where the scenario starts it.
     """
     from wakewise.links.autopilot.own_parameters import read_params
     from wakewise.links.physics import Physics, PulseTable
@@ -111,23 +131,35 @@ def sitl(
     chosen = overrides(sets, seed=None, vehicle=vehicle, target=None, target_size=None, world=world)
     flown = load_scenario(preset, scenario, chosen).parts()
     table = PulseTable.of(flown.vehicle, None if params is None else read_params(params))
-    behind = BehindFirmware(parts=flown)
+    behind = BehindFirmware(parts=flown, held_s=held)
     physics = Physics(behind.begin, table.thrusts, rate_hz=rate, own_clock=own_clock)
-    with open_socket(host, port) as listening:
+    with ExitStack() as stack:
+        listening = stack.enter_context(open_socket(host, port))
+        depths = _depth_watch(stack, watch)
         with Bars().stage("water") as progress:
-            behind.ready(progress)
+            warning = behind.ready(progress)
+        if warning:
+            typer.echo(warning, err=True)
         typer.echo(
             f"{flown.vehicle.name} in {flown.scenario.world} at UDP {host}:{listening.getsockname()[1]}; "
             "now start the firmware with --model JSON",
             err=True,
         )
+
+        def said() -> None:
+            figures = physics.figures()
+            if depths is not None and not figures.stage:
+                depths.look(figures.depth_m)
+            status_line(_physics_line(figures, depths))
+
         with suppress(KeyboardInterrupt):
-            serve(physics, listening, _until(seconds), said=lambda: _say(_physics_line(physics.figures())))
+            serve(physics, listening, _until(seconds), said=said)
     figures = physics.figures()
     if json:
-        print_json({"vehicle": flown.vehicle.name, "world": flown.scenario.world, **asdict(figures)})
+        seen = {} if depths is None else depths.facts()
+        print_json({"vehicle": flown.vehicle.name, "world": flown.scenario.world, **asdict(figures), **seen})
     else:
-        typer.echo(_physics_line(figures))
+        typer.echo(_physics_line(figures, depths))
         if figures.refused:
             typer.echo(f"last refused    {physics.why_refused}")
 
@@ -163,19 +195,20 @@ def stand_in(
     chosen = any_vehicle(vehicle)
     values = own_parameters(len(chosen.thrusters)) | ({} if params is None else read_params(params))
     scripts = {} if no_script else _scripts(script)
-    made = StandIn(values | {"SCHED_LOOP_RATE": loop}, loop_hz=loop, scripts=scripts)
+    # Water of its own has no surface to start at: there it was carried down, switched on, to where it is.
+    zero_m = 0.0 if physics is None else None
+    made = StandIn(values | {"SCHED_LOOP_RATE": loop}, loop_hz=loop, scripts=scripts, zero_depth_m=zero_m)
     behind = _embedded(chosen, values) if physics is None else OverUdp(*_address("--physics", physics))
-    links = [Link(*_address("--out", each), out=True) for each in out or [_STATION, _COMPANION]]
-    typer.echo(
-        f"stand-in for ArduSub, system {made.system}: MAVLink to {', '.join(out or [_STATION, _COMPANION])}", err=True
-    )
+    outs = out or [_STATION, _COMPANION, _WATCH]
+    links = [Link(*_address("--out", each), out=True) for each in outs]
+    typer.echo(f"stand-in for ArduSub, system {made.system}: MAVLink to {', '.join(outs)}", err=True)
     with ExitStack() as held:
         held.enter_context(suppress(KeyboardInterrupt))
         held.callback(behind.close)
         for link in links:
             held.callback(link.close)
         turn = Ashore(made, carry_to(made, links)).turn if pilot else None
-        run(made, behind, links, _until(seconds), turn=turn, said=lambda: _say(_stand_in_line(made)))
+        run(made, behind, links, _until(seconds), turn=turn, said=lambda: status_line(_stand_in_line(made)))
     if json:
         print_json(_stand_in_facts(made))
     else:
@@ -216,21 +249,42 @@ def _until(seconds: float | None) -> Callable[[], bool]:
     return lambda: end_s is None or time.monotonic() < end_s
 
 
-def _say(line: str) -> None:
-    """The same line of a terminal again and again, a line each time elsewhere."""
-    if sys.stderr.isatty():
-        typer.echo(f"\r{line}\x1b[K", nl=False, err=True)
-    else:
-        typer.echo(line, err=True)
+def _depth_watch(stack: ExitStack, where: str) -> DepthWatch | None:
+    """What holds the autopilot's depth against the truth; None, and a line, where nothing can be overheard."""
+    from wakewise.errors import EnvironmentFailure
+    from wakewise.extras import has
+    from wakewise.links.ardusub.connection import parse_connection
+    from wakewise.links.physics.depth_watch import DepthWatch
+
+    if where == "none":
+        return None
+    _address("--watch", where)
+    if not has("links"):
+        typer.echo("the autopilot's depth is not compared: the extra `links` is not installed", err=True)
+        return None
+    from wakewise.links.ardusub.carriers import carrier_of
+    from wakewise.links.ardusub.post import Post
+    from wakewise.links.ardusub.protocol import DEFAULT_SYSTEM
+
+    try:
+        carrier = carrier_of(parse_connection(f"udpin:{where}", "--watch"))
+    except EnvironmentFailure as fault:
+        if where != _WATCH:
+            raise
+        typer.echo(f"the autopilot's depth is not compared: {fault} (--watch HOST:PORT takes another)", err=True)
+        return None
+    stack.callback(carrier.close)
+    return DepthWatch(Post(carrier, DEFAULT_SYSTEM))
 
 
-def _physics_line(figures: PhysicsFigures) -> str:
+def _physics_line(figures: PhysicsFigures, depths: DepthWatch | None) -> str:
     if not figures.frames:
         return f"no firmware yet; {figures.refused} datagrams refused"
     pulses = " ".join(str(pulse) for pulse in figures.pulses_us[:8])
+    where = figures.stage or ("" if depths is None else depths.words)
     return (
         f"{shown(figures.rate_hz)} Hz, {figures.lost} lost, {figures.repeats} repeated, {figures.refused} refused; "
-        f"t {figures.time_s:.1f} s, depth {figures.depth_m or 0.0:.2f} m; pulses {pulses}"
+        f"t {figures.time_s:.1f} s, depth {figures.depth_m or 0.0:.2f} m{', ' if where else ''}{where}; pulses {pulses}"
     )
 
 

@@ -100,6 +100,8 @@ class VehiclePlant:
         # Velocity in the world before the last step, that step, and 1 if the hull was surely clear of everything then.
         self._last = np.zeros(5)
         self._water_W = ambient.velocity(start.X_WB.p_m[None], 0.0)[0]
+        self.push_B = np.zeros(6)
+        """Wrench of what is outside the water, in the body frame, shape (6,), held until it is set anew."""
         self.contact = ""
         """What the hull was stopped by in the last step, or nothing (an empty string)."""
         where = ", ".join(f"{v:.2f}" for v in start.X_WB.p_m)
@@ -151,7 +153,7 @@ class VehiclePlant:
         commands, touched = self._steps_of(np.array(commands_N, dtype=np.float64)), ""
         while until_s - self._time > _TIME_TOLERANCE_S:
             if self._calm and inflow_W_m_s is None:
-                self._move(commands, until_s, np.zeros(6), self._water_W)
+                self._move(commands, until_s, self.push_B, self._water_W)
             else:
                 self._step(commands, min(self._time + PLANT_STEP_S, until_s) - self._time, inflow_W_m_s)
             touched = touched or self.contact
@@ -216,7 +218,7 @@ class VehiclePlant:
         if inflow_W_m_s is not None:
             motors = thruster_lag(self._motors_N, saturate(wanted, self._lower_N, self._upper_N), self._lags_s, dt_s)
             self._factors = self._inflow_factors(self._gains * 0.5 * (self._motors_N + motors), inflow_W_m_s)
-        water, wrench = self._water_W, np.zeros(6)
+        water, wrench = self._water_W, self.push_B.copy()
         if not self._still and dt_s > 0.0:
             self._water_W = self._ambient.velocity(self._state[None, :3], self._time + dt_s)[0]
             water = 0.5 * (water + self._water_W)

@@ -225,6 +225,10 @@ class Tank:
         self._touching = self._touching or self._plant.touches()
         return self._sensors.collect(self._time) + self._joint.turn(self._time, dt_s)
 
+    def push(self, wrench_B: Array) -> None:
+        """A wrench from outside the water that acts until the next call; see `wakewise.interfaces.Plant`."""
+        self._plant.push_B = np.array(wrench_B, dtype=np.float64)
+
     def aim(self, tilt_rad: float) -> None:
         """Wish an angle of the camera's joint; a fixed camera does not mind."""
         self._joint.aim(tilt_rad)

@@ -83,7 +83,7 @@ def test_hand_back_does_not_jump_in_any_mode_that_is_allowed():
     assert shipped.count(left) == 1
     assert risen_m(ALT_HOLD, shipped.replace(left, "stepped_out = false")) > 0.5
     at_once = shipped.replace(left, "vehicle:set_mode(STABILIZE) vehicle:set_mode(ALT_HOLD)")
-    assert risen_m(ALT_HOLD, at_once) > 0.1
+    assert risen_m(ALT_HOLD, at_once) > 0.07
 
 
 def test_modes_that_hold_a_place_are_not_allowed():

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from wakewise.errors import InputError
 from wakewise.links.ardusub.protocol import ALT_HOLD, MANUAL, STABILIZE
+from wakewise.links.autopilot.piloted import Ashore
 from wakewise.links.autopilot.rehearsal import Rehearsal
 from wakewise.links.autopilot.stand_in import StandIn
 from wakewise.links.autopilot.telling import BUILDERS
@@ -190,3 +191,22 @@ def test_bad_arguments_are_refused() -> None:
     """Loops that no time-out of a script could be counted in."""
     with pytest.raises(InputError, match="10 loops"):
         StandIn(loop_hz=10.0)
+
+
+def test_the_pilot_ashore_leaves_alone_what_somebody_else_switched_off() -> None:
+    """It arms and switches on once; what another station undoes stays undone until the stand-in starts anew."""
+    flight = Rehearsal(HEAVY, sticks=None, beats=False)
+    pilot = Ashore(flight.stand_in, flight.carry)
+    flight.turns.append(pilot.turn)
+    flight.run(3.0)
+    assert flight.stand_in.armed
+    assert flight.stand_in.parameters.get("WKW_ENABLE") == 1.0
+    flight.arm(False)
+    flight.set("WKW_ENABLE", 0.0)
+    flight.run(6.0)
+    assert not flight.stand_in.armed
+    assert flight.stand_in.parameters.get("WKW_ENABLE") == 0.0
+    flight.stand_in.reboot()
+    flight.run(3.0)
+    assert flight.stand_in.armed
+    assert flight.stand_in.parameters.get("WKW_ENABLE") == 1.0

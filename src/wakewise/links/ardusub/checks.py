@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from wakewise.links.ardusub.buttons import conflict, free_buttons, free_words, parameters_of
+from wakewise.links.ardusub.engagement import Limits
 from wakewise.links.ardusub.frames import FRAMES, match_motors
 from wakewise.links.ardusub.motor_results import MotorResults
 from wakewise.links.ardusub.parameters import GROUND_NAMES, SYSTEM_NAMES, first_of
@@ -28,6 +29,10 @@ from wakewise.links.motors import channels_of_motors
 from wakewise.vehicles import Vehicle
 
 Verdict = Literal["go", "no-go", "unknown"]
+Whole = Literal["go", "no-go", "unknown", "unseen"]
+"""Of all rows; `unseen` is go but for motors that nobody has seen turn."""
+GAP_S = Limits().pose_s
+"""Longer than this nothing that a session needs may stay away."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +54,8 @@ class Heard:
         Messages that hold a position by their type, with their number.
     mavlink_2 : bool
         Whether the autopilot speaks MAVLink 2 on this connection.
+    gaps_s : dict
+        The longest time between two of "pose", "sticks" and "attitude".
     """
 
     seconds: float
@@ -58,6 +65,7 @@ class Heard:
     sticks: Mapping[int, int] = field(default_factory=dict)
     poses: Mapping[str, int] = field(default_factory=dict)
     mavlink_2: bool = True
+    gaps_s: Mapping[str, float] = field(default_factory=dict, compare=False)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,7 +85,10 @@ class Facts:
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One thing: what was asked for, what was found, and what to do; `needed` rows must not be unknown."""
+    """One thing: what was asked for, what was found, and what to do; `needed` rows must not be unknown.
+
+    `unseen` rows are motors that nobody has seen turn.
+    """
 
     what: str
     asked: str
@@ -85,6 +96,7 @@ class Row:
     verdict: Verdict
     do: str = ""
     needed: bool = True
+    unseen: bool = False
 
 
 def check(facts: Facts) -> tuple[Row, ...]:
@@ -92,11 +104,13 @@ def check(facts: Facts) -> tuple[Row, ...]:
     return tuple(row for part in _PARTS for row in part(facts))
 
 
-def verdict(rows: tuple[Row, ...]) -> Verdict:
-    """Go if nothing says no-go and nothing that is needed is unknown."""
+def verdict(rows: tuple[Row, ...], *, motors_seen: bool = True) -> Whole:
+    """Go if nothing says no-go, nothing that is needed is unknown and, if asked for, every motor was seen to turn."""
     if any(row.verdict == "no-go" for row in rows):
         return "no-go"
-    return "unknown" if any(row.verdict == "unknown" and row.needed for row in rows) else "go"
+    if any(row.verdict == "unknown" and row.needed for row in rows):
+        return "unknown"
+    return "unseen" if motors_seen and any(row.unseen for row in rows) else "go"
 
 
 def _vehicle(facts: Facts) -> Iterator[Row]:
@@ -218,14 +232,16 @@ def _tested(facts: Facts) -> Iterator[Row]:
     if facts.results is None or facts.results.vehicle != facts.vehicle.name:
         found = "none was tested" if facts.results is None else f"tested were those of {facts.results.vehicle}"
         asked = "each pushes as expected"
-        yield Row(what="motors seen", asked=asked, found=found, verdict="unknown", do=look, needed=False)
+        row = Row(what="motors seen", asked=asked, found=found, verdict="unknown", do=look, needed=False, unseen=True)
+        yield row
         return
     for motor in range(1, min(len(facts.vehicle.thrusters), SLOTS) + 1):
         what, asked = f"motor {motor} seen", "pushes as expected"
         seen = facts.results.of(motor)
         direction = facts.parameters.get(f"MOT_{motor}_DIRECTION")
         if seen is None or direction is None:
-            yield Row(what=what, asked=asked, found="not tested", verdict="unknown", do=look, needed=False)
+            found = "not tested"
+            yield Row(what=what, asked=asked, found=found, verdict="unknown", do=look, needed=False, unseen=True)
         elif seen.right_direction is None:
             do = f"find what turns: SERVOn_FUNCTION {32 + motor}, the cable of motor {motor}, its speed controller"
             yield _row(what, asked, seen.answer, False, do)
@@ -287,6 +303,17 @@ def _hearing(facts: Facts) -> Iterator[Row]:
     found = ", ".join(f"{name} {n / heard.seconds:.1f} a second" for name, n in sorted(heard.poses.items()))
     do = "no sensor gives a position: a DVL, a positioning system or VISION_POSITION_ESTIMATE is needed to engage"
     yield _row("pose", "a position", found or "none", bool(heard.poses), do)
+    for what, gap_s in heard.gaps_s.items():
+        even = gap_s <= GAP_S
+        do = f"a session lets go after {1e3 * GAP_S:.0f} ms without: look for what pauses it (Wi-Fi, a busy computer)"
+        yield Row(
+            what=f"longest pause of the {what}",
+            asked=f"at most {1e3 * GAP_S:.0f} ms, better half of it",
+            found=f"{1e3 * gap_s:.0f} ms in {heard.seconds:g} s",
+            verdict="go" if even else "unknown",
+            do="" if even else do,
+            needed=False,
+        )
     do = "set SERIALn_PROTOCOL of this port, or the endpoint in BlueOS, to MAVLink 2"
     yield _row("MAVLink", "version 2", "version 2" if heard.mavlink_2 else "version 1", heard.mavlink_2, do)
 

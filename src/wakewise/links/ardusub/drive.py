@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -15,9 +16,26 @@ from wakewise.links.motors import OUTPUTS, channels_of_motors
 from wakewise.vehicles import Vehicle
 
 
+class Drive(Protocol):
+    """What thrusts are to the script, by what the autopilot is set to."""
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Names of the parameters that must be known, and stay as they are while it drives."""
+        ...
+
+    def amiss(self, parameters: Mapping[str, float]) -> str:
+        """What of the parameters does not fit the vehicle, in words; empty where all does."""
+        ...
+
+    def slots(self, parameters: Mapping[str, float], thrusts_N: Array, battery_V: float) -> Array:
+        """What the script is told, shape (8,), for thrusts of shape (n,): values in [-1, 1], NaN without a motor."""
+        ...
+
+
 @dataclass(eq=False)
 class VehicleDrive:
-    """The motors of a vehicle; implements `wakewise.links.ardusub.warden.Drive`.
+    """The motors of a vehicle; implements `Drive`.
 
     Raises
     ------

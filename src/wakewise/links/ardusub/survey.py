@@ -13,16 +13,21 @@ from wakewise.links.ardusub.connection import Talk, send_command
 from wakewise.links.ardusub.motor_results import MotorResults
 from wakewise.links.ardusub.parameters import read_parameters
 from wakewise.links.ardusub.protocol import AUTOPILOT_COMPONENT, HEARTBEAT_PERIOD_S, VERSION_NAME
+from wakewise.links.ardusub.requests import interval_requests
 from wakewise.vehicles import Vehicle
 
 LISTEN_S = 3.0
 """Long enough for the script, which speaks twice a second, and for sticks and poses."""
 PATIENCE_S = 5.0
+SETTLE_S = 1.0
+"""How long an autopilot may take to speak at the rates that were asked for."""
 _ARDUPILOT, _SUBMARINE = 3, 12
 _REQUEST_MESSAGE, _AUTOPILOT_VERSION = 512, 148
 _POSES = frozenset(
     {"LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "VISION_POSITION_ESTIMATE", "ODOMETRY", "VISION_POSITION_DELTA"}
 )
+_TAKEN = frozenset({"LOCAL_POSITION_NED", "VISION_POSITION_ESTIMATE", "ODOMETRY"})
+"""Those of them that a session takes for a pose."""
 Progress = Callable[[float, float], None]
 
 
@@ -89,12 +94,29 @@ def say_hello(talk: Talk) -> None:
 
 
 def _listened(talk: Talk, seconds: float, kind: str, *, mavlink_2: bool) -> Heard:
-    """Everything that is said for a while; the version is asked for until it is."""
+    """Everything that is said for a while, at the rates that a session asks for; the version is asked for until it is.
+
+    Pauses count from the second message of a kind after `SETTLE_S`.
+    """
+    for request, fields in interval_requests(talk.system):
+        talk.send(request, **fields)
+    last_s: dict[str, float] = {}
+    gaps_s: dict[str, float] = {}
+
+    def came(what: str) -> None:
+        now_s = time.monotonic()
+        if now_s < settled_s:
+            return
+        if what in last_s:
+            gaps_s[what] = max(gaps_s.get(what, 0.0), now_s - last_s[what])
+        last_s[what] = now_s
+
     sticks: Counter[int] = Counter()
     poses: Counter[str] = Counter()
     firmware: tuple[int, int, int] | None = None
     script: float | None = None
     until, hello_s = time.monotonic() + seconds, 0.0
+    settled_s = time.monotonic() + min(SETTLE_S, 0.5 * seconds)
     while (left_s := until - time.monotonic()) > 0.0:
         if time.monotonic() >= hello_s:
             say_hello(talk)
@@ -107,6 +129,7 @@ def _listened(talk: Talk, seconds: float, kind: str, *, mavlink_2: bool) -> Hear
         name = message.get_type()
         if name == "MANUAL_CONTROL" and message.target == talk.system:
             sticks[message.get_srcSystem()] += 1
+            came("sticks")
         elif message.get_srcSystem() != talk.system:
             continue
         elif name == "AUTOPILOT_VERSION" and message.get_srcComponent() == AUTOPILOT_COMPONENT:
@@ -115,6 +138,10 @@ def _listened(talk: Talk, seconds: float, kind: str, *, mavlink_2: bool) -> Hear
             script = float(message.value)
         elif name in _POSES and not (name == "GLOBAL_POSITION_INT" and message.lat == message.lon == 0):
             poses[name] += 1
+            if name in _TAKEN:
+                came("pose")
+        elif name == "ATTITUDE":
+            came("attitude")
     return Heard(
         seconds=seconds,
         kind=kind,
@@ -123,6 +150,7 @@ def _listened(talk: Talk, seconds: float, kind: str, *, mavlink_2: bool) -> Hear
         sticks=dict(sticks),
         poses=dict(poses),
         mavlink_2=mavlink_2,
+        gaps_s=gaps_s,
     )
 
 

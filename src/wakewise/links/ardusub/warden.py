@@ -15,7 +15,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -23,9 +23,11 @@ from wakewise.arrays import Array
 from wakewise.interfaces import BodyState, Measurement
 from wakewise.links.ardusub import protocol
 from wakewise.links.ardusub.buttons import BUTTON_PARAMETERS, buttons_amiss
+from wakewise.links.ardusub.drive import Drive
 from wakewise.links.ardusub.engagement import Engagement, Facts, Limits, faults
 from wakewise.links.ardusub.journal import Journal
 from wakewise.links.ardusub.listening import REMEMBERED_S, Known, Said, heard, tilt_of
+from wakewise.links.ardusub.margins import Margins
 from wakewise.links.ardusub.measuring import Telemetry, measured
 from wakewise.links.ardusub.news import News
 from wakewise.links.ardusub.requests import (
@@ -38,23 +40,6 @@ from wakewise.links.ardusub.requests import (
 
 Send = Callable[[str, Mapping[str, Any]], None]
 """Sends a message: its name as pymavlink's encoders have it, and its fields."""
-
-
-class Drive(Protocol):
-    """What thrusts are to the script, by what the autopilot is set to."""
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Names of the parameters that must be known, and stay as they are while it drives."""
-        ...
-
-    def amiss(self, parameters: Mapping[str, float]) -> str:
-        """What of the parameters does not fit the vehicle, in words; empty where all does."""
-        ...
-
-    def slots(self, parameters: Mapping[str, float], thrusts_N: Array, battery_V: float) -> Array:
-        """What the script is told, shape (8,), for thrusts of shape (n,): values in [-1, 1], NaN without a motor."""
-        ...
 
 
 TICK_S = 0.02
@@ -118,7 +103,7 @@ class Warden:
         self._news = News(journal, clock)
         self._judged_for: Mapping[str, float] | None = None
         self._amiss, self._engaged_with, self._engaged_mode = "", dict[str, float](), ""
-        self._releases_left = 0
+        self._releases_left, self.margins = 0, Margins()
         self.thrusts_sent = self.releases_sent = self.unsent = 0
 
     def begin(self) -> None:
@@ -229,6 +214,7 @@ class Warden:
             self._standstill_s = gap_s
             self._judge()
             self._standstill_s = 0.0
+            self.margins.looked(self.facts())
             if self.engagement.state == "off":
                 return
             if self.entry is not None and self._slots is not None and now_s - self._sent_s >= protocol.SEND_PERIOD_S:
@@ -346,6 +332,7 @@ class Warden:
             self._engaged_with = {name: self.known.parameters[name] for name in self._needs}
             self._pressed.clear()
         for t in after.told:
+            self.margins.told(t)
             self._write("state", before=t.before, after=t.after, reason=t.reason, kind=t.kind)
 
     def _let_go(self, now_s: float) -> None:

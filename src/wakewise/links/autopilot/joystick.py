@@ -1,12 +1,10 @@
 """What the pilot's buttons do, by BTNn_FUNCTION and, while a shift button is held, by BTNn_SFUNCTION.
 
-As ArduSub does it: a button acts as it goes down, and for a tenth of a second after one has acted the others are not
-looked at. Arming, disarming, modes and shift are here; mount, lights, gain, trim, relays and servos are not.
+Arming, disarming, modes and shift are here; mount, lights, gain, trim, input hold, relays and servos are not.
 """
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from wakewise.links.ardusub.buttons import (
@@ -24,37 +22,32 @@ from wakewise.links.autopilot.parameters import ParameterTable
 if TYPE_CHECKING:
     from wakewise.links.autopilot.stand_in import StandIn
 
-DEBOUNCE_S = 0.1
-
 
 class Joystick:
-    """Remembers which buttons are down."""
+    """Remembers which buttons are down: one acts as it goes down."""
 
     def __init__(self) -> None:
-        self._before, self._acted_s = 0, -math.inf
+        self._before = 0
 
     def take(self, board: StandIn, buttons: int) -> None:
         """Buttons as bits, as the last sticks have them."""
-        if board.now_s - self._acted_s <= DEBOUNCE_S:
+        pressed, self._before = buttons & ~self._before, buttons
+        if not pressed:
             return
-        down = [button for button in range(BUTTONS) if buttons & 1 << button]
-        shifted = any(_function(board.parameters, button, shifted=False) == SHIFT for button in down)
-        for button in down:
-            self._acted_s = board.now_s
-            if not self._before & 1 << button:
+        shifted = any(buttons & 1 << b and _function(board.parameters, b) == SHIFT for b in range(BUTTONS))
+        for button in range(BUTTONS):
+            if pressed & 1 << button:
                 _act(board, _function(board.parameters, button, shifted=shifted))
-        self._before = buttons
 
 
 def can_disarm(parameters: ParameterTable) -> bool:
     """Whether some button disarms: without one ArduSub refuses to arm, whatever ARMING_CHECK says."""
-    functions = {
-        _function(parameters, button, shifted=shifted) for button in range(BUTTONS) for shifted in (False, True)
-    }
-    return bool(functions & {ARM_TOGGLE, DISARM})
+    plain = {_function(parameters, button) for button in range(BUTTONS)}
+    shifted = {_function(parameters, button, shifted=True) for button in range(BUTTONS)} if SHIFT in plain else set()
+    return bool((plain | shifted) & {ARM_TOGGLE, DISARM})
 
 
-def _function(parameters: ParameterTable, button: int, *, shifted: bool) -> int:
+def _function(parameters: ParameterTable, button: int, *, shifted: bool = False) -> int:
     return round(parameters.value(parameters_of(button)[shifted], otherwise=NONE))
 
 

@@ -92,12 +92,12 @@ def _depth(
     dead = 1e-3 * parameters.value("THR_DZ", otherwise=100.0)
     steered = abs(throttle) > dead
     held = depth if steered or loops.depth_m is None else loops.depth_m
-    wished = parameters.value("PSC_POSZ_P", otherwise=1.0) * (held - depth)
+    wished = parameters.value("PSC_POSZ_P", otherwise=3.0) * (held - depth)
     if steered:
         wished = -throttle * parameters.value("PILOT_SPEED_UP", otherwise=50.0) / _CM
     # Gains of the last loop count per mille of the throttle's half range for cm/s2.
     scale = _PER_MILLE * _CM
-    missing = parameters.value("PSC_VELZ_P", otherwise=5.0) * (wished - down)
+    missing = parameters.value("PSC_VELZ_P", otherwise=8.0) * (wished - down)
     most = _PER_MILLE * parameters.value("PSC_ACCZ_IMAX", otherwise=100.0) * 2.0
     total = loops.climb_sum + scale * parameters.value("PSC_ACCZ_I", otherwise=0.1) * missing * dt_s
     total = max(-most, min(most, total))

@@ -1,4 +1,7 @@
-"""A pilot ashore for whom nobody must be there: arms the stand-in, switches the script on and lets the sticks go."""
+"""A pilot ashore for whom nobody must be there: arms the stand-in, switches the script on and lets the sticks go.
+
+Once it has seen both it leaves them as somebody else puts them, until the stand-in starts anew.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ FIRST_S = 0.4
 
 
 class Ashore:
-    """Heartbeats and sticks of a ground station; arms and switches on again where somebody undid it.
+    """Heartbeats and sticks of a ground station; arms and switches on once after each start.
 
     Parameters
     ----------
@@ -33,16 +36,24 @@ class Ashore:
 
     def __init__(self, made: StandIn, carry: Callable[[bytes, str], None]) -> None:
         self._made, self._pilot = made, Speaker(carry, STATION, STATION_COMPONENT, "pilot ashore")
+        self._begin()
+
+    def _begin(self) -> None:
         self._due = {"sticks": 0.0, "beat": 0.0, "ask": FIRST_S}
+        self._done, self._last_s = False, 0.0
 
     def turn(self) -> None:
         """Say what is due, by the stand-in's time."""
         made, pilot = self._made, self._pilot
+        if made.now_s < self._last_s:
+            self._begin()
+        self._last_s = made.now_s
         if self._is_due("sticks", STICKS_S):
             pilot.say(mavlink.MAVLink_manual_control_message(made.system, *STICKS_MIDDLE, 0))
         if self._is_due("beat", BEAT_S):
             pilot.say(mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
-        if self._is_due("ask", ASKS_S):
+        self._done |= made.armed and made.parameters.get(ENABLE_PARAMETER) == 1.0
+        if not self._done and self._is_due("ask", ASKS_S):
             if not made.armed:
                 arm = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
                 pilot.say(mavlink.MAVLink_command_long_message(made.system, 1, arm, 0, 1.0, 0, 0, 0, 0, 0, 0))

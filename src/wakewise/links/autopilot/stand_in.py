@@ -74,6 +74,9 @@ class StandIn:
         Lua scripts on its card, text by name.
     home_deg : tuple of two floats
         Latitude and longitude of physics' origin.
+    zero_depth_m : float or None
+        Where the depth sensor was calibrated; None does that at each start, wherever it is, as ArduSub does. Either
+        way whatever is shallower later on is its new zero.
 
     Raises
     ------
@@ -96,6 +99,7 @@ class StandIn:
     _station_s: float | None
     _sticks_s: float | None
     _told: dict[str, Action]
+    _zeroed: bool
 
     def __init__(
         self,
@@ -105,10 +109,12 @@ class StandIn:
         firmware: tuple[int, int, int] = FIRMWARE,
         scripts: Mapping[str, str] | None = None,
         home_deg: tuple[float, float] = HOME_DEG,
+        zero_depth_m: float | None = 0.0,
     ) -> None:
         if not LOOPS_HZ[0] <= loop_hz <= LOOPS_HZ[1]:
             raise InputError(f"stand-in: {loop_hz:g} loops a second, {LOOPS_HZ[0]:g} to {LOOPS_HZ[1]:g} are allowed")
         self.loop_hz, self.firmware, self.home_deg = loop_hz, firmware, home_deg
+        self._calibrated_m, self.zero_depth_m = zero_depth_m, 0.0
         self.parameters = ParameterTable(own_parameters() | dict(values or {}))
         self.files = Files()
         for name, text in (scripts or {}).items():
@@ -156,6 +162,11 @@ class StandIn:
         return round(1e3 * self.now_s) & 0xFFFFFFFF
 
     @property
+    def depth_m(self) -> float:
+        """What its depth sensor makes of where it is."""
+        return float(self.motion.p_WB_m[2]) - self.zero_depth_m
+
+    @property
     def overridden(self) -> bool:
         """Whether a script drives an output now."""
         return any(self._servos.overridden)
@@ -194,6 +205,7 @@ class StandIn:
         """One loop: the pulses of its outputs, 16 of them, after physics told how the vehicle moves."""
         dt_s = max(motion.time_s - self.motion.time_s, 0.0)
         self.motion = motion
+        self._calibrate(float(motion.p_WB_m[2]))
         self._watch()
         for script in self._scripts:
             script.step()
@@ -216,6 +228,14 @@ class StandIn:
             self.send(parameter(self, self._to_list.popleft()))
         return self.pulses_us
 
+    def _calibrate(self, depth_m: float) -> None:
+        """Take the depth at the start for 0, and any less for it later on: less than no depth cannot be."""
+        if self._zeroed and depth_m >= self.zero_depth_m:
+            return
+        fixed = not self._zeroed and self._calibrated_m is not None
+        self.zero_depth_m = self._calibrated_m if fixed and self._calibrated_m is not None else depth_m
+        self._zeroed = True
+
     # What messages and failsafes do.
 
     def reboot(self) -> None:
@@ -226,6 +246,7 @@ class StandIn:
         self._servos = Servos(self.loop_hz)
         self.motor_test = MotorTest(len(factors_of(self.parameters)))
         self.timetable, self.joystick = Timetable(), Joystick()
+        self._zeroed = False
         self._station_s = None
         self._sticks_s = None
         self._to_list = deque()

@@ -1,6 +1,7 @@
 """What the stand-in tells, and how often: the messages that ground stations, companions and logs live on.
 
-Each is built from the truth that physics told last: there is no noise, no estimator and no magnetometer here.
+Each is built from the truth that physics told last: there is no noise, no estimator and no magnetometer here. Only the
+depth is the sensor's, which may have been calibrated under water (`StandIn.depth_m`).
 """
 
 from __future__ import annotations
@@ -88,11 +89,12 @@ def _attitude_quaternion(board: StandIn) -> Any:
 
 
 def _local_position(board: StandIn) -> Any:
-    return mavlink.MAVLink_local_position_ned_message(board.boot_ms, *board.motion.p_WB_m, *board.motion.v_W_m_s)
+    north, east, _ = board.motion.p_WB_m
+    return mavlink.MAVLink_local_position_ned_message(board.boot_ms, north, east, board.depth_m, *board.motion.v_W_m_s)
 
 
 def _global_position(board: StandIn) -> Any:
-    north, east, down = board.motion.p_WB_m
+    north, east, _ = board.motion.p_WB_m
     latitude, longitude = board.home_deg
     turn = math.degrees(1.0 / _EARTH_M)
     heading = math.degrees(euler_from_quat(board.motion.q_WB)[2]) % 360.0
@@ -100,8 +102,8 @@ def _global_position(board: StandIn) -> Any:
         board.boot_ms,
         round(1e7 * (latitude + turn * north)),
         round(1e7 * (longitude + turn * east / math.cos(math.radians(latitude)))),
-        round(-1e3 * down),
-        round(-1e3 * down),
+        round(-1e3 * board.depth_m),
+        round(-1e3 * board.depth_m),
         *(int(np.clip(round(1e2 * v), -32767, 32767)) for v in board.motion.v_W_m_s),
         round(1e2 * heading) % 36000,
     )
@@ -111,9 +113,7 @@ def _vfr_hud(board: StandIn) -> Any:
     velocity = board.motion.v_W_m_s
     heading = math.degrees(euler_from_quat(board.motion.q_WB)[2]) % 360.0
     speed = float(np.hypot(velocity[0], velocity[1]))
-    return mavlink.MAVLink_vfr_hud_message(
-        speed, speed, round(heading) % 360, 0, -float(board.motion.p_WB_m[2]), -float(velocity[2])
-    )
+    return mavlink.MAVLink_vfr_hud_message(speed, speed, round(heading) % 360, 0, -board.depth_m, -float(velocity[2]))
 
 
 def _pressure_in_hull(board: StandIn) -> Any:

@@ -33,7 +33,10 @@ class Body(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class PhysicsFigures:
-    """How the link went: counts as in `Frames`, datagrams refused, frames a second, and how the vehicle is now."""
+    """How the link went: counts as in `Frames`, datagrams refused, frames a second, and how the vehicle is now.
+
+    `stage` is what is done with it before it is free, see `Lowered`.
+    """
 
     frames: int
     repeats: int
@@ -47,6 +50,7 @@ class PhysicsFigures:
     depth_m: float | None
     thrusts_N: tuple[float, ...]
     pulses_us: tuple[int, ...]
+    stage: str = ""
 
 
 class Physics:
@@ -140,4 +144,5 @@ class Physics:
             depth_m=None if motion is None else float(motion.p_WB_m[2]),
             thrusts_N=tuple(round(float(thrust), 3) for thrust in self._now_N),
             pulses_us=self._pulses,
+            stage=str(getattr(self._body, "stage", "")),
         )

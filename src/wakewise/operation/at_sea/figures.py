@@ -29,12 +29,16 @@ STILL_M_S = 1e-4
 
 @dataclass(kw_only=True, eq=False)
 class Figures:
-    """D of the thrusts that act and what they save against the least ones, for ground stations; twice a second."""
+    """D of the thrusts that act and what they save against the least ones, for ground stations; twice a second.
+
+    `speeds_m_s` is the root mean square speed at the target's points of both, for people; None before any.
+    """
 
     parts: Parts
     warden: Warden
     turn: Turn
     flown_N: Callable[[], Array]
+    speeds_m_s: tuple[float, float] | None = None
     _due_s: float = -math.inf
     _covered_pct: float | None = None
     _coverage: Coverage | None = None
@@ -50,10 +54,11 @@ class Figures:
         if not np.isfinite(gram).all():
             return
         found = {DISTURBANCE_NAME: disturbance_of(gram, thrusts)}
-        if engaged:
-            least = least_thrusts(self._layout, self._layout.B @ thrusts, gram).disturbance or 0.0
-            if least > self._view.total_weight * STILL_M_S**2:
-                found[SAVED_NAME] = 100.0 * (1.0 - found[DISTURBANCE_NAME] / least)
+        least = least_thrusts(self._layout, self._layout.B @ thrusts, gram).disturbance or 0.0
+        weight = self._view.total_weight
+        self.speeds_m_s = (math.sqrt(found[DISTURBANCE_NAME] / weight), math.sqrt(max(least, 0.0) / weight))
+        if engaged and least > weight * STILL_M_S**2:
+            found[SAVED_NAME] = 100.0 * (1.0 - found[DISTURBANCE_NAME] / least)
         if self._covered_pct is not None:
             found[COVERAGE_NAME] = self._covered_pct
         self.warden.figures = found

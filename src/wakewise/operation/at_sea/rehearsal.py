@@ -11,6 +11,7 @@ from wakewise.allocation import least_thrusts
 from wakewise.control import make_tracker, vehicle_layout
 from wakewise.interfaces import Goal, Measurement
 from wakewise.operation.at_sea.join import AtSea
+from wakewise.operation.at_sea.turns import WhileEngaged
 from wakewise.operation.by_hand.assisted import assisted
 from wakewise.operation.by_hand.desk import Desk, DeskState
 from wakewise.operation.loop import Step
@@ -45,7 +46,9 @@ def rehearse(sea: AtSea, steps: int = 12) -> float:
     parts, start = sea.parts, sea.parts.start
     dt_s, layout = 1.0 / parts.control.rate_hz, vehicle_layout(parts.vehicle)
     chain = assisted(sea.bare.replace(world=_Patience()), _Waving(), Desk(), DeskState(mode="operator"))
-    flying, filtering, method = chain.flying, chain.estimator, sea.parts.controller.inner
+    resting = sea.parts.controller
+    assert isinstance(resting, WhileEngaged)  # see `join.at_sea`
+    flying, filtering, method = chain.flying, chain.estimator, resting.inner
     state, own, known, estimate, took_s = flying.init(), method.init(), filtering.init(start), start, 0.0
     for k in range(steps):
         began = time.perf_counter()

@@ -23,7 +23,6 @@ from wakewise.links.ardusub.drive import VehicleDrive
 from wakewise.links.ardusub.journal import JOURNAL_FILE, Journal
 from wakewise.links.ardusub.link_thread import LinkThread, Receiving
 from wakewise.links.ardusub.listening import attitude_of
-from wakewise.links.ardusub.protocol import DISTURBANCE_NAME, SAVED_NAME
 from wakewise.links.ardusub.warden import Send, Warden
 from wakewise.operation.at_sea.cameras import MakeCamera, note_view
 from wakewise.operation.at_sea.join import AtSea, at_sea
@@ -129,18 +128,22 @@ class SeaSession:
             "loop_jitter_ms_p99": None if pace is None else round(1e3 * pace.late_s(), 3),
             "photographs": self.photographs,
             "photographs_confirmed": self.warden.known.photographs,
+            "trips": dict(self.warden.margins.trips),
         }
 
     def line(self) -> str:
         """How it stands, in one line for people."""
         warden, facts = self.warden, self.warden.facts()
-        known, engagement, shown = warden.known, warden.engagement, warden.figures
+        known, engagement = warden.known, warden.engagement
         armed = {True: "armed", False: "disarmed", None: "not heard"}[known.armed]
-        parts = [f"{engagement.state:<9}", f"{known.mode_name or '-'} {armed}", f"pose {_age(facts.pose_s)}"]
-        if DISTURBANCE_NAME in shown:
-            parts.append(f"D {shown[DISTURBANCE_NAME]:.1e} (m/s)^2")
-        if SAVED_NAME in shown:
-            parts.append(f"saved {shown[SAVED_NAME]:.0f} %")
+        state = f"{engagement.state:<9}" + ("" if engagement.state == "engaged" else f" ({engagement.why})")
+        parts = [state, f"{known.mode_name or '-'} {armed}", f"pose {_age(facts.pose_s)}"]
+        if self.sea is not None and self.sea.figures.speeds_m_s is not None:
+            flown, least = (1e3 * speed for speed in self.sea.figures.speeds_m_s)
+            parts.append(f"water at the target {flown:.1f} mm/s rms, by least thrusts {least:.1f}")
+        margins = warden.margins.words(warden.limits)
+        if margins:
+            parts.append(margins)
         if self._camera is not None and known.camera:
             parts.append(known.camera)
         live = self.live
@@ -148,7 +151,7 @@ class SeaSession:
             parts.append(self.preparing if live is None else f"begins: {live.preparing}")
         else:
             parts.append(f"loop {1e3 * live.pace.late_s():.1f} ms")
-        return "  ".join(parts) + (f"  | {engagement.why}" if engagement.state != "engaged" else "")
+        return "  ".join(parts)
 
     def _run(self) -> None:
         try:

@@ -12,7 +12,7 @@ SCRIPT_NAME = "wakewise.lua"
 SCRIPT_FOLDERS = ("/APM/scripts", "./scripts")
 """Where ArduPilot looks for scripts (AP_Scripting, lua_common_defs.h): on a card, and where it runs on Linux, as on a
 Navigator board; BlueOS shows that folder as `lua_scripts`."""
-PARAMETERS_NAME = "wakewise.params"
+PARAMETERS_NAME, SITL_NAME = "wakewise.params", "sitl.params"
 BY_HAND = (
     "BlueOS, File Browser, folder lua_scripts: upload wakewise.lua (elsewhere: folder APM/scripts of the autopilot's "
     "card)",
@@ -45,6 +45,16 @@ def write_script(folder: Path) -> Path:
 def write_parameters(folder: Path) -> Path:
     """Write the parameter file into a folder, and say where; raises as `write_script`."""
     return _write(folder, PARAMETERS_NAME, parameters_text())
+
+
+def sitl_text() -> str:
+    """The same for ArduSub's simulator, with what is a vehicle's own: frame and depth sensor."""
+    return parameters_text() + (files(__package__) / SITL_NAME).read_text(encoding="utf-8")
+
+
+def write_sitl(folder: Path) -> Path:
+    """Write the simulator's parameter file into a folder, and say where; raises as `write_script`."""
+    return _write(folder, SITL_NAME, sitl_text())
 
 
 def _write(folder: Path, name: str, text: str) -> Path:
