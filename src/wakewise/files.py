@@ -18,7 +18,6 @@ from wakewise.processes import half_done
 
 _LEAST_BYTES = 65_536
 _LONGEST_NAME = 200
-_MOST_HEAD_LINES, _LONGEST_LINE = 1000, 10_000
 
 
 @contextmanager
@@ -154,22 +153,3 @@ def named(folder: Path, name: str, what: str) -> Path:
     if fault is not None:
         raise InputError(f"{what}: {quoted(name)} names a folder, so {fault}")
     return folder / name
-
-
-def broken_promise(path: Path) -> str | None:
-    """What an ASCII PLY file holds less of than its head promises, in words; None for a whole one or another format.
-
-    Readers take what is there, so a file that was cut short passes for a small one.
-    """
-    with path.open("rb") as file:
-        promised = 0
-        for _ in range(_MOST_HEAD_LINES):
-            words = file.readline(_LONGEST_LINE).split()
-            if words[:1] == [b"format"] and words[1:2] != [b"ascii"]:
-                return None
-            if words[:1] == [b"element"] and len(words) == 3 and words[2].isdigit():
-                promised += int(words[2])
-            if words == [b"end_header"]:
-                held = sum(1 for line in file if line.strip())
-                return None if held >= promised else f"promises {promised} vertices and faces, holds {held}"
-    return None

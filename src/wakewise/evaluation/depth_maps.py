@@ -12,6 +12,7 @@ from scipy.spatial import KDTree
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError, StageError
 from wakewise.evaluation.surface import thin
+from wakewise.sizes import check_arrays
 
 THRESHOLDS_MM = (5, 10, 20, 50)
 
@@ -84,14 +85,17 @@ def read_depth_views(depths: Path, cameras: Path) -> list[DepthView]:
     """
     if not depths.is_file():
         raise InputError(f"{depths}: does not exist; an .npz file with an array depth (n, h, w) is needed")
+    files = sorted(cameras.glob("*.camera")) if cameras.is_dir() else []
+    shape = check_arrays(depths).get("depth")
+    if shape is None:
+        raise InputError(f"{depths}: is no .npz file with an array depth (n, h, w)")
+    if len(shape) != 3 or shape[0] != len(files) or len(files) == 0:
+        raise InputError(f"{depths}: depth has shape {shape}, {cameras} holds {len(files)} .camera files")
     try:
         with np.load(depths) as file:
             stack = np.asarray(file["depth"], dtype=np.float64)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         raise InputError(f"{depths}: is no .npz file with an array depth (n, h, w)") from None
-    files = sorted(cameras.glob("*.camera")) if cameras.is_dir() else []
-    if stack.ndim != 3 or len(stack) != len(files) or len(files) == 0:
-        raise InputError(f"{depths}: depth has shape {stack.shape}, {cameras} holds {len(files)} .camera files")
     return [_view(depth, path) for depth, path in zip(stack, files, strict=True)]
 
 

@@ -27,6 +27,7 @@ from wakewise.imaging import PinholeCamera, SiltOptics
 from wakewise.interfaces import ScalarGrid, no_progress
 from wakewise.operation import Scenario, read_exposures, read_scenario
 from wakewise.operation.exposures import ExposureRecord
+from wakewise.pictures import read_picture
 from wakewise.reports import figures
 from wakewise.reports.trial import Trial, read_trial
 from wakewise.reports.vehicle.hull import hull_of
@@ -184,7 +185,7 @@ class _Film:
 
     def _photograph(self, index: int) -> NDArray[np.uint8] | None:
         if self._photo[0] != index:
-            image = cv2.imread(str(self.trial.photographs[index].path), cv2.IMREAD_COLOR)
+            image = read_picture(self.trial.photographs[index].path)
             self._photo = (index, None if image is None else np.ascontiguousarray(image[..., ::-1]))
         return self._photo[1]
 
@@ -294,7 +295,7 @@ def _keep(path: Path, frame: NDArray[np.uint8]) -> None:
 
 
 def _again(path: Path) -> NDArray[np.uint8]:
-    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    image = read_picture(path)
     if image is None:
         path.unlink(missing_ok=True)
         raise InputError(f"{path}: a kept frame cannot be read; run the same command again to draw it anew")

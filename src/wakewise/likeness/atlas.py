@@ -23,6 +23,7 @@ from wakewise.errors import StageError
 from wakewise.files import whole_file
 from wakewise.interfaces import Progress, no_progress
 from wakewise.likeness.photo_colours import project
+from wakewise.pictures import read_picture
 from wakewise.reconstruction.views import View, read_views
 
 SIDES_PX = (512, 1024, 2048, 4096, 8192)
@@ -134,7 +135,7 @@ def paint(
         share = np.where(which == k, weight, 0.0).sum(axis=1)
         if not share.any():
             continue
-        image = cv2.imread(str(photos / view.name), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+        image = read_picture(photos / view.name, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
         if image is None:
             raise StageError(f"{photos / view.name}: can no longer be read")
         scale = np.array([image.shape[1] / view.width, image.shape[0] / view.height])

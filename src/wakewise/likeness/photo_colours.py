@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import cv2
@@ -22,8 +23,10 @@ from wakewise.errors import InputError, StageError
 from wakewise.files import whole_file
 from wakewise.interfaces import no_progress
 from wakewise.likeness.colour import WaterFit, balanced, fit_water, without_water
+from wakewise.pictures import read_picture
 from wakewise.reconstruction import read_photos
 from wakewise.reconstruction.views import View, read_views
+from wakewise.sizes import picture_depth
 
 FIT_PHOTOS = 16
 """Photographs, spread over the set, that the water is fitted to."""
@@ -34,12 +37,19 @@ _QUALITY = 93
 
 @dataclass(frozen=True, kw_only=True)
 class Corrected:
-    """What was done: photographs with the water undone by physics, others balanced, and the water, in 1/m."""
+    """What was done: photographs with the water undone by physics, others balanced, and the water, in 1/m.
+
+    deep, clear: photographs of more than 8 bits and with transparency, which the copies have not; renamed: copies that
+    are called after the photograph's whole name, as two would have met.
+    """
 
     physical: int
     balanced: int
     water: WaterFit | None
     why_not: str | None
+    deep: int
+    clear: int
+    renamed: int
 
     def summary(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -51,6 +61,9 @@ class Corrected:
             "photos": self.physical + self.balanced,
             "physical": self.physical,
             "balanced": self.balanced,
+            "deep": self.deep,
+            "clear": self.clear,
+            "renamed": self.renamed,
             "signal_per_m": rates,
             "veil": veil,
             "why": why,
@@ -68,6 +81,12 @@ class Corrected:
         if self.balanced:
             reason = "" if self.why_not is None else f" ({self.why_not})"
             lines.append(f"{self.balanced} photographs balanced without depths{reason}")
+        lost = [(self.deep, "have more than 8 bits"), (self.clear, "have transparency")]
+        said = [f"{count} photographs {what}" for count, what in lost if count]
+        if said:
+            lines.append(f"{' and '.join(said)}, which the copies (JPEG, 8 bits) have not")
+        if self.renamed:
+            lines.append(f"{self.renamed} copies are named after the whole name (a.png.jpg), as two would have met")
         return lines
 
 
@@ -94,6 +113,7 @@ def correct_photos(
         raise InputError(f"--out {out}: is the folder of the photographs, must be another")
     found = read_photos(photos)
     names = [photo.name for photo in found]
+    targets = copy_names(names)
     depths, why_not = _depths(model, names)
     fit: WaterFit | None = None
     if depths is not None:
@@ -109,11 +129,13 @@ def correct_photos(
             fit = fit_water(pairs)
         except InputError as fault:
             why_not = str(fault)
-    physical = 0
+    physical = deep = clear = 0
     for k, name in enumerate(names):
         progress(k, len(names), name)
         image = _read(photos / name)
-        path = out / Path(name).with_suffix(".jpg")
+        path = out / targets[name]
+        bits, alpha = picture_depth((photos / name).read_bytes())
+        deep, clear = deep + (bits > 8), clear + alpha
         known = fit is not None and depths is not None and depths.knows(name, image.shape[:2])
         physical += known
         if path.exists():
@@ -126,7 +148,28 @@ def correct_photos(
             jpeg = cv2.imencode(".jpg", np.ascontiguousarray(shown[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
             temporary.write_bytes(jpeg[1].tobytes())
     progress(len(names), len(names), "")
-    return Corrected(physical=physical, balanced=len(names) - physical, water=fit, why_not=why_not)
+    return Corrected(
+        physical=physical,
+        balanced=len(names) - physical,
+        water=fit,
+        why_not=why_not,
+        deep=deep,
+        clear=clear,
+        renamed=sum(copy == f"{name}.jpg" for name, copy in targets.items()),
+    )
+
+
+def copy_names(names: Sequence[str]) -> dict[str, str]:
+    """Name of each photograph's copy, a JPEG: its own with that ending, or its whole name and that where two meet.
+
+    Meeting is what a disk that does not tell large letters from small ones would say.
+    """
+    plain = {name: str(PurePosixPath(name).with_suffix(".jpg")) for name in names}
+    often = Counter(copy.lower() for copy in plain.values())
+    copies = {name: copy if often[copy.lower()] == 1 else f"{name}.jpg" for name, copy in plain.items()}
+    if len({copy.lower() for copy in copies.values()}) < len(copies):
+        raise InputError("photographs: some differ in nothing but large and small letters; rename them")
+    return copies
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -248,7 +291,7 @@ def _depths(model: Path | None, names: list[str]) -> tuple[Depths | None, str | 
 
 
 def _read(path: Path) -> NDArray[np.uint8]:
-    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    image = read_picture(path)
     if image is None:
         raise InputError(f"{path}: cannot be read as a photograph")
     return np.ascontiguousarray(image[..., ::-1])

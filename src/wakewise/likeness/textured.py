@@ -11,7 +11,6 @@ import struct
 from collections.abc import Callable
 from pathlib import Path
 
-import cv2
 import numpy as np
 import trimesh
 from embreex.mesh_construction import TriangleMesh
@@ -24,6 +23,7 @@ from wakewise.files import whole_file
 from wakewise.interfaces import no_progress
 from wakewise.likeness.colour import srgb_decode
 from wakewise.likeness.photo_colours import project
+from wakewise.pictures import read_picture
 from wakewise.reconstruction.views import View, read_views
 
 _SHARPNESS = 4
@@ -132,7 +132,7 @@ def vertex_colours(
     total, weight = np.zeros((len(vertices_m), 3)), np.zeros(len(vertices_m))
     for k, view in enumerate(views):
         progress(k, len(views), view.name)
-        image = cv2.imread(str(photos / view.name), cv2.IMREAD_COLOR)
+        image = read_picture(photos / view.name)
         if image is None:
             continue
         h, w = image.shape[:2]

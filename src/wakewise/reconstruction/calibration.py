@@ -152,7 +152,7 @@ def _read(folder: Path) -> dict[str, NDArray[np.uint8]]:
         raise InputError(f"{folder}: holds no photos; a folder of photos of a ChArUco board is needed")
     out: dict[str, NDArray[np.uint8]] = {}
     for path in files:
-        image = decode(path.read_bytes())
+        image = decode(path.read_bytes(), str(path))
         if image is None:
             raise InputError(f"{path}: is no image that can be read")
         grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)

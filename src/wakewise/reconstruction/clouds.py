@@ -10,7 +10,8 @@ import trimesh
 
 from wakewise.arrays import Array, BoolArray, IntArray, freeze
 from wakewise.errors import InputError
-from wakewise.files import broken_promise, whole_file
+from wakewise.files import whole_file
+from wakewise.sizes import broken_ply
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,8 +59,8 @@ def read_cloud(path: Path) -> Cloud:
     if not path.is_file():
         raise InputError(f"{path}: does not exist; a file of points is needed (.ply)")
     try:
-        broken = broken_promise(path)
-        loaded = trimesh.load(path, process=False)
+        broken = broken_ply(path)
+        loaded = trimesh.load(path, process=False) if broken is None else None
     except (ValueError, KeyError, IndexError, TypeError, NotImplementedError, OSError):
         raise InputError(f"{path}: is no file of points that can be read; a PLY file is one, for example") from None
     if broken is not None:

@@ -16,6 +16,7 @@ import numpy as np
 
 from wakewise.arrays import BoolArray
 from wakewise.errors import InputError
+from wakewise.pictures import read_picture
 from wakewise.reconstruction.photos import PNG, Image, Photo
 from wakewise.reconstruction.stereo import DepthMap, resample
 from wakewise.reconstruction.views import View
@@ -133,12 +134,7 @@ def _read(path: Path) -> BoolArray:
     InputError
         If it is no image.
     """
-    try:
-        image: Image | None = cv2.imdecode(
-            np.frombuffer(path.read_bytes(), dtype=np.uint8), cv2.IMREAD_UNCHANGED | cv2.IMREAD_IGNORE_ORIENTATION
-        )
-    except (OSError, cv2.error):
-        image = None
+    image: Image | None = read_picture(path, cv2.IMREAD_UNCHANGED | cv2.IMREAD_IGNORE_ORIENTATION)
     if image is None:
         raise InputError(f"{path}: is no image that can be read; a mask is one, black where nothing is looked at")
     most = float(np.iinfo(image.dtype).max) if image.dtype.kind == "u" else 1.0

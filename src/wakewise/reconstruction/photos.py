@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from wakewise.errors import EnvironmentFailure, InputError
+from wakewise.pictures import AS_STORED, decode_picture
 from wakewise.reconstruction.exif import exif_words
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ class PhotoStore:
             return kept
         path = self.folder / name
         try:
-            image = decode(path.read_bytes())
+            image = decode(path.read_bytes(), str(path))
         except OSError:
             image = None
         if image is None:
@@ -175,7 +175,7 @@ def _read_photo(folder: Path, path: Path, store: PhotoStore | None) -> Photo:
         )
     if data.startswith(PNG) and not png_is_whole(data):
         raise InputError(f"{path}: is cut short or damaged ({len(data)} bytes of a PNG image); remove or replace it")
-    image = decode(data)
+    image = decode(data, str(path))
     if image is None:
         raise InputError(f"{path}: is no image that can be read ({len(data)} bytes); allowed are {', '.join(SUFFIXES)}")
     kind, suffixes = next((found for start, found in _BEGINNINGS.items() if data.startswith(start)), ("", ()))
@@ -257,40 +257,14 @@ def _end_of_scan(data: bytes, at: int) -> int:
         at += 1 if data[at + 1] == 0xFF else 2
 
 
-class _Quiet:
-    """OpenCV's decoders say nothing of their own while any thread is in here."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._inside = 0
-        self._level = 0
-
-    def __enter__(self) -> None:
-        with self._lock:
-            if self._inside == 0:
-                self._level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-            self._inside += 1
-
-    def __exit__(self, *_: object) -> None:
-        with self._lock:
-            self._inside -= 1
-            if self._inside == 0:
-                cv2.utils.logging.setLogLevel(self._level)
-
-
-_quiet_decoders = _Quiet()
-
-
-def decode(data: bytes) -> Image | None:
+def decode(data: bytes, name: str) -> Image | None:
     """Colours of an encoded image, shape (h, w, 3), blue first as OpenCV has them; None if it is no image.
 
     The camera's orientation tag is ignored, as COLMAP ignores it, so that pixels mean the same to both.
+
+    Raises
+    ------
+    InputError
+        If the image `name` has more pixels than are allowed.
     """
-    if not data:
-        return None
-    flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-    try:
-        with _quiet_decoders:
-            return cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags)
-    except cv2.error:
-        return None
+    return decode_picture(data, name, AS_STORED)

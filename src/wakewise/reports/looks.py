@@ -15,6 +15,7 @@ from wakewise.imaging.sensor import srgb_encode
 from wakewise.likeness.colour import WaterFit, balanced, fit_water, without_water
 from wakewise.likeness.photo_colours import Depths
 from wakewise.likeness.textured import read_textured
+from wakewise.pictures import read_picture
 from wakewise.reports.ink import data_uri
 from wakewise.reports.page import panel
 from wakewise.reports.trial import Photograph, Surface, Trial
@@ -136,5 +137,5 @@ def _embedded(picture: NDArray[np.uint8]) -> str:
 
 
 def _read(path: Path) -> NDArray[np.uint8] | None:
-    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    image = read_picture(path)
     return None if image is None else np.ascontiguousarray(image[..., ::-1])

@@ -7,6 +7,7 @@ from html import escape
 
 import cv2
 
+from wakewise.pictures import read_picture
 from wakewise.reports.ink import data_uri
 from wakewise.reports.page import fold
 from wakewise.reports.trial import Photograph, Trial
@@ -40,7 +41,7 @@ def embed(shot: Photograph, width: int) -> str | None:
     """JPEG data URI of a photograph, at most `width` pixels wide; None if the file is missing or no image."""
     if not shot.path.is_file():
         return None
-    image = cv2.imread(str(shot.path), cv2.IMREAD_COLOR)
+    image = read_picture(shot.path)
     if image is None:
         return None
     if image.shape[1] > width:

@@ -21,6 +21,7 @@ from wakewise.arrays import Array, IntArray
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, quat_multiply
 from wakewise.importers import any_vehicle
+from wakewise.pictures import read_picture
 from wakewise.reports.errors import ModelErrors
 from wakewise.reports.ink import error_colours
 from wakewise.reports.looks import coloured_model
@@ -230,7 +231,7 @@ def _lens(trial: Trial) -> tuple[float, float]:
 
 
 def _thumbnail(shot: Photograph, width: int = 128) -> Array | None:
-    image = cv2.imread(str(shot.path), cv2.IMREAD_COLOR)
+    image = read_picture(shot.path)
     if image is None:
         return None
     height = max(1, round(width * image.shape[0] / image.shape[1]))

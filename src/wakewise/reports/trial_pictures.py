@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from wakewise.arrays import Array
 from wakewise.campaigns.glance import Measure, Place, worst_trials
 from wakewise.campaigns.pictures import MODEL, photographs_of
+from wakewise.pictures import read_picture
 from wakewise.reports.ink import data_uri, error_colours
 from wakewise.reports.page import error_scale, panel
 from wakewise.reports.views import SIDES, Frame, draw_cloud
@@ -98,7 +99,7 @@ def sheet(worst: Mapping[str, Mapping[str, Any]], store: Path) -> bytes | None:
         row[0].set_title(f"{method} \N{EN DASH} {_trial(place)}", loc="left", fontsize=8.5, color="#12252d")
         taken = photographs_of(store / place["folder"])
         for axes, (after_s, path) in zip(row[:2], taken[:: max(1, len(taken) - 1)], strict=False):
-            image = cv2.imread(str(path), cv2.IMREAD_COLOR_RGB)
+            image = read_picture(path, cv2.IMREAD_COLOR_RGB)
             if image is not None:
                 axes.imshow(image)
                 axes.text(4, image.shape[0] - 8, f"{after_s:.1f} s", fontsize=7.5, color="white")

@@ -15,7 +15,8 @@ import numpy as np
 
 from wakewise.arrays import Array, IntArray, freeze, frozen_indices
 from wakewise.errors import InputError
-from wakewise.files import broken_promise, write_bytes
+from wakewise.files import write_bytes
+from wakewise.sizes import broken_ply
 
 READABLE_SUFFIXES = (".ply", ".stl", ".obj", ".off", ".glb")
 PLAUSIBLE_SIZE_M = (0.02, 2.0)
@@ -181,18 +182,21 @@ def _read(path: Path) -> tuple[Array, IntArray]:
     import trimesh
 
     try:
+        broken = broken_ply(path) if path.suffix.lower() == ".ply" else None
+        if broken is not None:
+            raise InputError(f"{path}: was cut short, {broken}")
         with _silence():
             loaded = trimesh.load(path, file_type=path.suffix[1:].lower(), force="mesh", process=False)
             vertices = np.asarray(getattr(loaded, "vertices", np.zeros((0, 3))), dtype=np.float64)
             faces = np.asarray(getattr(loaded, "faces", np.zeros((0, 3))), dtype=np.int64)
+    except InputError:
+        raise
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or 'the file is damaged'})") from error
     except Exception as error:
         # The parsers check little, and raise whatever malformed bytes happen to lead to.
         reason = str(error).strip().splitlines()[0][:120] if str(error).strip() else "the file is damaged"
         raise InputError(f"{path}: not a readable {path.suffix[1:].upper()} mesh ({reason})") from error
-    if path.suffix.lower() == ".ply" and (broken := broken_promise(path)) is not None:
-        raise InputError(f"{path}: was cut short, {broken}")
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
     return vertices, faces

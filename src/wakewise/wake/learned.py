@@ -17,6 +17,7 @@ from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.files import whole_file
 from wakewise.physics import FRESH_WATER_KG_M3
+from wakewise.sizes import check_arrays
 from wakewise.wake.floor import WALL_SPEED, wall_velocity
 from wakewise.wake.network import (
     EDGES,
@@ -193,6 +194,7 @@ def load_network(path: Path = SHIPPED) -> Network:
         If the file is missing or is none.
     """
     try:
+        check_arrays(path)
         with np.load(path) as data:
             layers = sum(name.startswith("w") and name[1:].isdigit() for name in data.files)
             return Network(

@@ -155,7 +155,7 @@ def _read_photo(path: Path, camera: pycolmap.Camera, photo_px: int) -> tuple[Byt
     """Colours, red first, averaged down where the photo is longer than wished; and the scale."""
     if not path.is_file():
         raise InputError(f"{path}: does not exist; --photos must name the folder that the model was made from")
-    image = decode(path.read_bytes())
+    image = decode(path.read_bytes(), str(path))
     if image is None:
         raise InputError(f"{path}: is no image that can be read")
     height, width = image.shape[:2]

@@ -14,6 +14,7 @@ import viser
 from wakewise.arrays import Array
 from wakewise.geometry import quat_from_matrix
 from wakewise.likeness.textured import read_textured
+from wakewise.pictures import read_picture
 from wakewise.reconstruction import read_cloud
 from wakewise.reconstruction.photo_facts import ModelFacts, PhotoFact
 from wakewise.reports.scene3d import CAMERA_RGB, MAX_POINTS, lightened, unheard
@@ -114,7 +115,7 @@ def _cameras(server: viser.ViserServer, photos: Path, placed: list[PhotoFact], s
 
 
 def _thumb(path: Path) -> Array | None:
-    image = cv2.imread(str(path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    image = read_picture(path, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     if image is None:
         return None
     height = max(1, round(_THUMB_PX * image.shape[0] / image.shape[1]))

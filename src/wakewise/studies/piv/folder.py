@@ -12,6 +12,7 @@ from pydantic import Field, ValidationError
 from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.extras import need
+from wakewise.pictures import read_picture
 from wakewise.settings import Settings, describe_faults
 from wakewise.studies.piv.images import Picture
 from wakewise.studies.piv.processing import Engine, displacements
@@ -61,7 +62,7 @@ def _read(path: Path) -> Picture:
     need("reading pictures of a jet", "piv", only=("cv2",))
     import cv2
 
-    picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    picture = read_picture(path, cv2.IMREAD_GRAYSCALE)
     if picture is None:
         raise InputError(f"{path}: not a picture that can be read")
     return np.asarray(picture, dtype=np.uint8)
