@@ -24,6 +24,7 @@ def read_points(path: Path, vehicle: Vehicle, X_WB: Pose) -> tuple[Array, Array]
     import numpy as np
 
     from wakewise.errors import InputError
+    from wakewise.separators import other_separator
 
     columns = ("x_m", "y_m", "z_m", "weight")
     try:
@@ -32,7 +33,8 @@ def read_points(path: Path, vehicle: Vehicle, X_WB: Pose) -> tuple[Array, Array]
         raise InputError(f"--points {path}: cannot be read as CSV, {fault}") from None
     head = [name.strip() for name in rows[0]] if rows else []
     if sorted(head) != sorted(columns):
-        raise InputError(f"--points {path}: columns {', '.join(head) or 'none'}, allowed: {', '.join(columns)}")
+        how = other_separator(head)
+        raise InputError(f"--points {path}: columns {', '.join(head) or 'none'}, allowed: {', '.join(columns)}{how}")
     values = []
     for line, row in enumerate(rows[1:], start=2):
         if not any(cell.strip() for cell in row):

@@ -17,6 +17,7 @@ from wakewise.geometry import matrix_from_quat
 from wakewise.reconstruction.colmap_files import read_colmap
 from wakewise.reconstruction.lenses import Lens
 from wakewise.reconstruction.photos import Photo
+from wakewise.separators import other_separator
 
 LEAST_CAMERAS = 2
 MOST_SKEW = 1e-3
@@ -201,8 +202,8 @@ def _read_table(path: Path) -> KnownCameras:
             missing = [column for column in _POSE if column not in columns]
             if missing:
                 raise InputError(
-                    f"{path}: has no column {', '.join(missing)}; needed is {_KINDS}; places alone are for "
-                    "--reference-cameras"
+                    f"{path}: has no column {', '.join(missing)}{other_separator(columns)}; needed is {_KINDS}; "
+                    "places alone are for --reference-cameras"
                 )
             some = [column for column in _LENS if column in columns]
             if some and len(some) < len(_LENS):

@@ -10,6 +10,7 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
+from wakewise.separators import other_separator
 
 
 def read_reference_cameras(path: Path) -> dict[str, Array]:
@@ -59,7 +60,8 @@ def _read_csv(path: Path) -> dict[str, Array]:
             reader = csv.DictReader(file)
             missing = [column for column in wanted if column not in (reader.fieldnames or ())]
             if missing:
-                raise InputError(f"{path}: has no column {', '.join(missing)}; needed are {', '.join(wanted)}")
+                how = other_separator(reader.fieldnames)
+                raise InputError(f"{path}: has no column {', '.join(missing)}; needed are {', '.join(wanted)}{how}")
             for row in reader:
                 if row["name"] in out:
                     raise InputError(f"{path}: line {reader.line_num}: {row['name']} is there twice")

@@ -12,6 +12,7 @@ import numpy as np
 
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
+from wakewise.separators import other_separator
 from wakewise.vehicles import Vehicle
 
 _NUMBERED = re.compile(r"(?:thrust|thruster|t)?[_ ]?(\d+)", re.IGNORECASE)
@@ -72,8 +73,8 @@ def read_table(path: Path, what: str) -> tuple[list[str], Array]:
         raise InputError(f"{path}: cannot be read as text, {what} is needed") from None
     if not rows:
         raise InputError(f"{path}: empty, {what} is needed")
-    if len(rows[0]) == 1 and ";" in rows[0][0]:
-        raise InputError(f"{path}: columns are parted by semicolons, commas are needed")
+    if how := other_separator(rows[0]):
+        raise InputError(f"{path}: {what} is needed{how}")
     header = [name.strip() for name in rows[0]]
     if len(set(header)) < len(header):
         raise InputError(f"{path}: a column is named twice in {', '.join(header)}")

@@ -12,6 +12,7 @@ from scipy.spatial import KDTree
 
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
+from wakewise.separators import other_separator
 from wakewise.targets.mesh import Mesh, read_mesh
 
 COLUMNS = ("x_m", "y_m", "z_m", "radius_m", "weight")
@@ -63,8 +64,8 @@ def read_marks(path: Path | str) -> Marks:
     Raises
     ------
     InputError
-        If the file is missing or empty, a column is missing or unknown, or a value is no number, not finite or out of range; the
-        message names the line.
+        If the file is missing or empty, a column is missing or unknown, or a value is no number, not finite or out of
+        range; the message names the line.
     """
     path = Path(path)
     try:
@@ -80,7 +81,8 @@ def read_marks(path: Path | str) -> Marks:
     header = [name.strip() for name in rows[0]] if rows else []
     missing = [name for name in COLUMNS[:4] if name not in header]
     if missing:
-        raise InputError(f"{path}: no column {', '.join(missing)}, the columns are {', '.join(COLUMNS)}")
+        how = other_separator(header)
+        raise InputError(f"{path}: no column {', '.join(missing)}, the columns are {', '.join(COLUMNS)}{how}")
     if unknown := [name for name in header if name not in COLUMNS]:
         raise InputError(f"{path}: unknown column '{unknown[0]}', the columns are {', '.join(COLUMNS)}")
     place = {name: header.index(name) for name in COLUMNS if name in header}

@@ -10,6 +10,7 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.errors import InputError
+from wakewise.separators import other_separator
 
 COLUMNS = ("time_s", "command", "thrust_N")
 LARGEST_FILE_BYTES = 200_000_000
@@ -34,7 +35,8 @@ def read_step(path: Path | str) -> tuple[Array, Array, Array]:
             reader = csv.DictReader(file)
             missing = [name for name in COLUMNS if name not in (reader.fieldnames or ())]
             if missing:
-                raise InputError(f"step {path}: no column {', '.join(missing)}, needs {', '.join(COLUMNS)}")
+                how = other_separator(reader.fieldnames)
+                raise InputError(f"step {path}: no column {', '.join(missing)}, needs {', '.join(COLUMNS)}{how}")
             for row in reader:
                 try:
                     values = [float(row[name]) for name in COLUMNS]

@@ -14,6 +14,7 @@ from scipy.optimize import isotonic_regression
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
 from wakewise.physics import GRAVITY_M_S2
+from wakewise.separators import other_separator
 from wakewise.thrusters.thrust_curve import NEUTRAL_US, CurveSide, ThrustCurve
 
 KGF_N = GRAVITY_M_S2
@@ -205,7 +206,8 @@ def _columns(header: list[str]) -> list[str]:
     unknown = [name for name in names if name not in COLUMNS]
     if unknown:
         allowed = ", ".join(sorted(set(COLUMNS.values())))
-        raise InputError(f"unknown column {', '.join(map(repr, unknown[:3]))}, allowed {allowed}")
+        how = other_separator(header)
+        raise InputError(f"unknown column {', '.join(map(repr, unknown[:3]))}, allowed {allowed}{how}")
     columns = [COLUMNS[name] for name in names]
     twice = sorted({column for column in columns if columns.count(column) > 1})
     if twice:

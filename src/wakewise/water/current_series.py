@@ -13,6 +13,7 @@ import numpy as np
 
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
+from wakewise.separators import other_separator
 
 FASTEST_M_S = 3.0
 """Above this a column is taken to be in another unit: few tidal streams, and no tank, run faster."""
@@ -123,7 +124,8 @@ def _read_csv(path: Path) -> tuple[Array, Array]:
             picked = [header.index(name) for name in ("time_s", *names) if name in header]
             break
     else:
-        raise InputError(f"{path}: columns {', '.join(header) or 'none'}, needed are time_s,u,v[,w] in s and m/s")
+        how = other_separator(header)
+        raise InputError(f"{path}: columns {', '.join(header) or 'none'}, needed are time_s,u,v[,w] in s and m/s{how}")
     table = np.zeros((len(rows) - 1, 4))
     for k, row in enumerate(rows[1:]):
         for column, at in enumerate(picked):

@@ -21,6 +21,7 @@ from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError
 from wakewise.reconstruction.exif import UNREADABLE
 from wakewise.reconstruction.photos import photo_files
+from wakewise.separators import other_separator
 
 GPS_SIGMA_M, GPS_HEIGHT_SIGMA_M = 8.0 / 2.448, 13.0 / 1.96
 """Of each of two horizontal axes, and of the height: 8 m and 13 m at 95 %, in the mean over the globe (GPS Standard
@@ -113,7 +114,7 @@ def read_fixes(path: Path) -> Fixes:
             unknown = [name for name in given if name not in ("name", *_NUMBERS)]
             if "name" not in given or "depth_m" not in given or unknown:
                 wrong = f"has a column {unknown[0]}" if unknown else "needs at least the columns name and depth_m"
-                raise InputError(f"{path}: {wrong}; allowed are {columns}")
+                raise InputError(f"{path}: {wrong}; allowed are {columns}{other_separator(given)}")
             for row in reader:
                 name = (row["name"] or "").strip()
                 if not name:
