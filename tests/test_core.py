@@ -204,6 +204,34 @@ assert len(lines) == 6, lines
     assert found.returncode == 0, found.stderr
 
 
+@pytest.mark.parametrize(
+    ("call", "extras"),
+    [
+        ("ww.trial(scenario, 'runs/x')", "photos,reports,logs"),
+        ("ww.compare({'a': scenario, 'b': scenario}, 'runs/x')", "photos,reports,logs"),
+        ("ww.reconstruct('.', 'runs/x')", "photos"),
+        ("ww.evaluate('cloud.ply', 'mesh.ply')", "photos"),
+    ],
+)
+def test_a_function_names_all_that_is_missing_before_it_begins(call, extras, tmp_path):
+    """One line with every extra, not one after the other; nothing is written."""
+    found = without_extras(
+        f"""
+import wakewise as ww
+scenario = ww.Scenario.preset("quick")
+try:
+    {call}
+except ww.errors.MissingExtra as refusal:
+    print(refusal)
+""",
+        tmp_path,
+    )
+    assert found.returncode == 0, found.stderr
+    assert found.stdout.startswith(f"{call.partition('(')[0]} needs ")
+    assert how_to_install(extras) in found.stdout
+    assert not (tmp_path / "runs").exists()
+
+
 HEAVY = ("numpy", "scipy", "numba", "polars", "pydantic", "yaml", "rich", "matplotlib", "cv2", "trimesh")
 
 
@@ -212,6 +240,10 @@ HEAVY = ("numpy", "scipy", "numba", "polars", "pydantic", "yaml", "rich", "matpl
     [
         ("import wakewise", HEAVY),
         ("from wakewise.cli.main import run\nassert run(['--help']) == 0", HEAVY),
+        (
+            "import wakewise.campaigns.worker, wakewise.campaigns.flights",
+            ("cv2", "embreex", "pycolmap", "small_gicp", "PIL", "matplotlib", "trimesh"),
+        ),
         (
             "from wakewise.operation import load_scenario\nload_scenario('quick', None, {})",
             ("polars", "rich", "cv2", "embreex", "pycolmap", "trimesh", "networkx", "skimage", "scipy.stats", "osqp"),

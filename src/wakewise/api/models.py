@@ -11,6 +11,7 @@ from wakewise.arrays import frozen
 from wakewise.checks import finite_number, instance_of
 from wakewise.control import MAKERS
 from wakewise.errors import InputError
+from wakewise.extras import need
 from wakewise.plugins import names
 from wakewise.targets import find_target, is_mesh_file
 
@@ -61,6 +62,7 @@ def reconstruct(
     >>> import wakewise as ww
     >>> ww.reconstruct("photos", "runs/photos").summary()["registered_images"]  # doctest: +SKIP
     """
+    need("ww.reconstruct", "photos")
     from wakewise.reconstruction import read_lens, read_reference_cameras
     from wakewise.reconstruction import reconstruct as build
 
@@ -112,6 +114,7 @@ def evaluate(
     >>> bool(score.rmse_mm < 0.01)
     True
     """
+    need("ww.evaluate", "photos", only=("embreex", "small_gicp"))
     from wakewise.evaluation import Crop, evaluate_surface
     from wakewise.reconstruction import read_cloud
     from wakewise.targets import Mesh, read_mesh

@@ -9,11 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 from wakewise.checks import quoted
 from wakewise.errors import InputError
+from wakewise.extras import need
 from wakewise.files import named
 
 if TYPE_CHECKING:
     from wakewise.operation import Parts, Scenario
     from wakewise.trials import Watch
+
+
+_EXTRAS = ("photos", "reports", "logs")
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,8 @@ def trial(
         If the parts do not fit each other, or the folder holds another trial.
     StageError
         If a stage cannot finish.
+    MissingExtra
+        Without the extras `photos`, `reports` and `logs`; all that is missing is named before anything is made.
 
     Examples
     --------
@@ -60,6 +66,7 @@ def trial(
     >>> scenario = ww.Scenario.preset("quick", **{"mission.views": [8, 6, 4]})
     >>> ww.trial(scenario, "runs/few")  # doctest: +SKIP
     """
+    need("ww.trial", *_EXTRAS)
     from wakewise.reports import Draft, begin_report, write_report
     from wakewise.trials import Quiet, run_trial
     from wakewise.trials.reporting import report_attempt
@@ -86,7 +93,7 @@ def compare(flights: Mapping[str, Parts | Scenario], folder: str | Path, watch: 
 
     Raises
     ------
-    InputError, StageError
+    InputError, StageError, MissingExtra
         As `trial`.
 
     Examples
@@ -96,6 +103,7 @@ def compare(flights: Mapping[str, Parts | Scenario], folder: str | Path, watch: 
     >>> flights = {"dp": parts.replace(method="dp"), "ours": parts}
     >>> ww.compare(flights, "runs/both").figures["ratios"]["ours"]  # doctest: +SKIP
     """
+    need("ww.compare", *_EXTRAS)
     from wakewise.reports import Draft, begin_report, write_comparison, write_report
     from wakewise.trials import Quiet, compare_methods
     from wakewise.trials.reporting import report_attempt
