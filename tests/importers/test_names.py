@@ -110,6 +110,25 @@ def test_words_that_only_look_like_sides_say_nothing() -> None:
     assert contradictions(["T1", "T2"], PLACES[:2], AXES[:2]) == []
 
 
+@pytest.mark.parametrize("up", [1.0, -1.0])
+def test_buoyancy_above_weight_tells_up(tmp_path: Path, up: float) -> None:
+    """Where no key and no name does; a difference below a millimetre tells nothing."""
+    draft = imported(tmp_path, listed(PLAIN, before=f"cog: [0, 0, 0]\ncob: [0, 0, {0.02 * up}]\n"))
+    assert draft.notes[0].startswith("frame: FLU" if up > 0 else "frame: FRD") and not doubts(draft)
+    assert doubts(imported(tmp_path, listed(PLAIN, before="cog: [0, 0, 0]\ncob: [0, 0, 0.0001]\n")))
+
+
+def test_a_comment_far_from_the_thrusters_says_nothing_of_them(tmp_path: Path) -> None:
+    text = listed(PLAIN) + "\n" * 60 + "filter: 3  # accelerations in ENU\n"
+    assert any("is a guess" in note for note in doubts(imported(tmp_path, text)))
+
+
+def test_bow_and_stern_speak_of_one_another(tmp_path: Path) -> None:
+    """An origin at the nose puts all thrusters at x < 0; that turns no names round."""
+    names = ["bow_left", "bow_right", "stern_left", "stern_right"]
+    assert not doubts(imported(tmp_path, listed(names, PLACES - [1.5, 0, 0])))
+
+
 # A guess by names of links
 
 LINK = """<link name="{name}"/><joint name="{name}_joint" type="fixed"><parent link="base_link"/><child link="{name}"/>

@@ -171,3 +171,16 @@ def test_a_scenario_of_macros_that_nobody_calls_says_so(tmp_path: Path) -> None:
     )
     with pytest.raises(InputError, match=r"holds no robot \(it defines the macros sub and calls none"):
         import_vehicle(path)
+
+
+@pytest.mark.parametrize("kind", ["revolute", "fixed"])
+def test_a_thruster_that_a_servo_turns_is_questioned(tmp_path: Path, kind: str) -> None:
+    """Its direction is that of the joint at zero."""
+    links = (
+        f'{HULL}<link name="duct" type="box"><mass value="0.1"/></link><joint name="j" type="{kind}">'
+        '<parent name="Hull"/><child name="duct"/><origin xyz="-0.5 0 0" rpy="0 0 0"/></joint>'
+    )
+    draft = robot(tmp_path, actuator("quadratic", True, False).replace('link name="Hull"', 'link name="duct"'), links)
+    np.testing.assert_allclose(draft.thrusters[0].p_BT_m, [-0.5, 0.2, 0])
+    questioned = any(n.startswith("QUESTIONED: thrusters on joints that move") for n in draft.notes)
+    assert questioned == (kind == "revolute")

@@ -117,3 +117,17 @@ def test_a_plugin_of_an_unknown_form_is_named_and_not_denied(
 def test_without_any_plugin_that_is_said(tmp_path: Path) -> None:
     notes = imported(tmp_path, BASE.replace("<gazebo><plugin PLUGIN</plugin></gazebo>", "")).notes
     assert any(n.startswith("no thruster plugin in the file: links were taken for thrusters") for n in notes)
+
+
+@pytest.mark.parametrize("kind", ["revolute", "fixed"])
+def test_a_thruster_that_a_servo_turns_is_questioned(tmp_path: Path, kind: str) -> None:
+    """A joint above the propeller's own that moves."""
+    plugin = 'name="t" filename="gz-sim-thruster-system"><joint_name>prop_joint</joint_name>'
+    servo = (
+        f'<link name="prop"/><joint name="prop_joint" type="continuous"><parent link="mount"/><child link="prop"/>'
+        f'<axis xyz="1 0 0"/></joint><link name="mount"/><joint name="pan" type="{kind}"><parent link="base_link"/>'
+        f'<child link="mount"/></joint><gazebo>'
+    )
+    draft = imported(tmp_path, BASE.replace("PLUGIN", plugin).replace("<gazebo>", servo))
+    questioned = any(n.startswith("QUESTIONED: thrusters on joints that move") for n in draft.notes)
+    assert len(draft.thrusters) == 1 and questioned == (kind == "revolute")

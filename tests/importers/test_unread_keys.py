@@ -94,3 +94,11 @@ def test_motors_with_places_are_thrusters_too(tmp_path: Path) -> None:
 def test_toml_is_refused_by_its_name(tmp_path: Path, name: str, kind: str, text: str) -> None:
     with pytest.raises(InputError, match=rf"is {kind}, which is not read; vehicles are read from URDF, xacro, SDF"):
         imported(tmp_path, text, name)
+
+
+def test_a_mass_in_kilograms_is_read_and_one_of_zero_is_not_stated(tmp_path: Path) -> None:
+    text = FRAME + thrusters("") + "physical: {mass_kg: MASS, displacement_m3: 0.012}\n"
+    whole = imported(tmp_path, text.replace("MASS", "12.5"))
+    assert (whole.mass_kg, whole.displaced_volume_m3) == (12.5, 0.012) and not unread(whole)
+    zero = imported(tmp_path, text.replace("MASS", "0.0"))
+    assert zero.mass_kg is None and "mass" in zero.missing

@@ -9,8 +9,8 @@ path, by format). Readers: `urdf.py`, `sdf.py`, `stonefish.py` with `stonefish_t
 `wakewise.vehicle_formats`. Their helpers: `layouts.py` and `thruster_lists.py` (thrusters in lists, with `angles.py`),
 `wrench_rows.py` (what the rows of a matrix are), `names.py` (what thrusters' names say) and `plausible.py` (what any
 vehicle must fulfil), `xacro*.py`, `expressions.py` and `scopes.py` expand macros, `xml.py` and `packages.py` find
-files, `bodies.py`, `plugins.py`, `water.py`, `outline.py` and `found.py` put a vehicle together, `stated_matrix.py`
-reads the matrix that a file states, to be held against its geometry.
+files, `bodies.py`, `plugins.py` with `thruster_forms.py`, `water.py`, `outline.py` and `found.py` put a vehicle
+together, `stated_matrix.py` reads the matrix that a file states, to be held against its geometry.
 """
 
 from wakewise.importers.find import any_vehicle, compare_with, find_vehicle

@@ -186,7 +186,7 @@ def read_mass(bodies: Bodies, found: Found) -> None:
     weighed = [link for link in bodies.links.values() if link.mass_kg is not None]
     if not weighed:
         return
-    moving = _moving_parts(bodies)
+    moving = moving_parts(bodies)
     if all(link.name in moving or PART_NAME.search(link.name) for link in weighed):
         names = ", ".join(link.name for link in weighed[:4])
         found.notes.append(f"mass: only links of parts or that move state one ({names}), so it is not taken")
@@ -226,7 +226,7 @@ def read_mass(bodies: Bodies, found: Found) -> None:
     )
 
 
-def _moving_parts(bodies: Bodies) -> set[str]:
+def moving_parts(bodies: Bodies) -> set[str]:
     """Links beyond a joint that moves, thrusters' own apart: an arm, not the hull."""
     edges: dict[str, list[tuple[str, bool]]] = {}
     for joint in bodies.joints.values():

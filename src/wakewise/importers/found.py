@@ -78,6 +78,7 @@ class Found:
     thrusters: list[FoundThruster] = field(default_factory=list)
     matrix: Array | None = None
     matrix_name: str = ""
+    matrix_line: int | None = None
     raw_matrix: Array | None = None
     claims: list[tuple[int, str, Place, bool]] = field(default_factory=list)
     X_BC: Pose | None = None

@@ -83,7 +83,10 @@ def read_matrix_only(root: Item, found: Found, rows: Order | None = None) -> Non
     found.frame, found.frame_why = _frame(root, entries, found, geometry=False)
 
 
-_TURNING = re.compile(r"flip|revers|invert|(^|_)sign|polarity|spin", re.IGNORECASE)
+_TURNING = re.compile(r"flip|revers|invert|(^|_)sign|polarity|spin|^directions?$", re.IGNORECASE)
+_LIFT_M = 1e-3
+_NEAR_LINES = 40
+"""How far from the thrusters or the matrix a comment may stand that speaks of their frame."""
 
 
 def _holds_figures(item: Item) -> bool:
@@ -129,9 +132,11 @@ def _frame(root: Item, entries: Entries, found: Found, *, geometry: bool) -> tup
                     item.seen = True
                     said = f"detected: {path[-1]} is {item.value} ({item.place.file.name}:{item.place.line})"
                     return ("FRD", said) if frame == "FRD" else ("FLU", said)
+    here = found.thrusters[0].place.line if found.thrusters else found.matrix_line
     spoken = {
         frame: place
         for text, place in root.comments
+        if here is None or abs(place.line - here) <= _NEAR_LINES
         for pattern, frame in ((_DOWN_WORDS, "FRD"), (_UP_WORDS, "FLU"))
         if pattern.search(text)
     }
@@ -140,6 +145,13 @@ def _frame(root: Item, entries: Entries, found: Found, *, geometry: bool) -> tup
         if spoken and votes.frame not in spoken:
             found.notes.append(f"{QUESTION}a comment speaks of {next(iter(spoken))}, the names of the thrusters do not")
         return ("FLU" if votes.frame == "FLU" else "FRD"), f"inferred: {votes.words}"
+    if found.p_G_m is not None and found.p_buoyancy_m is not None:
+        lift_m = float(found.p_buoyancy_m[2] - found.p_G_m[2])
+        if abs(lift_m) > _LIFT_M:
+            why = (
+                "inferred: so the centre of buoyancy is above the centre of gravity, as a vehicle needs; no key says so"
+            )
+            return ("FLU", why) if lift_m > 0.0 else ("FRD", why)
     if len(spoken) == 1:
         frame, place = next(iter(spoken.items()))
         why = f"inferred: a comment says so, no key does ({place.file.name}:{place.line})"
@@ -175,7 +187,7 @@ def _matrix(root: Item, entries: Entries, found: Found, rows: Order | None, *, f
         require_count(n, f"{item.place}: {key}: ")
         order = rows or order or _stated_order(root, path, item, entries)
         found.matrix, stated = settle(raw, order, key, item.place if flown else None, found.notes)
-        found.matrix_name, found.raw_matrix = key, None if stated else raw
+        found.matrix_name, found.matrix_line, found.raw_matrix = key, item.place.line, None if stated else raw
         if order is not None and order.throttle:
             found.frame, found.frame_why = "FRD", f"detected: {key} is of throttle, up, and lateral, to the right"
         found.notes.append(f"allocation matrix: {key}, 6 x {n} ({item.place.file.name}:{item.place.line})")

@@ -64,7 +64,9 @@ def vote(names: Sequence[str], places: Array, axes: Array) -> Votes:
     votes = Votes()
     letters = {letter for name in names for letter in _letters(name)}
     meanings = [_meaning(name, letters) for name in names]
-    for name, meaning, place in zip(names, meanings, places, strict=True):
+    # Bow and stern speak of one another: bodies with their origin at the nose are about.
+    middle = np.array([float(places[:, 0].mean()), 0.0, 0.0])
+    for name, meaning, place in zip(names, meanings, places - middle, strict=True):
         for pair, axis, for_, against in (("port", 1, "left", "right"), ("ahead", 0, "front", "back")):
             if abs(place[axis]) > _NEAR_M and (for_ in meaning) != (against in meaning):
                 getattr(votes, pair)[0 if (place[axis] > 0.0) == (for_ in meaning) else 1].append(name)
@@ -83,12 +85,12 @@ def vote(names: Sequence[str], places: Array, axes: Array) -> Votes:
 def contradictions(names: Sequence[str], places: Array, axes: Array) -> list[str]:
     """Where names contradict places, shape (n, 3), and axes, shape (n, 3), in x forward, y right, z down."""
     votes, said = vote(names, places, axes), []
-    for (for_, against), wrong, words in (
+    for (_, against), wrong, words in (
         (votes.port[::-1], "y", "port and starboard lie on the other sides"),
         (votes.ahead, "x", "bow and stern lie at the other ends"),
         (votes.up[::-1], "z", "up and down are the other way"),
     ):
-        if len(against) > len(for_):
+        if against:
             said.append(f"by the names {_some(against)} {words} (along {wrong})")
     return said
 

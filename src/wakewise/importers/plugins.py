@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-import math
 import re
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.importers.bodies import THRUSTER_NAME, Bodies, Joint
+from wakewise.importers.bodies import THRUSTER_NAME, Bodies, Joint, moving_parts
 from wakewise.importers.found import QUESTION, Found, FoundThruster
-from wakewise.importers.urdf import origin
-from wakewise.importers.xml import Element, PlacedError, number, numbers
+from wakewise.importers.thruster_forms import number_in, on_joint, plugin_thrusters, short, where_on, words
+from wakewise.importers.xml import Element, PlacedError, numbers
 
-GZ_RULE = "positive thrust pushes along the joint axis, whatever the sign of thrust_coefficient (gz-sim's Thruster)"
-UUV_RULE = "positive thrust pushes along the joint axis, +x of the thruster where none is given (UUV Simulator)"
 NAME_RULE = "inferred from names: positive thrust pushes along the axis of each joint that is called a thruster"
-
-HIPPO_RULE = (
-    "positive thrust pushes along +x of the thruster's link, turned round by a clockwise propeller (HippoCampus)"
-)
-ORCA_RULE = "positive thrust pushes along +z of each thruster's origin, turned round by a negative pos_force (orca2)"
 
 _DRIVES = re.compile(r"thrust|propel|propuls|rotor|motor", re.IGNORECASE)
 _READ = frozenset(
@@ -35,11 +26,6 @@ _READ = frozenset(
 _PROPELLER = re.compile(r"prop|rotor|blade", re.IGNORECASE)
 _NUMBERED = re.compile(r"\d+")
 _HAND_M = 0.15
-
-
-def words(plugin: Element) -> str:
-    """What a plugin calls itself, in lower case."""
-    return (plugin.attributes.get("filename", "") + " " + plugin.attributes.get("name", "")).lower()
 
 
 def read_thrusters(bodies: Bodies, found: Found) -> None:
@@ -57,7 +43,7 @@ def read_thrusters(bodies: Bodies, found: Found) -> None:
     for plugin in bodies.plugins:
         if not _drives(plugin):
             continue
-        read = _plugin_thrusters(plugin, bodies, found)
+        read = plugin_thrusters(plugin, bodies, found)
         (unknown if read is None else known).append(plugin)
         for thruster, rule, identity in read or ():
             found.thrusters.append(thruster)
@@ -76,6 +62,9 @@ def read_thrusters(bodies: Bodies, found: Found) -> None:
         found.thrust_rule = "; ".join(dict.fromkeys(rules))
         found.derived["thruster_layout"] = f"{found.kind} {found.file.name}: thruster plugins and their joints"
         _question_undriven(bodies, found)
+        turning = {short(name) for name in moving_parts(bodies)}
+        carried = {short(joint.child): short(joint.parent) for joint in bodies.joints.values()}
+        question_steered([t.name for t in found.thrusters if carried.get(t.name) in turning], found)
     elif not _freefloating(bodies, found):
         _by_name(bodies, unknown, found)
     tags = dict.fromkeys(child.tag for plugin in known for child in plugin.children if child.tag not in _READ)
@@ -95,64 +84,6 @@ def _title(plugin: Element) -> str:
     return (plugin.attributes.get("name") or plugin.attributes.get("filename") or "without a name")[:80]
 
 
-def _plugin_thrusters(plugin: Element, bodies: Bodies, found: Found) -> list[tuple[FoundThruster, str, float]] | None:
-    """Thrusters of one plugin with its rule and their order; None if its form is not known."""
-    if "thruster" in words(plugin):
-        if plugin.first("joint_name") is not None:
-            return [(_gz(plugin, bodies), GZ_RULE, math.inf)]
-        if plugin.first("linkName") is not None or plugin.first("jointName") is not None:
-            identity = plugin.value("thrusterID")
-            place = number(identity, plugin.place, "thrusterID") if identity else math.inf
-            return [(_uuv(plugin, bodies), UUV_RULE, place)]
-        if plugin.first("link") is not None and plugin.first("propeller_direction") is not None:
-            return [(_hippo(plugin, bodies), HIPPO_RULE, math.inf)]
-    inner = plugin.all("thruster")
-    if inner and all(t.first("origin") is not None and t.first("map") is None for t in inner):
-        return [(t, ORCA_RULE, math.inf) for t in _orca(plugin, bodies, found)]
-    return None
-
-
-def _hippo(plugin: Element, bodies: Bodies) -> FoundThruster:
-    name = plugin.value("link") or ""
-    link = bodies.link(name)
-    if link is None:
-        raise PlacedError(f"{plugin.place}: thruster plugin: link {name} is not in the file")
-    sign = -1.0 if (plugin.value("propeller_direction") or "").lower() == "cw" else 1.0
-    # The force acts at the link's centre of mass (gz-sim's AddWorldForce).
-    p_m = link.X_BL.apply(link.p_LG_m)
-    return FoundThruster(short(link.name), p_m, sign * link.X_BL.R[:, 0], plugin.place, link.X_BL.R)
-
-
-def _orca(plugin: Element, bodies: Bodies, found: Found) -> list[FoundThruster]:
-    """Thrusters that stand in the plugin itself, each an origin in one link with its forces at full command."""
-    name = plugin.value("link_name") or bodies.base
-    link = bodies.link(name)
-    if link is None:
-        raise PlacedError(f"{plugin.place}: thruster plugin: link {name} is not in the file")
-    thrusters: list[FoundThruster] = []
-    for i, element in enumerate(plugin.all("thruster")):
-        X_BT = link.X_BL @ origin(element.first("origin"))
-        ahead, astern = _number(element, "pos_force"), _number(element, "neg_force")
-        ahead, astern = 50.0 if ahead is None else ahead, 40.0 if astern is None else astern
-        label = element.attributes.get("name") or f"thruster{i}"
-        if ahead * astern <= 0.0:
-            raise PlacedError(
-                f"{element.place}: thruster {label}: pos_force {ahead:g} and neg_force {astern:g} must be of one sign, "
-                f"or it pushes one way only"
-            )
-        sign = math.copysign(1.0, ahead)
-        thruster = FoundThruster(label, X_BT.p_m, sign * X_BT.R[:, 2], element.place, X_BT.R)
-        thruster.max_forward_N, thruster.max_reverse_N = abs(ahead), abs(astern)
-        thrusters.append(thruster)
-    if np.any(np.abs(link.p_LG_m) > 1e-9):
-        found.notes.append(
-            f"{QUESTION}places of thrusters are from the origin of link {short(link.name)}, as the plugin's text says; "
-            f"Gazebo counts them from its centre of mass, {np.round(link.p_LG_m, 4).tolist()} m away"
-        )
-    found.derived["thruster_limits"] = f"{found.kind} {found.file.name}: pos_force and neg_force of the plugin"
-    return thrusters
-
-
 def _question_undriven(bodies: Bodies, found: Found) -> None:
     """Say which turning joints are called thrusters and are driven by no plugin."""
     driven = [t.p_m for t in found.thrusters]
@@ -161,12 +92,21 @@ def _question_undriven(bodies: Bodies, found: Found) -> None:
         for j in bodies.joints.values()
         if j.kind in {"continuous", "revolute"}
         and THRUSTER_NAME.search(short(j.child) + " " + short(j.name))
-        and not any(float(np.linalg.norm(_where(j, bodies) - p)) < _HAND_M for p in driven)
+        and not any(float(np.linalg.norm(where_on(j, bodies) - p)) < _HAND_M for p in driven)
     ]
     if idle:
         found.notes.append(
             f"{QUESTION}{len(found.thrusters)} thrusters have a plugin, but {len(idle)} further joints are called "
             f"thrusters: {', '.join(short(name) for name in idle[:12])}"
+        )
+
+
+def question_steered(names: list[str], found: Found) -> None:
+    """Say which thrusters sit beyond a joint that moves: they are read as they point with the joint at zero."""
+    if names:
+        found.notes.append(
+            f"{QUESTION}thrusters on joints that move, as servos turn them: {', '.join(names[:12])}; "
+            f"they are held where the joints are at zero"
         )
 
 
@@ -185,106 +125,13 @@ def _drop_repeats(found: Found, order: list[float]) -> None:
         )
 
 
-def _checked_axis(axis: Array, where: str) -> Array:
-    length = float(np.linalg.norm(axis))
-    if length < 1e-6:
-        raise PlacedError(f"{where}: axis {axis.tolist()} has length {length:g}, it must not be zero")
-    return axis / length
-
-
-def _gz(plugin: Element, bodies: Bodies) -> FoundThruster:
-    name = plugin.value("joint_name") or ""
-    joint = bodies.joint(name)
-    if joint is None or joint.axis is None:
-        what = "is not in the file" if joint is None else "has no axis"
-        raise PlacedError(f"{plugin.place}: thruster plugin: joint {name} {what}")
-    thruster = _on_joint(joint, bodies)
-    diameter = _number(plugin, "propeller_diameter")
-    if diameter is not None:
-        thruster.disk_area_m2 = 0.25 * math.pi * diameter**2
-    if (plugin.value("use_angvel_cmd") or "false").lower() not in {"true", "1"}:
-        high, low = _number(plugin, "max_thrust_cmd"), _number(plugin, "min_thrust_cmd")
-        thruster.max_forward_N = high if high is not None and high >= 0.0 else None
-        thruster.max_reverse_N = -low if low is not None and low <= 0.0 else None
-    return thruster
-
-
-def _where(joint: Joint, bodies: Bodies) -> Array:
-    """Where a thruster on a joint pushes: at the origin of the link that turns, wherever the joint itself is placed."""
-    link = bodies.link(joint.child)
-    return joint.X_BJ.p_m if link is None else link.X_BL.p_m
-
-
-def _on_joint(joint: Joint, bodies: Bodies) -> FoundThruster:
-    axis = joint.axis if joint.axis is not None else joint.X_BJ.R[:, 0]
-    where = f"{joint.place}: joint {joint.name}"
-    name = short(joint.child)
-    return FoundThruster(name, _where(joint, bodies), _checked_axis(axis, where), joint.place, joint.X_BJ.R)
-
-
-def short(name: str) -> str:
-    """A link's name without namespaces."""
-    return name.replace("::", "/").rpartition("/")[2] or name
-
-
-def _uuv(plugin: Element, bodies: Bodies) -> FoundThruster:
-    link_name, joint_name = plugin.value("linkName"), plugin.value("jointName")
-    joint = bodies.joint(joint_name) if joint_name else None
-    link = bodies.link(link_name) if link_name else None
-    if joint is not None:
-        thruster = _on_joint(joint, bodies)
-        if link is not None:
-            thruster.name = short(link.name)
-    elif link is not None:
-        thruster = FoundThruster(short(link.name), link.X_BL.p_m, link.X_BL.R[:, 0], plugin.place, link.X_BL.R)
-    else:
-        raise PlacedError(f"{plugin.place}: thruster plugin: neither link {link_name} nor its joint is in the file")
-    dynamics = plugin.first("dynamics")
-    if dynamics is not None:
-        lag = _number(dynamics, "timeConstant")
-        thruster.time_constant_s = 0.0 if (dynamics.value("type") or "").lower() == "zeroorder" else lag
-    _uuv_limits(plugin, thruster)
-    return thruster
-
-
-def _uuv_limits(plugin: Element, thruster: FoundThruster) -> None:
-    """Limits: stated thrusts first, then the ends of a thrust table, then the command's ends through the curve."""
-    high, low = _number(plugin, "thrustMax"), _number(plugin, "thrustMin")
-    conversion = plugin.first("conversion")
-    clamp_high, clamp_low = _number(plugin, "clampMax"), _number(plugin, "clampMin")
-    gain = _number(plugin, "gain")
-    gain = 1.0 if gain is None else gain
-    if conversion is not None:
-        outputs = conversion.first("outputValues")
-        constant = _number(conversion, "rotorConstant")
-        if outputs is not None and outputs.text.strip():
-            table = numbers(outputs.text, outputs.place, "outputValues")
-            high = float(table.max()) if high is None else high
-            low = float(table.min()) if low is None else low
-        elif constant is not None:
-            ends = [constant * g * abs(g) for g in (gain * c for c in (clamp_low, clamp_high) if c is not None)]
-            if len(ends) == 2:
-                high = max(ends) if high is None else high
-                low = min(ends) if low is None else low
-    efficiency = _number(plugin, "thrust_efficiency")
-    scale = efficiency if efficiency is not None and 0.0 < efficiency <= 1.0 else 1.0
-    thruster.max_forward_N = scale * high if high is not None and high >= 0.0 else None
-    thruster.max_reverse_N = -scale * low if low is not None and low <= 0.0 else None
-
-
-def _number(element: Element, tag: str) -> float | None:
-    text = element.value(tag)
-    child = element.first(tag)
-    return None if text is None or child is None else number(text, child.place, tag)
-
-
 def _by_name(bodies: Bodies, unknown: list[Element], found: Found) -> None:
     joints = [j for j in bodies.joints.values() if THRUSTER_NAME.search(short(j.child) + " " + short(j.name))]
     turning = [j for j in joints if j.axis is not None and j.kind in {"continuous", "revolute"}]
     fixed = [j for j in joints if j.kind == "fixed"]
     turning, fixed = _one_each(turning, bodies, found), _one_each(fixed, bodies, found) if not turning else []
     for joint in turning or fixed:
-        found.thrusters.append(_on_joint(joint, bodies))
+        found.thrusters.append(on_joint(joint, bodies))
     if turning:
         found.thrust_rule = NAME_RULE
     elif fixed:
@@ -372,7 +219,7 @@ def _ardupilot(bodies: Bodies, found: Found) -> None:
             joint = bodies.joint(control.value("jointName") or "")
             if joint is None or "thrust" not in (control.value("cmd_topic") or ""):
                 continue
-            multiplier, offset = _number(control, "multiplier"), _number(control, "offset")
+            multiplier, offset = number_in(control, "multiplier"), number_in(control, "offset")
             thruster = next((t for t in found.thrusters if t.name == short(joint.child)), None)
             if thruster is None or multiplier is None:
                 continue

@@ -17,9 +17,10 @@ from wakewise.importers.matrices import read_matrix_only, read_yaml
 from wakewise.importers.outline import read_outline
 from wakewise.importers.packages import Folders
 from wakewise.importers.plausible import question_names, question_rank, require_count, require_force_columns
-from wakewise.importers.plugins import read_thrusters, words
+from wakewise.importers.plugins import read_thrusters
 from wakewise.importers.sdf import left_out, read_sdf
 from wakewise.importers.stonefish import read_stonefish
+from wakewise.importers.thruster_forms import words
 from wakewise.importers.urdf import read_urdf
 from wakewise.importers.water import read_water
 from wakewise.importers.wrench_rows import ARDUSUB, FORCES_FIRST, MOMENTS_FIRST, Order, agreeing, nearest, told_order

@@ -157,10 +157,15 @@ def _bodies(robot: Element, weights: dict[str, _Weight]) -> Bodies:
         links[name] = Link(element.attributes.get("name", ""), element.place)
         weights[name] = _weight(element, name)
     steps: dict[str, tuple[str, Pose]] = {}
-    for joint in robot.all("joint"):
-        parent, child = joint.first("parent"), joint.first("child")
-        if parent is not None and child is not None:
-            steps[child.attributes.get("name", "")] = (parent.attributes.get("name", ""), origin(joint.first("origin")))
+    joints: dict[str, Joint] = {}
+    for i, joint in enumerate(robot.all("joint")):
+        ends = joint.first("parent"), joint.first("child")
+        if ends[0] is None or ends[1] is None:
+            continue
+        parent, child = (end.attributes.get("name", "") for end in ends if end is not None)
+        steps[child] = (parent, origin(joint.first("origin")))
+        name, kind = joint.attributes.get("name", f"joint{i}"), joint.attributes.get("type", "")
+        joints[name] = Joint(name, kind, child, Pose(np.zeros(3)), None, joint.place, parent)
     for name, link in links.items():
         X, here = Pose(np.zeros(3)), name
         for _ in range(len(links)):
@@ -169,7 +174,6 @@ def _bodies(robot: Element, weights: dict[str, _Weight]) -> Bodies:
             here, step = steps[here]
             X = step @ X
         link.X_BL = X
-    joints: dict[str, Joint] = {}
     return Bodies(robot.attributes.get("name", "robot"), base, links, joints, [], [])
 
 

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
-from wakewise.importers.bodies import Bodies
+from wakewise.importers.bodies import Bodies, moving_parts
 from wakewise.importers.found import QUESTION, Found, FoundThruster
-from wakewise.importers.plugins import short
+from wakewise.importers.plugins import question_steered
+from wakewise.importers.thruster_forms import short
 from wakewise.importers.urdf import origin
 from wakewise.importers.xml import Element, PlacedError, number, numbers
 
@@ -48,6 +49,8 @@ def read_thrusters(robot: Element, bodies: Bodies, density: float | None, found:
         If a thruster is on no link, or a number is not one.
     """
     rules: list[str] = []
+    turning = moving_parts(bodies)
+    steered: list[str] = []
     others: dict[str, int] = {}
     for actuator in robot.all("actuator"):
         kind = actuator.attributes.get("type", "")
@@ -58,6 +61,10 @@ def read_thrusters(robot: Element, bodies: Bodies, density: float | None, found:
             _thruster(actuator, bodies, density, found) if kind == "thruster" else _simple(actuator, bodies)
         )
         rules.append(RULE if kind == "thruster" else SIMPLE_RULE)
+        link = actuator.first("link")
+        if link is not None and short(link.attributes.get("name", "")) in {short(name) for name in turning}:
+            steered.append(found.thrusters[-1].name)
+    question_steered(steered, found)
     found.thrust_rule = "; ".join(dict.fromkeys(rules)) or RULE
     if others:
         said = ", ".join(f"{n} of type {kind[:40] or 'unknown'}" for kind, n in others.items())

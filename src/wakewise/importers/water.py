@@ -9,7 +9,7 @@ import numpy as np
 from wakewise.arrays import Array
 from wakewise.importers.bodies import Bodies
 from wakewise.importers.found import Found, symmetrised
-from wakewise.importers.plugins import short, words
+from wakewise.importers.thruster_forms import short, words
 from wakewise.importers.xml import Element, PlacedError, number, numbers
 
 _FORCES = "xyzkmn"

@@ -14,6 +14,7 @@ from wakewise.importers.xml import PlacedError
 from wakewise.importers.yamls import Item
 from wakewise.physics import GRAVITY_M_S2
 
+_MASS = ("mass", "mass_kg")
 Entries = list[tuple[tuple[str, ...], Item]]
 """Every item of a file with the keys that lead to it."""
 
@@ -48,13 +49,16 @@ def read_parameters(entries: Entries, found: Found) -> bool:
     known = len(found.derived)
     entries = _of_the_vehicle(entries, found)
     where = f"{found.kind} {found.file.name}"
-    mass = _number(entries, ("mass",))
+    mass = _number(entries, _MASS)
     if mass is not None:
         value, item = mass
-        if value <= 0.0:
+        if value == 0.0 and find(entries, ("mass",)) is None:
+            found.notes.append(f"mass: 0, so it is not stated ({item.place.file.name}:{item.place.line})")
+        elif value <= 0.0:
             raise PlacedError(f"{item.place}: mass is {value:g}, must be more than 0")
-        found.mass_kg = value
-        found.derived["body"] = where
+        else:
+            found.mass_kg = value
+            found.derived["body"] = where
     _inertia(entries, found)
     for keys, attribute in (
         (("cog", "center_of_gravity", "center_of_mass", "centre_of_gravity"), "p_G_m"),
@@ -64,7 +68,7 @@ def read_parameters(entries: Entries, found: Found) -> bool:
         if point is not None:
             setattr(found, attribute, three(point, keys[0]))
             found.derived["buoyancy"] = where
-    volume = _number(entries, ("volume", "displaced_volume"))
+    volume = _number(entries, ("volume", "displaced_volume", "displacement_m3", "volume_m3"))
     if volume is not None and volume[0] > 0.0:
         found.displaced_volume_m3 = volume[0]
         found.derived["buoyancy"] = where
@@ -90,8 +94,8 @@ def _of_the_vehicle(entries: Entries, found: Found) -> Entries:
         If two masses stand at one depth that may both be the vehicle's.
     """
     whole = [(path, item) for path, item in entries if not any(PART_NAME.search(key) for key in path[:-1])]
-    masses = [(path, item) for path, item in whole if path[-1] == "mass" and isinstance(item.value, str)]
-    parts = [path for path, item in entries if path[-1] == "mass" and any(PART_NAME.search(key) for key in path[:-1])]
+    masses = [(path, item) for path, item in whole if path[-1] in _MASS and isinstance(item.value, str)]
+    parts = [path for path, item in entries if path[-1] in _MASS and any(PART_NAME.search(key) for key in path[:-1])]
     if parts:
         said = ", ".join(dict.fromkeys("/".join(path[:-1]) for path in parts[:6]))
         found.notes.append(f"mass: that of {said} is of a part and is not taken for the vehicle's")
