@@ -11,6 +11,8 @@ from bottle import SESSION, SOURCES, THRUST, THRUSTS, Bottle
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from wakewise.geometry import Pose
+from wakewise.interfaces import BodyState
 from wakewise.links.ardusub.engagement import Limits
 from wakewise.links.ardusub.journal import Journal, read_journal
 from wakewise.links.ardusub.listening import Said
@@ -170,6 +172,43 @@ def test_a_process_that_stood_still_lets_go():
     bottle.now_s += 0.5
     bottle.warden.tick()
     assert [fields["group_mlx"] for _, name, fields in bottle.sent[before:] if name == THRUST] == [1]
+
+
+def test_thrusts_whose_own_call_ends_the_engagement_are_not_sent():
+    """The position grew too old since the last tick: the call finds it out, and nothing follows the release."""
+    bottle = engaged()
+    before, entry = len(bottle.sent), bottle.warden.entry
+    bottle.now_s += LIMITS.pose_s + TICK_S
+    assert bottle.warden.entry == entry
+    assert not bottle.warden.command(THRUSTS, entry)
+    assert bottle.warden.entry is None
+    assert bottle.warden.engagement.why.startswith("no ")
+    assert [fields["group_mlx"] for _, name, fields in bottle.sent[before:] if name == THRUST] == [1]
+    bottle.run(0.5)
+    assert bottle.thrusts[-1] < bottle.releases[0]
+
+
+@pytest.mark.parametrize("ends", ["pose", "operator takes over", "end"])
+def test_letting_go_is_said_three_times(ends):
+    """At once and with the next ticks: two of them may be lost, and the pilot has the sticks at the third."""
+    bottle = engaged()
+    LOSSES[ends](bottle)
+    bottle.run(1.0)
+    assert len(bottle.releases) == 3
+    assert 0.02 - SLACK_S <= np.ptp(bottle.releases) <= 0.04 + SLACK_S
+    assert bottle.warden.releases_sent == 3
+
+
+@pytest.mark.parametrize("twist", [[1.5, 0.0, 0.0], [0.0, -1.1, 0.0], [0.7, 0.7, 0.7]])
+def test_a_speed_that_only_the_estimator_knows_ends_it(twist):
+    """The autopilot says that it stands still; the larger of both counts."""
+    bottle = engaged()
+    fast = BodyState(X_WB=Pose(np.array(bottle.at), np.array([1.0, 0.0, 0.0, 0.0])), nu_B=np.array([*twist, 0, 0, 0]))
+    bottle.warden.estimated(fast)
+    bottle.now_s += TICK_S
+    bottle.warden.tick()
+    assert bottle.warden.entry is None
+    assert bottle.warden.engagement.why == f"{np.linalg.norm(twist):.2f} m/s, allowed 1 m/s"
 
 
 def test_thrusts_of_an_engagement_before_are_not_sent():

@@ -18,6 +18,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 pytest.importorskip("pymavlink", reason="the extra `links` is not installed")
@@ -25,16 +26,25 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from wakewise.geometry import Pose
+from wakewise.interfaces import BodyState
 from wakewise.links.ardusub.engagement import Limits
-from wakewise.links.ardusub.protocol import COMPANION_COMPONENT, ENABLE_PARAMETER, SCRIPT_VERSION, THRUST_GROUP
+from wakewise.links.ardusub.protocol import (
+    ALT_HOLD,
+    COMPANION_COMPONENT,
+    ENABLE_PARAMETER,
+    SCRIPT_VERSION,
+    THRUST_GROUP,
+)
 from wakewise.links.ardusub.script import script_text
 from wakewise.links.autopilot.aboard import Aboard
 from wakewise.links.autopilot.own_parameters import own_parameters
 from wakewise.links.autopilot.rehearsal import STATION, STATION_COMPONENT, THRUSTS, shipped_script
 from wakewise.links.autopilot.rim import Link, OverUdp, run
 from wakewise.links.autopilot.stand_in import HOME_DEG, StandIn
-from wakewise.links.physics import FreeWater, Physics, PulseTable
+from wakewise.links.physics import Body, FreeWater, Physics, PulseTable
 from wakewise.links.physics.datagrams import PORT
+from wakewise.links.physics.lowering import Lowered
 from wakewise.links.physics.udp import LOOPBACK, open_socket, serve
 from wakewise.vehicles import load_vehicle
 
@@ -42,6 +52,8 @@ HEAVY = load_vehicle("bluerov2-heavy")
 BINARY = os.environ.get("WAKEWISE_ARDUSUB", "")
 MIDDLE = (1500,) * 8
 ACTING = tuple(int(1500 + 400 * value + 0.5) for value in THRUSTS)
+START = BodyState(X_WB=Pose(np.array([0.0, 0.0, 2.0]), np.array([1.0, 0.0, 0.0, 0.0])))
+HELD_S = 10.0
 FIRST_S = 90.0
 """How long a firmware may take to its first message and to be ready to arm."""
 
@@ -64,6 +76,7 @@ class Ashore:
         self._due = {"beat": 0.0, "sticks": 0.0, "stream": 0.0}
         self.sticks: tuple[int, int, int, int] | None = (0, 0, 500, 0)
         self.streams = False
+        self.thrusts: tuple[float, ...] = THRUSTS
         self.listeners: dict[str, Callable[[bytes], None]] = {}
         self.turns: list[Callable[[], None]] = []
         self.last: dict[str, Any] = {}
@@ -97,7 +110,7 @@ class Ashore:
             stamp_us = round(1e6 * now_s)
             self._send(
                 self._companion,
-                mavlink.MAVLink_set_actuator_control_target_message(stamp_us, THRUST_GROUP, 1, 1, list(THRUSTS)),
+                mavlink.MAVLink_set_actuator_control_target_message(stamp_us, THRUST_GROUP, 1, 1, list(self.thrusts)),
             )
         for turn in self.turns:
             turn()
@@ -114,6 +127,22 @@ class Ashore:
                 self.named[message.name] = message.value
             elif message.get_type() == "STATUSTEXT":
                 self.texts.append(message.text)
+
+    @property
+    def depth_m(self) -> float:
+        """As physics knows it."""
+        assert self.physics.motion is not None
+        return float(self.physics.motion.p_WB_m[2])
+
+    @property
+    def off_m(self) -> float:
+        """What the autopilot says of its depth, less the truth."""
+        return -float(self.last["VFR_HUD"].alt) - self.depth_m
+
+    def ask(self, message: int, rate_hz: float) -> None:
+        """Have a message told so often."""
+        interval = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
+        self.say(mavlink.MAVLink_command_long_message(1, 1, interval, 0, message, 1e6 / rate_hz, 0, 0, 0, 0, 0))
 
     def run(self, seconds: float) -> None:
         """Let time pass."""
@@ -194,13 +223,20 @@ def _start_stand_in(stack: ExitStack, physics_port: int, station_port: int) -> N
 def _start_firmware(stack: ExitStack, folder: Path, station_port: int) -> None:
     values = {name: own_parameters()[name] for name in ("FRAME_CONFIG", "FS_GCS_ENABLE", "FS_GCS_TIMEOUT")}
     # From 4.7 on ARMING_CHECK is ARMING_SKIPCHK; what a release does not know it leaves out.
-    values |= {"SCR_ENABLE": 1, "ARMING_CHECK": 0, "ARMING_SKIPCHK": -1, "JS_GAIN_DEFAULT": 0.5}
+    values |= {
+        "SIM_BARO_RND": 0.01,
+        "SIM_BAR2_RND": 0.01,
+        "SCR_ENABLE": 1,
+        "ARMING_CHECK": 0,
+        "ARMING_SKIPCHK": -1,
+        "JS_GAIN_DEFAULT": 0.5,
+    }
     (folder / "start.parm").write_text("".join(f"{name},{value:g}\n" for name, value in values.items()))
     (folder / "scripts").mkdir()
     (folder / "scripts" / "wakewise.lua").write_text(script_text())
     home = ",".join(map(str, (*HOME_DEG, 0, 0)))
     arguments = ["--model", f"JSON:{LOOPBACK}", "--speedup", "1", "-I0", "--home", home, "--defaults", "start.parm"]
-    arguments += ["--serial0", f"udpclient:{LOOPBACK}:{station_port}"]
+    arguments += ["--serial0", f"udpclient:{LOOPBACK}:{station_port}", "--serial1", "none:0", "--serial2", "none:0"]
     with (folder / "firmware.log").open("w") as log:
         firmware = subprocess.Popen(
             [str(Path(BINARY).resolve()), *arguments], cwd=folder, stdout=log, stderr=subprocess.STDOUT
@@ -227,10 +263,16 @@ WHO = [
 @pytest.fixture(params=WHO)
 def ashore(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Ashore]:
     """A vehicle in still water behind an autopilot that has said its first heartbeat and loaded the script."""
-    physics = Physics(lambda: FreeWater(HEAVY), PulseTable.of(HEAVY).thrusts)
+    real = request.param == "ArduSub"
+
+    def begin() -> Body:
+        """The firmware calibrates its depth at the surface; the stand-in was calibrated there before."""
+        body = FreeWater(HEAVY, START)
+        return Lowered(body, START, HELD_S) if real else body
+
+    physics = Physics(begin, PulseTable.of(HEAVY).thrusts)
     over = threading.Event()
     with ExitStack() as stack:
-        real = request.param == "ArduSub"
         assert not real or os.access(BINARY, os.X_OK), f"WAKEWISE_ARDUSUB={BINARY}: no program is there"
         listening = stack.enter_context(open_socket(LOOPBACK, PORT if real else 0))
         station = stack.enter_context(open_socket(LOOPBACK, 0))
@@ -243,6 +285,7 @@ def ashore(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Ashore]:
         else:
             _start_stand_in(stack, listening.getsockname()[1], station.getsockname()[1])
         ashore = Ashore(station, physics)
+        ashore.until(lambda: not physics.figures().stage and physics.figures().frames > 0, FIRST_S, "under water")
         ashore.until(lambda: "HEARTBEAT" in ashore.last and "WKW_VER" in ashore.named, FIRST_S, "heartbeat and script")
         yield ashore
 
@@ -314,4 +357,52 @@ def test_the_warden_drives_by_consent_and_lets_go_when_the_sticks_fall_silent(as
     ashore.sticks = (0, 0, 500, 0)
     ashore.run(1.5)
     assert ashore.pulses == MIDDLE
+    ashore.arm(False)
+
+
+@pytest.mark.slow
+def test_the_autopilot_knows_its_depth_down_and_up_to_the_surface(ashore: Ashore) -> None:
+    """Down by the sticks, then up until it is there and on: the vehicle stays in the water, its depth within 0.3 m."""
+    ashore.ask(mavlink.MAVLINK_MSG_ID_VFR_HUD, 20.0)
+    ashore.arm(True)
+    ashore.run(1.0)
+    off, depths = [abs(ashore.off_m)], [ashore.depth_m]
+    for throttle, seconds in ((100, 2.0), (1000, 9.0), (300, 1.5)):
+        ashore.sticks = (0, 0, throttle, 0)
+        for _ in range(round(10.0 * seconds)):
+            ashore.run(0.1)
+            off.append(abs(ashore.off_m))
+            depths.append(ashore.depth_m)
+    print(f"depths {min(depths):.2f} to {max(depths):.2f} m, off by {max(off):.3f} m at most")
+    assert max(depths) > 2.1
+    assert -0.3 < min(depths) < 0.3
+    assert max(off) < 0.3
+    ashore.arm(False)
+
+
+@pytest.mark.slow
+def test_depth_hold_is_handed_back_where_the_vehicle_is(ashore: Ashore) -> None:
+    """In ALT_HOLD thrusts push it down past the depth that it held; left alone it stays there, still in ALT_HOLD."""
+    ashore.ask(mavlink.MAVLINK_MSG_ID_VFR_HUD, 20.0)
+    ashore.enable()
+    ashore.arm(True)
+    ashore.say(mavlink.MAVLink_set_mode_message(1, 1, ALT_HOLD))
+    ashore.until(lambda: ashore.last["HEARTBEAT"].custom_mode == ALT_HOLD, 5.0, "ALT_HOLD")
+    ashore.run(2.0)
+    held = ashore.depth_m
+    ashore.thrusts, ashore.streams = (0.0,) * 4 + (0.09,) * 4, True
+    ashore.run(5.0)
+    ashore.streams = False
+    ashore.run(0.4)
+    handed_back, heading = ashore.depth_m, float(ashore.physics.motion.q_WB[3])  # type: ignore[union-attr]
+    after = []
+    for _ in range(80):
+        ashore.run(0.1)
+        after.append(ashore.depth_m - handed_back)
+    turned = float(ashore.physics.motion.q_WB[3]) - heading  # type: ignore[union-attr]
+    print(f"down by {handed_back - held:.2f} m, then {min(after):+.3f} to {max(after):+.3f} m, turned {turned:+.3f}")
+    assert handed_back - held > 0.15
+    assert min(after) > -0.05
+    assert max(after) < 0.15
+    assert ashore.last["HEARTBEAT"].custom_mode == ALT_HOLD
     ashore.arm(False)
