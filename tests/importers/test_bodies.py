@@ -116,3 +116,13 @@ def test_a_cameras_pose_in_degrees_is_read_as_such(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace(' degrees="true"', ""))
     with pytest.raises(InputError, match=r"a.sdf:1: pose holds the angle 90"):
         import_vehicle(path)
+
+
+def test_links_without_an_inertial_are_a_kilogram_each_in_sdf(tmp_path: Path) -> None:
+    """What the file leaves out is said, and not counted."""
+    path = tmp_path / "m.sdf"
+    link = '<link name="base_link"><inertial><mass>9</mass></inertial></link>'
+    path.write_text(f'<sdf><model name="m">{link}<link name="a"/><link name="b"/></model></sdf>')
+    draft = import_vehicle(path)
+    assert draft.mass_kg == 9.0
+    assert any(n.startswith("QUESTIONED: mass: a, b states no inertial") and "2 kg in all" in n for n in draft.notes)

@@ -55,6 +55,22 @@ def test_names_of_sides_decide_the_frame(tmp_path: Path, names: list[str]) -> No
         assert not doubts(draft)
 
 
+@pytest.mark.parametrize("turn", [1.0, -1.0])
+def test_a_list_of_names_beside_matrices_speaks_as_well(tmp_path: Path, turn: float) -> None:
+    """Beside positions and directions, and beside an allocation matrix, whose columns along x and z tell places."""
+    frame, signs = "FLU" if turn > 0 else "FRD", np.array([1, turn, turn])
+    names = "thruster_names: [front_left, front_right, back_left, back_right]\n"
+    places, axes = (PLACES * signs).tolist(), (AXES * signs).tolist()
+    text = f"{names}thruster_positions: {places}\nthruster_directions: {axes}"
+    assert imported(tmp_path, text).notes[0].startswith(f"frame: {frame}")
+    assert imported(tmp_path, text).thrusters[0].name == "front_left"
+    ahead, up = np.array([[1.0, 0, 0]] * 2), np.array([[0, 0, 1.0]] * 2)
+    wrench = np.hstack([np.vstack([ahead, up]), np.cross(PLACES * signs, np.vstack([ahead, up]))])
+    assert imported(tmp_path, f"{names}tam: {wrench.T.tolist()}").notes[0].startswith(f"frame: {frame}")
+    rows = "".join(f"  {n}: {row}\n" for n, row in zip(["FL", "FR", "BL", "BR"], wrench.tolist(), strict=True))
+    assert imported(tmp_path, f"tam:\n{rows}").notes[0].startswith(f"frame: {frame}")
+
+
 @pytest.mark.parametrize("frame", ["FLU", "FRD"])
 @pytest.mark.parametrize("kind", ["up", "top"])
 def test_names_of_up_and_down_decide_where_no_side_is_named(tmp_path: Path, frame: str, kind: str) -> None:

@@ -53,7 +53,9 @@ LABELS = ["roll, pitch, yaw, surge, sway, heave", "Mx, My, Mz, Fx, Fy, Fz", "K, 
 
 
 @pytest.mark.parametrize("labels", LABELS)
-@pytest.mark.parametrize("where", ["beside", "elsewhere", "comment", "comments of rows", "told", "names of rows"])
+@pytest.mark.parametrize(
+    "where", ["beside", "elsewhere", "words", "comment", "comments of rows", "told", "names of rows"]
+)
 def test_labels_say_what_the_rows_are(tmp_path: Path, labels: str, where: str) -> None:
     """A list beside the matrix or elsewhere, a comment, comments of rows, the user, or names of the rows."""
     # Levers of 1 m: forces first would fit as well, so only the labels tell.
@@ -65,6 +67,8 @@ def test_labels_say_what_the_rows_are(tmp_path: Path, labels: str, where: str) -
         text = f"a: {{tam: {raw}, rows: [{labels}]}}"
     elif where == "elsewhere":
         text += f"\nb: {{c: {{order: [{labels}]}}}}"
+    elif where == "words":
+        text += f"\ndof_order: {labels}"
     elif where == "comment":
         text = f"# the rows: {labels}\n{text}"
     elif where == "comments of rows":

@@ -220,6 +220,12 @@ def read_mass(bodies: Bodies, found: Found) -> None:
             f"{QUESTION}mass: {sum(link.mass_kg or 0.0 for link in arms):g} kg of it move on joints "
             f"({', '.join(link.name for link in arms[:4])}), as an arm does; they are held where the file has them"
         )
+    unstated = [link.name for link in bodies.links.values() if link.mass_kg is None]
+    if found.kind == "SDF" and unstated:
+        found.notes.append(
+            f"{QUESTION}mass: {', '.join(unstated[:6])} states no inertial, for which Gazebo takes 1 kg each "
+            f"({len(unstated)} kg in all); not counted"
+        )
     where = f"{heaviest.place.file.name}:{heaviest.place.line}"
     found.derived["body"] = found.derived["inertia"] = (
         f"{found.kind} {where}: link {heaviest.name} and all others as one body"

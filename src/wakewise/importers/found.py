@@ -79,6 +79,7 @@ class Found:
     matrix: Array | None = None
     matrix_name: str = ""
     matrix_line: int | None = None
+    column_names: list[str] = field(default_factory=list)
     raw_matrix: Array | None = None
     claims: list[tuple[int, str, Place, bool]] = field(default_factory=list)
     X_BC: Pose | None = None

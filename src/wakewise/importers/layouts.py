@@ -22,6 +22,7 @@ from wakewise.importers.xml import PlacedError
 from wakewise.importers.yaml_parameters import Entries, find
 from wakewise.importers.yamls import Item
 
+_NAMES = re.compile(r"^(thrusters?|motors?)(_?(names?|ids?|labels?|order))?$|^names$", re.IGNORECASE)
 _POSITIONS = ("thruster_position", "thruster_positions", "positions", "thruster_locations", "locations")
 _DIRECTIONS = (
     *("thruster_force_direction", "thruster_force_directions", "thruster_direction_matrix", "thruster_layout"),
@@ -79,18 +80,30 @@ def _from_matrices(positions: Item, directions: Item, key: str, entries: Entries
     if count is not None and round(count.scalar("number of thrusters")) != n:
         raise PlacedError(f"{positions.place}: {n} positions, but num says {count.value}")
     Rs: list[Array | None] = [None] * n
+    names = listed_names(entries, axes) or [f"thruster{i}" for i in range(n)]
     if turned:
         rows, note = read_angles([(axes[:, i], directions.place) for i in range(n)], key, key)
         found.notes += [f"{key}: roll, pitch and yaw of each thruster", *([note] if note else [])]
         found.thrust_rule = TURN_RULE
         Rs = [pose_of(np.zeros(3), row).R for row in rows]
         axes = np.stack([R[:, 0] for R in Rs if R is not None], axis=1)
-    for i in range(n):
-        name = f"thruster{i}"
+    for i, name in enumerate(names):
         axis = unit_axis(axes[:, i], directions, name)
         if not turned:
             require_direction(axes[:, i], directions, name)
         found.thrusters.append(FoundThruster(name, places[:, i], axis, directions.place, Rs[i]))
+
+
+def listed_names(entries: Entries, columns: Array | None) -> list[str]:
+    """Names of thrusters, one for each column, that stand in a list of their own; [] if none does."""
+    if columns is None:
+        return []
+    for path, item in entries:
+        listed = [member.value for member in item.items() if isinstance(member.value, str)]
+        if _NAMES.match(path[-1]) and len(listed) == len(item.items()) == columns.shape[1]:
+            item.seen = True
+            return listed
+    return []
 
 
 def _columns(positions: Item, directions: Item, key: str, found: Found) -> tuple[Array, Array, bool]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from wakewise.arrays import Array
 from wakewise.importers.found import QUESTION, Found, Frame
-from wakewise.importers.layouts import read_geometry
+from wakewise.importers.layouts import listed_names, read_geometry
 from wakewise.importers.names import vote
 from wakewise.importers.plausible import claims_in, require_count, require_same_count
 from wakewise.importers.thruster_lists import LOOKS_LIKE_THRUSTERS
@@ -84,6 +84,7 @@ def read_matrix_only(root: Item, found: Found, rows: Order | None = None) -> Non
 
 
 _TURNING = re.compile(r"flip|revers|invert|(^|_)sign|polarity|spin|^directions?$", re.IGNORECASE)
+_ALONE = 0.9
 _LIFT_M = 1e-3
 _NEAR_LINES = 40
 """How far from the thrusters or the matrix a comment may stand that speaks of their frame."""
@@ -140,7 +141,9 @@ def _frame(root: Item, entries: Entries, found: Found, *, geometry: bool) -> tup
         for pattern, frame in ((_DOWN_WORDS, "FRD"), (_UP_WORDS, "FLU"))
         if pattern.search(text)
     }
-    votes = vote([t.name for t in found.thrusters], *_geometry(found)) if found.thrusters else None
+    names = [t.name for t in found.thrusters] or listed_names(entries, found.matrix) or found.column_names
+    placed = _geometry(found)
+    votes = vote(names, *placed) if names and len(names) == len(placed[0]) else None
     if votes is not None and votes.frame:
         if spoken and votes.frame not in spoken:
             found.notes.append(f"{QUESTION}a comment speaks of {next(iter(spoken))}, the names of the thrusters do not")
@@ -168,7 +171,18 @@ def _frame(root: Item, entries: Entries, found: Found, *, geometry: bool) -> tup
 
 
 def _geometry(found: Found) -> tuple[Array, Array]:
-    return np.array([t.p_m for t in found.thrusters]), np.array([t.axis for t in found.thrusters])
+    """Places and axes, each (n, 3), of the thrusters; of a matrix what its columns along x and along z tell of them."""
+    if found.thrusters or found.matrix is None:
+        return np.array([t.p_m for t in found.thrusters]), np.array([t.axis for t in found.thrusters])
+    force, moment = found.matrix[:3].T, found.matrix[3:].T
+    places = np.zeros_like(force)
+    for place, f, m in zip(places, force, moment, strict=True):
+        # From moment = place x force; what a column does not tell stays 0, which says nothing.
+        if abs(f[0]) > _ALONE and np.all(f[1:] == 0.0):
+            place[1:] = -m[2] / f[0], m[1] / f[0]
+        elif abs(f[2]) > _ALONE and np.all(f[:2] == 0.0):
+            place[:2] = -m[1] / f[2], m[0] / f[2]
+    return places, force
 
 
 def _matrix(root: Item, entries: Entries, found: Found, rows: Order | None, *, flown: bool) -> bool:
@@ -213,6 +227,7 @@ def _numbers(key: str, item: Item, found: Found) -> tuple[Array | None, Order | 
         return flat, None
     if item.table() and all(len(column.items()) == 6 and column.is_numbers() for column in item.table().values()):
         found.notes.append(f"{key}: six numbers for each of {', '.join(item.table())[:120]}")
+        found.column_names = list(item.table())
         return np.stack([column.numbers(f"{name} of {key}", 6) for name, column in item.table().items()]), None
     if item.items():
         found.notes.append(
@@ -227,7 +242,9 @@ def _stated_order(root: Item, path: tuple[str, ...], item: Item, entries: Entrie
     beside = [(p, e) for p, e in entries if p[:-1] == path[:-1]] or entries
     for key, entry in [*beside, *entries]:
         labels = [member.value for member in entry.items() if isinstance(member.value, str)]
-        order = order_of(labels, f"{key[-1]} says so") if len(labels) == len(entry.items()) == 6 else None
+        if isinstance(entry.value, str):
+            labels = re.split(r"[,;\s]+", entry.value.strip())
+        order = order_of(labels, f"{key[-1]} says so") if len(labels) in (len(entry.items()), 6) else None
         if order is not None:
             entry.seen = True
             return order

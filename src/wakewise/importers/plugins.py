@@ -141,7 +141,7 @@ def _by_name(bodies: Bodies, unknown: list[Element], found: Found) -> None:
     if found.thrusters:
         found.guessed = "links were taken for thrusters by their names"
         why = "the file's thruster plugin is not read" if unknown else "no thruster plugin in the file"
-        found.notes.append(f"{QUESTION if unknown else ''}{why}: {found.guessed}, and which way they push is a guess")
+        found.notes.append(f"{QUESTION}{why}: {found.guessed}, and which way they push is a guess")
         found.thrusters.sort(key=lambda t: [int(n) for n in _NUMBERED.findall(t.name)])
         found.derived["thruster_layout"] = f"{found.kind} {found.file.name}: joints with thruster names"
 
