@@ -10,6 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from wakewise.errors import InputError
 
+
+class NotFinite(InputError):  # noqa: N818  (it is what the array is)
+    """An array holds NaN or infinity; where nobody gave it, something has diverged."""
+
+
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
@@ -55,7 +60,7 @@ def frozen(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
     else:
         quick = flat.size <= _ONE_THREAD and math.isfinite(flat.dot(flat))
     if not quick and not np.isfinite(array).all():
-        raise InputError(f"{name}: holds NaN or infinity, every element must be finite")
+        raise NotFinite(f"{name}: holds NaN or infinity, every element must be finite")
     array.setflags(write=False)
     return array
 

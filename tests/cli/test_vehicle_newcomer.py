@@ -41,7 +41,7 @@ def own_urdf() -> str:
   </link>
   <link name="camera_link"/>
   <joint name="camera_joint" type="fixed">
-    <parent link="base_link"/><child link="camera_link"/><origin xyz="0.21 0 0.05"/>
+    <parent link="base_link"/><child link="camera_link"/><origin xyz="0.21 0 0.02"/>
   </joint>
   {"".join(parts)}
 </robot>
@@ -75,7 +75,7 @@ def test_the_commands_of_the_page_make_a_vehicle_that_can_fly(capsys: pytest.Cap
     assert "estimate" in capsys.readouterr().out
     whole = ww.load_vehicle("my_whole_rov.yaml")
     assert whole.size_m.tolist() == [0.46, 0.58, 0.25]
-    assert whole.X_BC.p_m.tolist() == [0.21, 0.0, -0.05]
+    assert whole.X_BC.p_m.tolist() == [0.21, 0.0, -0.02]
     assert whole.mass_kg == 11.0
     marked = {p.group for p in whole.provenance if p.estimate}
     assert marked >= {"buoyancy", "added_mass", "damping", "thruster_limits", "thruster_disk", "camera_lens"}

@@ -1,5 +1,7 @@
 """Said before the flight: a current too fast to hold, a series too short for the flight."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -65,3 +67,55 @@ def test_no_controller_is_told_the_current_that_the_tank_has():
     )
     assert np.array_equal(still.view.points_W_m, east.view.points_W_m)
     assert flow is None and flow_east is None
+
+
+@pytest.mark.parametrize(
+    "blocks",
+    [
+        [{"float_N": 5000.0}],
+        [{"float_N": -5000.0}],
+        [{"float_N": 40.0, "at_B_m": [5.0, 0.0, 0.0]}, {"float_N": -40.0, "at_B_m": [-5.0, 0.0, 0.0]}],
+    ],
+)
+def test_ballast_that_thrusters_cannot_hold_is_refused(blocks):
+    """With weight, moment and margin; a float that they can hold is flown with less margin."""
+    with pytest.raises(InputError, match=r"cannot hold its route.*N (heavy|light).*margin -\d+ %"):
+        check_current(load_scenario("quick", None, {"ballast": blocks}).parts())
+
+
+def test_a_float_costs_margin():
+    margins = [
+        check_current(load_scenario("quick", None, {"ballast": [{"float_N": float_N}]}).parts()).margin_pct
+        for float_N in (0.0, -20.0, -60.0)
+    ]
+    assert margins[0] > margins[1] > margins[2] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("twist", "words"),
+    [
+        ([1e6, 0, 0, 0, 0, 0], r"start: moves at 1e\+06 m/s, at most 5 m/s"),
+        ([0, 0, 6.0, 0, 0, 0], "start: moves at 6 m/s"),
+        ([0, 0, 0, 1e4, 0, 0], r"start: turns at 1e\+04 rad/s, at most 6\.28 rad/s"),
+    ],
+)
+def test_a_start_faster_than_any_vehicle_is_refused(twist, words):
+    parts = load_scenario("quick", None, {}).parts()
+    with pytest.raises(InputError, match=words):
+        preflight.check_begin(parts.replace(start=BodyState(X_WB=parts.start.X_WB, nu_B=np.array(twist, dtype=float))))
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"mass_kg": 1e12}, r"cannot hold its route.*e\+12|cannot hold its route.* N heavy"),
+        ({"mass_kg": 1e12, "displaced_volume_m3": 1e9}, "cannot hold|displaced_volume_m3 1e"),
+        ({"mass_kg": 60.0, "displaced_volume_m3": 0.06}, r"displaced_volume_m3 0\.06, the box round it"),
+    ],
+)
+def test_a_vehicle_of_impossible_mass_or_volume_is_refused(fields, words):
+    parts = load_scenario("quick", None, {"tank.mismatch.trim_N": 0.0}).parts()
+    heavy = replace(parts.vehicle, **fields)
+    with pytest.raises(InputError, match=words):
+        check_current(parts.replace(vehicle=heavy))
+        preflight.check_volume(heavy)

@@ -7,6 +7,7 @@ import numpy as np
 import polars as pl
 import pytest
 
+from wakewise.errors import StageError
 from wakewise.geometry import Pose, quat_from_matrix
 from wakewise.interfaces import BodyState, Command, Goal, Measurement, ScalarGrid, Truth, WaterTruth
 from wakewise.missions import MissionSettings, RoutePilot, plan_route
@@ -205,3 +206,41 @@ def test_the_estimator_is_told_what_was_flown() -> None:
     assert len(spy.told) == len(everything.commands) == 50
     np.testing.assert_array_equal(spy.told, everything.commands)
     np.testing.assert_array_equal(spy.told, [np.full(2, k + 1.0) for k in range(50)])
+
+
+class Diverging(Perfect):
+    """A plant that is fast, or without end, from a time on; or whose estimate or controller is."""
+
+    def __init__(self, part: str, value: float) -> None:
+        super().__init__()
+        self.part, self.value, self.steps = part, value, 0
+
+    def step(self, *arguments: object) -> object:
+        self.steps += 1
+        late = self.steps > 30
+        made = super().step(*arguments)
+        if late and self.part == "plant" and len(arguments) == 2:
+            Pose(np.full(3, self.value))
+            self.state = BodyState(X_WB=self.state.X_WB, nu_B=np.full(6, self.value))
+        if late and self.part == "controller" and isinstance(arguments[-1], Goal):
+            return made[0], Command(thrusts_N=np.full(2, self.value), wrench_B=np.zeros(6))  # type: ignore[index]
+        if late and self.part == "estimator" and len(arguments) == 4 and not isinstance(arguments[-1], Goal):
+            return 0, BodyState(X_WB=self.state.X_WB, nu_B=np.full(6, self.value))
+        return made
+
+
+@pytest.mark.parametrize(
+    ("part", "value", "words"),
+    [
+        ("plant", np.nan, "in the vehicle's motion: p_m: holds NaN"),
+        ("plant", np.inf, "in the vehicle's motion"),
+        ("plant", 1e6, r"in the (vehicle's motion|estimator): the vehicle moves or turns at 1e\+06"),
+        ("estimator", 1e6, r"in the estimator: the vehicle moves or turns at 1e\+06"),
+        ("estimator", np.nan, "in the estimator: nu_B: holds NaN"),
+        ("controller", np.nan, "in the controller: thrusts_N: holds NaN"),
+    ],
+)
+def test_a_simulation_that_diverges_says_when_and_in_which_part(part: str, value: float, words: str) -> None:
+    """It is no fault of the input, so it is a StageError."""
+    with pytest.raises(StageError, match=rf"the simulation diverged at t = 0\.\d\d s {words}"):
+        flown(plant=Diverging(part, value))

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from wakewise.arrays import Array, NotFinite
+from wakewise.errors import StageError
 from wakewise.interfaces import (
     BodyState,
     Command,
@@ -54,6 +57,29 @@ def unheard(time_s: float) -> None:
     """Take no note of when thrusts are sent."""
 
 
+DIVERGED = 100.0
+"""Speed of a vehicle, in m/s or rad/s, at which what moves it has diverged."""
+
+
+@contextmanager
+def _finite(part: str, time_s: float) -> Iterator[None]:
+    """Say of a part, and when, that it diverged, where numbers without end come of it."""
+    try:
+        yield
+    except (NotFinite, np.linalg.LinAlgError, ArithmeticError) as fault:
+        raise StageError(f"the simulation diverged at t = {time_s:.2f} s in the {part}: {fault}") from fault
+
+
+def _slow(part: str, time_s: float, nu_B: Array) -> None:
+    """Refuse to go on where a part says that the vehicle moves as no vehicle does."""
+    speed = max(map(abs, nu_B.tolist()))
+    if speed > DIVERGED:
+        raise StageError(
+            f"the simulation diverged at t = {time_s:.2f} s in the {part}: the vehicle moves or turns at {speed:.3g} "
+            f"m/s or rad/s, at most {DIVERGED:g}"
+        )
+
+
 def run_loop(
     *,
     pilot: Pilot,
@@ -81,6 +107,12 @@ def run_loop(
 
     Before each step `stop` is asked, then `pace` may wait until that time of the flight has come; `sent` is called
     when a step's thrusts go to the plant. What a flight is does not hang on any of them.
+
+    Raises
+    ------
+    StageError
+        If the simulation diverges: a part gives numbers that are not finite, or a vehicle faster than any; which part,
+        and when, is named.
     """
     control_state, filter_state = controller.init(), estimator.init(start)
     estimate, thrusts, aim = start, np.zeros(thrusters), getattr(plant, "aim", None)
@@ -89,12 +121,19 @@ def run_loop(
     while k < steps and not stop():
         now_s = k * dt_s
         pace(now_s)
-        goal = pilot.goal(now_s, estimate)
+        _slow("estimator", now_s, estimate.nu_B)
+        with _finite("pilot", now_s):
+            goal = pilot.goal(now_s, estimate)
         began = time.thread_time()
-        control_state, command = controller.step(control_state, dt_s, estimate, goal)
+        with _finite("controller", now_s):
+            control_state, command = controller.step(control_state, dt_s, estimate, goal)
         solve_s = time.thread_time() - began
         goal = goal if command.goal is None else command.goal
-        truth = witness.observe() if witness is not None else None
+        truth = None
+        if witness is not None:
+            with _finite("vehicle's motion", now_s):
+                truth = witness.observe()
+            _slow("vehicle's motion", now_s, truth.state.nu_B)
         record(
             Step(
                 time_s=now_s,
@@ -110,10 +149,12 @@ def run_loop(
         if aim is not None:
             aim(goal.tilt_rad)
         sent(now_s)
-        measurements = plant.step(thrusts, dt_s)
+        with _finite("vehicle's motion", now_s):
+            measurements = plant.step(thrusts, dt_s)
         for measured in measurements:
             tilt_rad = tilt_rad if measured.tilt_rad is None else measured.tilt_rad
-        filter_state, estimate = estimator.step(filter_state, dt_s, measurements, thrusts)
+        with _finite("estimator", now_s):
+            filter_state, estimate = estimator.step(filter_state, dt_s, measurements, thrusts)
         if k % 25 == 0 and duration_s is not None:
             progress(k, steps, f"{now_s:.0f} of {duration_s:.0f} s flown")
         k += 1

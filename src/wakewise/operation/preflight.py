@@ -20,8 +20,12 @@ from wakewise.vehicles import possible_drags, with_drag
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
+    from wakewise.vehicles import Vehicle
 
 log = logging.getLogger(__name__)
+
+FASTEST_M_S, FASTEST_RAD_S = 5.0, 2.0 * np.pi
+"""Faster no vehicle of this kind begins a mission."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,10 +57,12 @@ def preflight(parts: Parts) -> Preflight:
     check_target(parts)
     times_s = np.linspace(0.0, route.duration_s, 400)
     check_fit(scenario.tank, vehicle, [(float(t), route.body(float(t), parts.aim).X_WB) for t in times_s])
+    found = check_current(parts)
+    check_volume(vehicle)
     idle = () if "controller" in parts.given else idle_switches(scenario, vehicle)
     for words in idle:
         log.warning("%s", words)
-    return Preflight(clearance_m=clearance_m, holding=check_current(parts), idle=idle)
+    return Preflight(clearance_m=clearance_m, holding=found, idle=idle)
 
 
 def check_route(parts: Parts) -> float:
@@ -110,22 +116,44 @@ def check_way(parts: Parts) -> None:
             check_start(parts.vehicle, parts.region, state, around, what=f"mission at {time_s:.0f} s")
 
 
+def check_volume(vehicle: Vehicle) -> None:
+    """Refuse a vehicle that displaces more water than the box round it holds.
+
+    Raises
+    ------
+    InputError
+        With both volumes.
+    """
+    box_m3 = float(np.prod(vehicle.size_m))
+    if vehicle.displaced_volume_m3 > box_m3:
+        raise InputError(
+            f"vehicle {vehicle.name}: displaced_volume_m3 {vehicle.displaced_volume_m3:.4g}, the box round it (size_m) "
+            f"holds {box_m3:.4g} m3"
+        )
+
+
 def check_begin(parts: Parts) -> None:
     """Refuse a start from which no plan can be good; also of missions that were made by hand.
 
     Raises
     ------
     InputError
-        See `wakewise.planning.check_start`.
+        A start that is faster than any such vehicle, or see `wakewise.planning.check_start`.
     """
+    for words, part, most, unit in (
+        ("moves at", parts.start.nu_B[:3], FASTEST_M_S, "m/s"),
+        ("turns at", parts.start.nu_B[3:], FASTEST_RAD_S, "rad/s"),
+    ):
+        if (speed := float(np.linalg.norm(part))) > most:
+            raise InputError(f"start: {words} {speed:.3g} {unit}, at most {most:.3g} {unit}")
     check_start(parts.vehicle, parts.region, state_of(parts.start), surroundings_of(parts.scenario))
 
 
 def check_current(parts: Parts, looks: int = 200) -> Holding | None:
-    """Hold the water that passes the vehicle along its route against what its thrusters can give, with its worst drag.
+    """Hold weight and the water that passes the vehicle along its route against what its thrusters can give.
 
-    The drag is the worst that the plant may have: of any case that may be drawn, and all of `tank.mismatch.damping_pct`
-    above it.
+    Drag and trim are the worst that the plant may have: of any case that may be drawn, all of
+    `tank.mismatch.damping_pct` above it, and either end of the trim's range.
 
     Raises
     ------
@@ -138,17 +166,18 @@ def check_current(parts: Parts, looks: int = 200) -> Holding | None:
         raise InputError(
             f"tank.current.file: {ambient.end_s:.0f} s of series are left, the flight takes {route.duration_s:.0f} s"
         )
-    passing = []
+    passing, attitudes = [], []
     for time_s in np.linspace(0.0, route.duration_s, looks):
         wished = route.body(float(time_s), parts.aim)
         current = ambient.velocity(wished.X_WB.p_m[None], float(time_s))[0]
         passing.append(current @ wished.X_WB.R - wished.nu_B[:3])
+        attitudes.append(wished.X_WB.q)
     apart = tank.mismatch
-    trim_N = apart.trim_range_N if apart.trim_N is None else apart.trim_N
-    flows, more = np.array(passing), 0.01 * apart.damping_pct
-    drags = (with_drag(vehicle, case) for case in possible_drags(vehicle, apart.drag))
-    held = [h for h in (holding(v, flows, tank.density_kg_m3, trim_N, more) for v in drags) if h is not None]
-    found = min(held, key=lambda h: h.share, default=None)
+    trims_N = (-apart.trim_range_N, apart.trim_range_N) if apart.trim_N is None else (apart.trim_N,)
+    flows, turns, more = np.array(passing), np.array(attitudes), 0.01 * apart.damping_pct
+    drags = [with_drag(vehicle, case) for case in possible_drags(vehicle, apart.drag)]
+    loads = (holding(v, flows, tank.density_kg_m3, trim_N, more, turns) for v in drags for trim_N in trims_N)
+    found = min((load for load in loads if load is not None), key=lambda load: load.share, default=None)
     if found is not None and found.share < 1.0:
         raise InputError(f"tank: {vehicle.name} cannot hold its route, {found.said()}")
     return found

@@ -10,16 +10,23 @@ from scipy.optimize import linprog
 
 from wakewise.arrays import Array, freeze
 from wakewise.errors import InputError, StageError
-from wakewise.geometry import Pose
+from wakewise.geometry import Pose, matrix_from_quat
 from wakewise.tank.settings import TankSettings
-from wakewise.vehicles import RigidBody, Vehicle, allocation_rank, compile_body, damping_wrench
+from wakewise.vehicles import RigidBody, Vehicle, allocation_rank, compile_body, damping_wrench, restoring_wrench
 
 _AXES = ("surge", "sway", "heave")
+_LEVER_M = 0.2
+"""At this lever a moment counts like a force where loads are put in order."""
+_MOST = 10
+_NONE = 1e-6
+MOST_SHARE = 1e6
+_SOME_N, _SOME_N_m = 0.05, 0.005
+"""Weight and moment below these are not worth words."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Holding:
-    """The hardest of the flows that a vehicle was asked to hold against.
+    """The hardest of the loads that a vehicle was asked to hold against: of water that passes, and of its own weight.
 
     Parameters
     ----------
@@ -31,12 +38,18 @@ class Holding:
         The largest multiple of the wrench needed that the thrusters give without turning the vehicle.
     more_drag : float
         Share by which the drag is taken above that of the vehicle's model.
+    heavy_N : float
+        Weight less buoyancy, positive: it sinks.
+    righting_N_m : float
+        Moment by which weight and buoyancy turn the vehicle out of its attitude.
     """
 
     passing_B_m_s: Array
     drag_N: Array
     share: float
     more_drag: float = 0.0
+    heavy_N: float = 0.0
+    righting_N_m: float = 0.0
 
     def __post_init__(self) -> None:
         freeze(self, passing_B_m_s=(3,), drag_N=(3,))
@@ -48,24 +61,48 @@ class Holding:
 
     def said(self) -> str:
         """One line with the figures."""
+        loads = []
         speed = float(np.linalg.norm(self.passing_B_m_s))
         axis = int(np.argmax(np.abs(self.drag_N)))
-        able = self.share * abs(float(self.drag_N[axis]))
-        worst = f" if its drag is {100 * self.more_drag:.0f} % more than believed" if self.more_drag > 0.0 else ""
-        return (
-            f"water that passes at {speed:.2f} m/s drags with {abs(float(self.drag_N[axis])):.1f} N in {_AXES[axis]}"
-            f"{worst}, the thrusters hold {able:.1f} N there (margin {self.margin_pct:+.0f} %)"
-        )
+        drag_N = abs(float(self.drag_N[axis]))
+        weighs = []
+        if abs(self.heavy_N) >= _SOME_N:
+            weighs.append(f"it is up to {abs(self.heavy_N):.1f} N {'heavy' if self.heavy_N > 0.0 else 'light'}")
+        if self.righting_N_m >= _SOME_N_m:
+            weighs.append(f"weight and buoyancy turn it with {self.righting_N_m:.2f} N m")
+        if speed > 0.0 or not weighs:
+            worst = f" if its drag is {100 * self.more_drag:.0f} % more than believed" if self.more_drag > 0.0 else ""
+            loads.append(f"water that passes at {speed:.2f} m/s drags with {drag_N:.1f} N in {_AXES[axis]}{worst}")
+        loads += weighs
+        able = f"{100.0 * self.share:.3g} % of that" if weighs else f"{self.share * drag_N:.1f} N there"
+        return f"{', '.join(loads)}, the thrusters hold {able} (margin {self.margin_pct:+.0f} %)"
 
 
 def holding(
-    vehicle: Vehicle, passing_B_m_s: Array, density_kg_m3: float, trim_N: float = 0.0, more_drag: float = 0.0
+    vehicle: Vehicle,
+    passing_B_m_s: Array,
+    density_kg_m3: float,
+    trim_N: float = 0.0,
+    more_drag: float = 0.0,
+    q_WB: Array | None = None,
 ) -> Holding | None:
-    """Find the hardest flow past the vehicle, shape (n, 3) in body axes, to hold against; None if no water moves.
+    """Find the hardest load to hold against; None if there is none.
 
-    The drag of each, as the vehicle's own model has it and the share `more_drag` on top, and an upward trim must be met
-    by thrusts within their limits that make no other force and no moment but the one that balances drag; how many times
-    over they can is a linear program per current. Only the twenty fastest are looked at.
+    The drag of the water that passes, as the vehicle's own model has it and the share `more_drag` on top, its weight,
+    its buoyancy and an upward trim must be met by thrusts within their limits that make no other force and no other
+    moment; how many times over they can is a linear program per load. Only the ten largest are looked at.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    passing_B_m_s : ndarray, shape (n, 3)
+        Flows past the vehicle, in body axes.
+    density_kg_m3 : float
+    trim_N : float
+        Buoyancy beyond the vehicle's own.
+    more_drag : float
+    q_WB : ndarray, shape (n, 4), optional
+        Attitude at each flow; level if not given.
 
     Raises
     ------
@@ -73,34 +110,68 @@ def holding(
         If a linear program fails.
     """
     body = compile_body(vehicle, density_kg_m3)
-    flows = np.asarray(passing_B_m_s, dtype=np.float64).reshape(-1, 3)
-    order = np.argsort(-np.linalg.norm(flows, axis=1), kind="stable")[:20]
-    # Flows that agree to the millimetre per second are one.
-    some = np.unique(np.round(flows[order], 3), axis=0)
+    flows = np.round(np.asarray(passing_B_m_s, dtype=np.float64).reshape(-1, 3), 3)
+    level = np.array([1.0, 0.0, 0.0, 0.0])
+    attitudes = np.tile(level, (len(flows), 1)) if q_WB is None else np.asarray(q_WB, dtype=np.float64).reshape(-1, 4)
+    cases = [_case(body, flow, q, trim_N, more_drag) for flow, q in zip(flows, attitudes, strict=True)]
+    # Loads that agree to the millinewton are one.
+    different = {tuple(np.round(case.load, 3)): case for case in cases}.values()
+    # A vehicle that cannot make every moment leaves roll and pitch to its weight.
+    kept = list(range(6)) if allocation_rank(vehicle) == 6 else [0, 1, 2, 5]
     hardest: Holding | None = None
-    for flow in some[np.any(some != 0.0, axis=1)]:
-        found = _holding(vehicle, body, flow, trim_N, more_drag)
-        if hardest is None or found.share < hardest.share:
-            hardest = found
+    for case in sorted(different, key=lambda case: -case.size)[:_MOST]:
+        if case.size > _NONE:
+            share = _share(vehicle, case.load, kept)
+            if hardest is None or share < hardest.share:
+                hardest = Holding(
+                    passing_B_m_s=case.flow,
+                    drag_N=case.drag[:3],
+                    share=share,
+                    more_drag=more_drag,
+                    heavy_N=body.weight_N - body.buoyancy_N - trim_N,
+                    righting_N_m=float(np.linalg.norm(case.weighs[3:])),
+                )
     return hardest
 
 
-def _holding(vehicle: Vehicle, body: RigidBody, passing_B_m_s: Array, trim_N: float, more_drag: float) -> Holding:
+@dataclass(frozen=True, eq=False)
+class _Case:
+    """A flow, and the wrenches of shape (6,) that it and the weight put on the vehicle."""
+
+    flow: Array
+    drag: Array
+    weighs: Array
+
+    @property
+    def load(self) -> Array:
+        return self.drag + self.weighs
+
+    @property
+    def size(self) -> float:
+        return float(np.linalg.norm(self.load[:3]) + np.linalg.norm(self.load[3:]) / _LEVER_M)
+
+
+def _case(body: RigidBody, flow: Array, q_WB: Array, trim_N: float, more_drag: float) -> _Case:
     # Water that moves at u past a vehicle at rest drags it as the vehicle's own motion at -u does.
-    drag = (1.0 + more_drag) * damping_wrench(body, np.concatenate([-passing_B_m_s, np.zeros(3)]))
-    load = drag.copy()
-    load[2] -= trim_N
-    n = len(vehicle.thrusters)
+    drag = (1.0 + more_drag) * damping_wrench(body, np.concatenate([-flow, np.zeros(3)]))
+    weighs = restoring_wrench(body, q_WB)
+    weighs[:3] -= trim_N * matrix_from_quat(q_WB)[2]
+    return _Case(flow, drag, weighs)
+
+
+def _share(vehicle: Vehicle, load: Array, kept: list[int]) -> float:
+    """The largest multiple of a load that thrusts within their limits balance, in the axes that are kept."""
+    n, size = len(vehicle.thrusters), float(np.abs(load[kept]).max())
+    if size <= _NONE:
+        return MOST_SHARE
     cost = np.zeros(n + 1)
     cost[n] = -1.0
-    # A vehicle that cannot make every moment leaves roll and pitch to its weight.
-    kept = slice(None) if allocation_rank(vehicle) == 6 else [0, 1, 2, 5]
-    rows = np.hstack([vehicle.allocation_matrix, load[:, None]])[kept]
-    bounds = [*zip(vehicle.thrust_lower_N, vehicle.thrust_upper_N, strict=True), (0.0, 1e6)]
+    rows = np.hstack([vehicle.allocation_matrix, load[:, None] / size])[kept]
+    bounds = [*zip(vehicle.thrust_lower_N, vehicle.thrust_upper_N, strict=True), (0.0, MOST_SHARE)]
     solved = linprog(cost, A_eq=rows, b_eq=np.zeros(len(rows)), bounds=bounds)
     if solved.x is None or not solved.success:
-        raise StageError(f"holding against a current: linear program failed ({solved.message})")
-    return Holding(passing_B_m_s=passing_B_m_s, drag_N=drag[:3], share=float(solved.x[n]), more_drag=more_drag)
+        raise StageError(f"holding a load: linear program failed ({solved.message})")
+    return min(float(solved.x[n]) / size, MOST_SHARE)
 
 
 _BRACKET_M = 0.1  # a cable may be held this far off the hull
