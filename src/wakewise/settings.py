@@ -78,7 +78,7 @@ def describe_faults(
         dotted = ".".join(str(part) for part in fault["loc"]) or whole
         words = None if known is None else known(dotted, fault["input"])
         # Numbers of one list that are wrong in one way are told as one.
-        owner = f"{dotted.rpartition('.')[0]} {fault['type']}" if isinstance([*fault["loc"], ""][-2], int) else dotted
+        owner = f"{dotted.rpartition('.')[0]} {fault['type']}" if isinstance(["", *fault["loc"]][-1], int) else dotted
         if owner in told:
             alike[owner].append(dotted.rpartition(".")[2])
         elif words is None and len(told) >= MOST_FAULTS:
