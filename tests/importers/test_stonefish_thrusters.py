@@ -101,6 +101,21 @@ def test_what_is_not_read_of_actuators_is_named(tmp_path: Path) -> None:
     assert any(n.startswith("QUESTIONED: thruster t: not read: inverted") for n in notes)
 
 
+def test_a_thruster_of_before_the_thrust_models_keeps_its_rule(tmp_path: Path) -> None:
+    """Its specs say inverted; what they hold beside is named as not read."""
+    old = '<specs thrust_coeff="0.45" torque_coeff="0.01" max_rpm="3000" inverted="INVERTED"/>'
+    for right in (True, False):
+        for inverted in (True, False):
+            specs = old.replace("INVERTED", str(inverted).lower())
+            text = (
+                f'<actuator name="t" type="thruster"><link name="Hull"/>{specs}'
+                f'<propeller diameter="0.08" right="{str(right).lower()}"/></actuator>'
+            )
+            draft = robot(tmp_path, text)
+            np.testing.assert_allclose(draft.thrusters[0].axis_B, [1.0 if right != inverted else -1.0, 0, 0])
+            assert any(n.startswith("not read: thrust_coeff and max_rpm of 1 thrusters") for n in draft.notes)
+
+
 PART = (
     '<external_part name="{name}" type="{kind}"><origin xyz="0 0 0.1" rpy="0 0 0"/>{mass}'
     '<compound_transform xyz="{at}" rpy="0 0 0"/></external_part>'

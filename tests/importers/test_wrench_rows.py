@@ -65,6 +65,9 @@ def test_labels_say_what_the_rows_are(tmp_path: Path, labels: str, where: str) -
     text, told = f"tam: {raw}", {}
     if where == "beside":
         text = f"a: {{tam: {raw}, rows: [{labels}]}}"
+    elif where == "keys":
+        rows = [dict(zip(names, column, strict=True)) for column in np.array(raw).T.tolist()]
+        text = f"tam: {json.dumps([{'id': i, **row} for i, row in enumerate(rows)])}"
     elif where == "elsewhere":
         text += f"\nb: {{c: {{order: [{labels}]}}}}"
     elif where == "words":

@@ -13,7 +13,7 @@ from wakewise.importers.layouts import listed_names, read_geometry
 from wakewise.importers.names import vote
 from wakewise.importers.plausible import claims_in, require_count, require_same_count
 from wakewise.importers.thruster_lists import LOOKS_LIKE_THRUSTERS
-from wakewise.importers.wrench_rows import Order, component_in_comment, order_in_comment, order_of, settle
+from wakewise.importers.wrench_rows import Order, component_in_comment, order_in_comment, order_of, order_of_one, settle
 from wakewise.importers.xml import PlacedError
 from wakewise.importers.yaml_parameters import Entries, read_parameters
 from wakewise.importers.yamls import Item
@@ -203,7 +203,8 @@ def _matrix(root: Item, entries: Entries, found: Found, rows: Order | None, *, f
         found.matrix, stated = settle(raw, order, key, item.place if flown else None, found.notes)
         found.matrix_name, found.matrix_line, found.raw_matrix = key, item.place.line, None if stated else raw
         if order is not None and order.throttle:
-            found.frame, found.frame_why = "FRD", f"detected: {key} is of throttle, up, and lateral, to the right"
+            how = "inferred" if order.why.startswith("inferred") else "detected"
+            found.frame, found.frame_why = "FRD", f"{how}: {key} is of throttle, up, and lateral, to the right"
         found.notes.append(f"allocation matrix: {key}, 6 x {n} ({item.place.file.name}:{item.place.line})")
         return True
     return False
@@ -229,6 +230,13 @@ def _numbers(key: str, item: Item, found: Found) -> tuple[Array | None, Order | 
         found.notes.append(f"{key}: six numbers for each of {', '.join(item.table())[:120]}")
         found.column_names = list(item.table())
         return np.stack([column.numbers(f"{name} of {key}", 6) for name, column in item.table().items()]), None
+    members = item.items() or list(item.table().values())
+    tables = [{name: v for name, v in m.table().items() if order_of_one(name)} for m in members]
+    alike = {tuple(table) for table in tables}
+    order = order_of(next(iter(alike)), f"keys of each thruster in {key}") if len(alike) == 1 else None
+    if order is not None:
+        found.column_names = list(item.table())
+        return np.array([[v.scalar(f"{name} of {key}") for name, v in table.items()] for table in tables]), order
     if item.items():
         found.notes.append(
             f"{QUESTION}{key} is not read, neither rows nor columns of numbers ({item.place.file.name}:"

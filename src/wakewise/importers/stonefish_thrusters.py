@@ -65,6 +65,13 @@ def read_thrusters(robot: Element, bodies: Bodies, density: float | None, found:
         if link is not None and short(link.attributes.get("name", "")) in {short(name) for name in turning}:
             steered.append(found.thrusters[-1].name)
     question_steered(steered, found)
+    old = sum(
+        actuator.first("thrust_model") is None and specs is not None and "max_rpm" in specs.attributes
+        for actuator in robot.all("actuator")
+        if (specs := actuator.first("specs")) is not None and actuator.attributes.get("type") == "thruster"
+    )
+    if old:
+        found.notes.append(f"not read: thrust_coeff and max_rpm of {old} thrusters in the form before thrust models")
     found.thrust_rule = "; ".join(dict.fromkeys(rules)) or RULE
     if others:
         said = ", ".join(f"{n} of type {kind[:40] or 'unknown'}" for kind, n in others.items())

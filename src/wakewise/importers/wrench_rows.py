@@ -64,6 +64,11 @@ def order_of(labels: Sequence[str], why: str = "") -> Order | None:
     return Order(places, "throttle" in plain, ", ".join(label.strip() for label in labels), why)
 
 
+def order_of_one(label: str) -> bool:
+    """Whether a name is one of the six's."""
+    return re.sub(r"[^a-z]", "", label.lower()) in _COMPONENT
+
+
 def told_order(rows: str | None) -> Order | None:
     """Order of the option `--rows`.
 
