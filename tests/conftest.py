@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,14 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from sharing import next_file, room_of
+
+os.environ.setdefault("WAKEWISE_STRICT", "1")  # a mistake of the program fails a test; it is not flown around
+
+
+@pytest.fixture
+def fallbacks_fly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Guards fly a fallback whatever is raised, as they do where no test is watching."""
+    monkeypatch.setenv("WAKEWISE_STRICT", "0")
 
 
 def pytest_collection_finish() -> None:

@@ -39,6 +39,20 @@ class FileFailure(EnvironmentFailure, OSError):  # noqa: N818  (as above)
         return f"{where}{self.strerror}"
 
 
+STRICT = "WAKEWISE_STRICT"
+"""Environment variable: with 1, guards raise mistakes of the program instead of flying a fallback."""
+
+
+def is_strict() -> bool:
+    """Whether guards of simulated flights raise what is no error of Wakewise (WAKEWISE_STRICT=1).
+
+    A guard keeps a vehicle in the water under control whatever a controller or planner raises. In a simulation that
+    hides mistakes: the flight goes on with the fallback. Where a world does not wait, as with a real vehicle, the
+    variable is not heeded.
+    """
+    return os.environ.get(STRICT, "0").strip() not in ("", "0")
+
+
 FULL = "the disk is full"
 NO_MEMORY = "out of memory"
 _WORDS = dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), FULL) | {errno.ENOMEM: NO_MEMORY}

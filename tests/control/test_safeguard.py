@@ -11,6 +11,8 @@ from wakewise.geometry import Pose
 from wakewise.interfaces import BodyState, Command, Goal
 from wakewise.vehicles import load_vehicle
 
+pytestmark = pytest.mark.usefixtures("fallbacks_fly")
+
 VEHICLE = load_vehicle("paper")
 SETTINGS = ControlSettings()
 HERE = BodyState(X_WB=Pose(np.zeros(3)), load_B=np.array([0.0, 0.0, 2.0, 0.0, 0.0, 0.0]))

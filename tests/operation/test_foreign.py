@@ -12,6 +12,8 @@ from wakewise.control import make_controller
 from wakewise.errors import StageError
 from wakewise.operation.foreign import Guarded, described
 
+pytestmark = pytest.mark.usefixtures("fallbacks_fly")
+
 SECONDS = 0.4
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,7 +16,7 @@ from wakewise.cli.bench_worlds import show_worlds
 from wakewise.cli.console import Bars, print_json, shown, write_page
 from wakewise.cli.options import Json
 
-Name = Annotated[str, typer.Argument(help="Which bench; without a name, all of them.", show_default=False)]
+Name = Annotated[str, typer.Argument(help="Which bench, or all; without a name they are listed.", show_default=False)]
 Data = Annotated[
     Path, typer.Option(help="Folder of reference data that some figures are held against.", envvar="WAKEWISE_DATA")
 ]
@@ -89,6 +91,10 @@ _SEEDS = {"gentle": 3, "operator": 3}
 """Seeds of a bench that flies, if not given; 10 of the others."""
 
 
+_LASTS = {"gentle": "hours", "operator": "hours", "worlds": "hours"}
+"""About how long a bench runs on two free cores, where it is not minutes at most."""
+
+
 def bench(
     name: Name = "",
     data: Data = Path("../shared/data"),
@@ -114,7 +120,7 @@ def bench(
     that was stopped goes on where it was.
     """
     from wakewise.benches import BENCHES, run_bench
-    from wakewise.errors import InputError
+    from wakewise.errors import STRICT, InputError
     from wakewise.extras import need
     from wakewise.trials import BenchOptions
 
@@ -124,7 +130,11 @@ def bench(
         need("--plot", "reports")
         if plot.suffix.lower() not in (".png", ".svg", ".pdf"):
             raise InputError(f"--plot {plot}: ending '{plot.suffix}', allowed .png, .svg, .pdf")
-    names = [name] if name else sorted(BENCHES)
+    os.environ.setdefault(STRICT, "1")  # a mistake of the program ends a measurement; a fallback is not measured
+    if not name:
+        _list(BENCHES, json)
+        return
+    names = sorted(BENCHES) if name == "all" else [name]
     results: dict[str, Any] = {}
     bars = Bars()
     for each in names:
@@ -157,7 +167,7 @@ def bench(
         draw = {"gentle": draw_gentle, "operator": draw_operator}[name]
         write_page("plot", lambda: draw(results[name], plot))
     if json:
-        print_json(results[name] if name else results)
+        print_json(results if name == "all" else results[name])
         return
     for each, result in results.items():
         typer.echo(f"\n{each}: {BENCHES[each]}")
@@ -171,6 +181,18 @@ def bench(
             show_traps(result)
         else:
             _show(result, "  ")
+
+
+def _list(benches: Mapping[str, str], json: bool) -> None:
+    """Say which benches there are and how long they take, and run none."""
+    lasts = {name: _LASTS.get(name, "minutes") for name in benches}
+    if json:
+        print_json({"benches": {name: {"what": what, "lasts": lasts[name]} for name, what in benches.items()}})
+        return
+    width = max(map(len, benches))
+    for name, what in sorted(benches.items()):
+        typer.echo(f"{name:<{width}}  {lasts[name]:<7}  {what}")
+    typer.echo("\nwakewise bench NAME runs one, wakewise bench all runs all of them, one after another: many hours")
 
 
 def _listed(text: str) -> tuple[str, ...] | None:

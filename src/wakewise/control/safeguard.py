@@ -8,11 +8,11 @@ these fail, too, the thrusts last sent, fading. Every trouble is counted by its 
 `Command.fallback`.
 
 The clock. A simulated world waits for its controller; there an answer is counted as late by the solving thread's own
-time and flown all the same, and `Command.fallback` says nothing of it, so that one seed gives one flight on every
-machine. Where the world does not wait, `enforce` is on: the method works in a thread of its own, and when the period
-is over the backup's thrusts go out. What it then answers is too old to be flown; the state it leaves is taken, and it
-is asked again at the step after. A compiled kernel is not interrupted, so that an answer may be as much later as the
-longest of them takes (a millisecond or two).
+time and flown all the same, and `Command.fallback` says nothing of it, so that one seed gives one flight on one kind
+of processor. Where the world does not wait, `enforce` is on: the method works in a thread of its own, and when the
+period is over the backup's thrusts go out. What it then answers is too old to be flown; the state it leaves is taken,
+and it is asked again at the step after. A compiled kernel is not interrupted, so that an answer may be as much later
+as the longest of them takes (a millisecond or two).
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from wakewise.control.loop import HOLD_S, vehicle_layout
 from wakewise.control.settings import ControlSettings
 from wakewise.control.tracker import Tracker, TrackerState, make_tracker
 from wakewise.control.watch import FULL
+from wakewise.errors import WakewiseError, is_strict
 from wakewise.interfaces import BodyState, Command, Controller, Goal
 from wakewise.vehicles import Vehicle
 
@@ -77,6 +78,10 @@ class Safeguard:
         Seconds; by default the solving thread's where the world waits, the wall's where it does not.
     counts : dict
         How often each kind of trouble was met: "failed", "not finite", "limits", "late", "held", "afresh".
+    strict : bool, optional
+        Whether an exception that is no `WakewiseError`, or an answer of the wrong kind, is raised instead of counted:
+        both are mistakes of the program. By default as `wakewise.errors.is_strict` says, and never where `enforce` is
+        on: a vehicle in the water keeps its thrusts.
     """
 
     inner: Controller[Any]
@@ -85,8 +90,13 @@ class Safeguard:
     enforce: bool = False
     clock: Callable[[], float] | None = None
     counts: dict[str, int] = field(default_factory=dict)
+    strict: bool | None = None
     _worker: ThreadPoolExecutor | None = None
     _pending: Future[tuple[Any, Command]] | None = None
+
+    def __post_init__(self) -> None:
+        if self.strict is None:
+            self.strict = is_strict() and not self.enforce
 
     @property
     def name(self) -> str:
@@ -132,6 +142,8 @@ class Safeguard:
             return self._ask_in_time(state, dt_s, estimate, goal)
         except Exception as fault:  # whatever is raised in a control step must not leave the vehicle without thrusts
             self._pending = None
+            if self.strict and not isinstance(fault, WakewiseError):
+                raise
             return state.inner, None, ("failed", f"{self.name} failed: {type(fault).__name__}: {fault}")
 
     def _ask_in_time(
@@ -158,7 +170,10 @@ class Safeguard:
     def _judge(self, command: object) -> tuple[str, str] | None:
         lower, upper = self.layout.lower_N, self.layout.upper_N
         if not isinstance(command, Command) or command.thrusts_N.shape != lower.shape:
-            return "failed", f"{self.name} failed: must answer a Command of {len(lower)} thrusts"
+            words = f"{self.name} failed: must answer a Command of {len(lower)} thrusts"
+            if self.strict:
+                raise TypeError(words)
+            return "failed", words
         thrusts = command.thrusts_N
         if not np.isfinite(thrusts).all():
             return "not finite", f"{self.name}: thrusts not finite"
@@ -177,6 +192,8 @@ class Safeguard:
             sent = Command(thrusts_N=found.thrusts_N, wrench_B=wrench, fallback=f"{why}; least thrusts")
             return replace(state, tracker=tracker, thrusts_N=found.thrusts_N, share=found.scale), sent
         except Exception as fault:  # as in `_ask`
+            if self.strict and not isinstance(fault, WakewiseError):
+                raise
             words = self._count("held", f"{why}; holding the last thrusts, fading ({type(fault).__name__})")
         thrusts = state.thrusts_N * np.exp(-dt_s / HOLD_S)
         return replace(state, thrusts_N=thrusts), Command(thrusts_N=thrusts, wrench_B=np.zeros(6), fallback=words)
@@ -190,9 +207,21 @@ class Safeguard:
 
 
 def safeguarded(
-    controller: Controller[Any], vehicle: Vehicle, settings: ControlSettings, *, enforce: bool = False
+    controller: Controller[Any],
+    vehicle: Vehicle,
+    settings: ControlSettings,
+    *,
+    enforce: bool = False,
+    strict: bool | None = None,
 ) -> Safeguard:
-    """A method with a guard round each step; `enforce` where the world does not wait for its controller."""
+    """A method with a guard round each step; `enforce` where the world does not wait for its controller.
+
+    `strict` as in `Safeguard`.
+    """
     return Safeguard(
-        inner=controller, tracker=make_tracker(vehicle, settings), layout=vehicle_layout(vehicle), enforce=enforce
+        inner=controller,
+        tracker=make_tracker(vehicle, settings),
+        layout=vehicle_layout(vehicle),
+        enforce=enforce,
+        strict=strict,
     )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wakewise.control import MAKERS, make_controller, safeguarded
+from wakewise.errors import WakewiseError, is_strict
 from wakewise.interfaces import BodyState, Command, Controller, Goal
 from wakewise.operation.pilots import PILOTS
 from wakewise.operation.worlds.makers import WORLDS, flow_name
@@ -85,7 +86,7 @@ class Guarded:
     A step that raises, or whose thrusts are not finite or not one per thruster, is flown by the backup instead and
     counted as a fallback with its reason. One that takes longer than its period is flown, since a simulated world
     waits, and counted; after `patience_s` of such waiting the backup flies the rest. Thrusts beyond the thrusters'
-    limits are cut.
+    limits are cut. If it is `strict`, what the controller raises is raised instead, unless it is an error of Wakewise.
     """
 
     name: str
@@ -95,6 +96,7 @@ class Guarded:
     upper_N: np.ndarray
     backup: Callable[[], Controller[Any]]
     patience_s: float = PATIENCE_S
+    strict: bool = False
     clock: Callable[[], float] = time.perf_counter
     _made: list[Controller[Any]] = field(default_factory=list)
 
@@ -103,6 +105,8 @@ class Guarded:
         try:
             return GuardedState(inner=self.inner.init(), backup=None)
         except Exception as fault:  # whatever a foreign controller raises must not end the flight
+            if self.strict and not isinstance(fault, WakewiseError):
+                raise
             return GuardedState(inner=None, backup=None, gave_up=f"{self.name}: init raised {_said(fault)}")
 
     def step(self, state: GuardedState, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[GuardedState, Command]:
@@ -114,6 +118,8 @@ class Guarded:
             inner, command = self.inner.step(state.inner, dt_s, estimate, goal)
             trouble = self._trouble(command)
         except Exception as fault:  # see above
+            if self.strict and not isinstance(fault, WakewiseError):
+                raise
             inner, command, trouble = state.inner, None, f"{self.name}: raised {_said(fault)}"
         # What is compiled or read on the first step is not the controller's pace.
         took_s = 0.0 if state.first else self.clock() - began
@@ -171,6 +177,7 @@ def guarded(parts: Parts) -> Controller[Any]:
         lower_N=vehicle.thrust_lower_N,
         upper_N=vehicle.thrust_upper_N,
         backup=backup,
+        strict=is_strict() and getattr(parts.world, "waits", True),
     )
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from wakewise.arrays import Array
-from wakewise.errors import InputError, WakewiseError
+from wakewise.errors import InputError, WakewiseError, is_strict
 from wakewise.planning.planner import Planner
 from wakewise.planning.problem import CLEARANCE_M, Horizon, PlanProblem, shifted
 from wakewise.planning.surroundings import Surroundings
@@ -57,6 +57,9 @@ class Guard:
     enforce : bool
         Whether a late plan is left out. A simulated world waits for its controller; there a late plan is counted and
         flown, so that the same seed gives the same flight whether or not the machine was busy or had to compile.
+    strict : bool, optional
+        Whether an exception that is no `WakewiseError`, a mistake of the program, is raised instead of counted. By
+        default as `wakewise.errors.is_strict` says, and never where `enforce` is on.
     """
 
     planner: Planner
@@ -64,6 +67,11 @@ class Guard:
     clock: Callable[[], float] = time.perf_counter
     counts: dict[str, int] = field(default_factory=dict)
     enforce: bool = True
+    strict: bool | None = None
+
+    def __post_init__(self) -> None:
+        if self.strict is None:
+            self.strict = is_strict() and not self.enforce
 
     def count(self, kind: str, words: str) -> str:
         """Count and log a trouble; returns its words."""
@@ -85,6 +93,8 @@ class Guard:
         except WakewiseError as error:
             plan, trouble = None, ("refused", f"plan refused: {error}")
         except Exception as error:
+            if self.strict:
+                raise
             plan, trouble = None, ("failed", f"planner failed: {type(error).__name__}: {error}")
         if trouble is None and self.clock() - began > self.deadline_s:
             words = f"plan late: {1e3 * (self.clock() - began):.0f} ms of {1e3 * self.deadline_s:.0f} allowed"
