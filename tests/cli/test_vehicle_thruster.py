@@ -32,7 +32,7 @@ def test_a_curve_is_shown_to_machines(capsys: pytest.CaptureFixture[str], tmp_pa
 
 
 def test_a_curve_is_shown_to_people(capsys: pytest.CaptureFixture[str]) -> None:
-    run("thruster", "--thrust", "99")
+    run("thruster", "--thrust", "51.44")
     shown = capsys.readouterr().out
     assert "t200 at 16 V (table: 10, 12, 14, 16, 20 V)" in shown
     assert "no thrust from 1472 to 1528 us" in shown
@@ -78,6 +78,10 @@ def test_a_lag_is_found_in_a_file(capsys: pytest.CaptureFixture[str], tmp_path: 
         (["thruster", "nowhere.csv"], "no such file"),
         (["thruster", "--supply-V", "42"], "the table holds 10 to 20 V"),
         (["thruster", "--thrust", "nan"], "must be finite"),
+        (["thruster", "--thrust", "500"], "wished thrust: 500 N, t200 at 16 V gives -39.91 to 51.44 N"),
+        (["thruster", "--thrust", "5", "--thrust", "-40"], "wished thrust: -40 N"),
+        (["thruster", "--thrust", "inf"], "wished thrust: inf N"),
+        (["thruster", "--pwm", "2500"], "pulse: 2500 us, t200 at 16 V gives 1100 to 1900 us"),
         (["lag", "nowhere.csv"], "no such file"),
     ],
 )

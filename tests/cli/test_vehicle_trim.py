@@ -1,6 +1,7 @@
 """`wakewise vehicle trim`: from a flight to the ballast of the next, for a known weight, and what is refused."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -91,3 +92,19 @@ def test_a_weight_that_is_known_asks_for_floats(capsys: Capsys) -> None:
     told = json.loads(capsys.readouterr().out)
     assert told["net_buoyancy_N"] == pytest.approx(-4.0, abs=0.01) and told["unknown_trim_N"] == 0.5
     assert told["advice"].startswith("add floats of") and told["best"]["thrust_N"] < told["now"]["thrust_N"]
+
+
+def test_the_advice_names_figures_that_stand_in_the_table(capsys: Capsys, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its thrusts are those of the cells marked now and advised; no two rows have one name, and no zero has a sign."""
+    monkeypatch.setenv("COLUMNS", "200")
+    assert run(["vehicle", "trim", "bluerov2-heavy"]) == 0
+    shown = capsys.readouterr().out
+    speeds, thrusts, *_ = re.split(r"^(?=.*(?:thrust to hold|of it down))", shown, flags=re.MULTILINE)
+    found = re.search(r"([\d.]+) to ([\d.]+) N of thrust.*, ([\d.]+) to ([\d.]+) mm/s", shown)
+    assert found is not None
+    for table, now, advised in ((thrusts, found[1], found[2]), (speeds, found[3], found[4])):
+        assert float(re.findall(r"now: ([\d.]+)", table)[0]) == pytest.approx(float(now), abs=0.06)
+        assert float(re.findall(r"advised: ([\d.]+)", table)[0]) == pytest.approx(float(advised), abs=0.06)
+        rows = re.findall(r"^\S\s+([+-]\d+\.\d+)\s", table, flags=re.MULTILINE)
+        assert len(rows) == len(set(rows)) > 4
+    assert not re.search(r"-0\.0+\b", shown)

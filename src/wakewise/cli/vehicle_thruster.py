@@ -68,10 +68,10 @@ def thruster(
         return
     voltages = ", ".join(f"{value:g}" for value in facts["voltages_V"])
     typer.echo(f"{facts['name']} at {facts['supply_V']:g} V (table: {voltages} V)")
-    typer.echo(f"limits {facts['limits_N'][0]:.2f} to {facts['limits_N'][1]:+.2f} N")
+    typer.echo(f"limits {facts['limits_N'][0]:z.2f} to {facts['limits_N'][1]:+z.2f} N")
     typer.echo(f"no thrust from {facts['deadband_us'][0]:g} to {facts['deadband_us'][1]:g} us, both included")
     low, high = facts["first_step_N"]
-    typer.echo(f"smallest thrusts held {low:.2f} and {high:+.2f} N; a smaller wish becomes that or none, by half")
+    typer.echo(f"smallest thrusts held {low:z.2f} and {high:+z.2f} N; a smaller wish becomes that or none, by half")
     _print_rows("curve", facts["table"])
     if facts["thrusts"]:
         _print_rows("for wished thrusts", facts["thrusts"], wished=True)
@@ -126,7 +126,8 @@ def _print_rows(title: str, rows: list[dict[str, Any]], *, wished: bool = False)
     for row in rows:
         figures = [row["pwm_us"], row["thrust_N"], row["rpm"], row["power_W"]]
         cells = [
-            "—" if value is None else f"{value:.{digits}f}" for value, digits in zip(figures, (0, 2, 0, 1), strict=True)
+            "—" if value is None else f"{value:z.{digits}f}"
+            for value, digits in zip(figures, (0, 2, 0, 1), strict=True)
         ]
-        printed.add_row(*((f"{row['wished_N']:.2f}",) if wished else ()), *cells)
+        printed.add_row(*((f"{row['wished_N']:z.2f}",) if wished else ()), *cells)
     print_table(printed)

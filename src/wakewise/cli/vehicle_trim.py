@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from wakewise.cli.console import print_json, print_table
 from wakewise.cli.options import Json
+
+if TYPE_CHECKING:
+    from wakewise.control.trim import TrimAdvice, TrimRow
 
 Vehicle = Annotated[
     str | None, typer.Argument(help="Library name or vehicle file; paper if not given.", show_default=False)
@@ -106,8 +110,6 @@ def _for_mission(
     vehicle: str, scenario: Path | None, net_weight: float | None, known_to: float | None, json: bool
 ) -> None:
     """Trim by the wake model over a mission's poses."""
-    import numpy as np
-
     from wakewise.control import LeverSettings
     from wakewise.control.trim import trim_advice
     from wakewise.operation import load_scenario
@@ -143,24 +145,36 @@ def _for_mission(
             }
         )
         return
+    where = f"{len(poses)} poses, trim known to {unknown_N:g} N"
+    _print_ballasts(
+        f"{body.title}: water speed at the target in mm/s (by the wake model), {where}", advice, _speed_mm_s
+    )
+    _print_ballasts(f"thrust to hold its poses in N, {where}", advice, lambda row: row.thrust_N)
+    _print_ballasts("of it down in N", advice, lambda row: row.down_N)
+    typer.echo(f"advice: {advice.words}")
+    typer.echo(advice.wake_words)
+
+
+def _speed_mm_s(row: TrimRow) -> float:
+    return 1e3 * row.speed_m_s
+
+
+def _print_ballasts(title: str, advice: TrimAdvice, value: Callable[[TrimRow], float]) -> None:
+    """A figure of each ballast, by net buoyancy and centre of gravity; what is now and what is advised are marked."""
     from rich.table import Table
 
     shifts = sorted({row.shift_mm for row in advice.rows})
-    table = Table(
-        title=f"{body.title}: water speed at the target in mm/s (by the wake model), {len(poses)} poses, "
-        f"trim known to {unknown_N:g} N",
-        title_justify="left",
-    )
+    table = Table(title=title, title_justify="left")
     table.add_column("floats with N", justify="right")
     for shift in shifts:
-        table.add_column(f"CG {shift:+.0f} mm", justify="right")
-    table.add_column("thrust N", justify="right")
-    table.add_column("of it down N", justify="right")
+        table.add_column(f"CG {shift:+z.0f} mm", justify="right")
     for float_N in sorted({row.float_N for row in advice.rows}):
-        rows = [row for row in advice.rows if row.float_N == float_N]
-        cells = [f"{1e3 * row.speed_m_s:.2f}" for row in sorted(rows, key=lambda row: row.shift_mm)]
-        thrusts = (f"{np.mean([getattr(row, name) for row in rows]):.2f}" for name in ("thrust_N", "down_N"))
-        table.add_row(f"{float_N:+.1f}", *cells, *thrusts)
+        found = {row.shift_mm: row for row in advice.rows if row.float_N == float_N}
+        cells = (f"{_mark(advice, found[shift])}{value(found[shift]):z.2f}" for shift in shifts)
+        table.add_row(f"{float_N:+z.2f}", *cells)
     print_table(table)
-    typer.echo(f"advice: {advice.words}")
-    typer.echo(advice.wake_words)
+
+
+def _mark(advice: TrimAdvice, row: TrimRow) -> str:
+    marks = [word for word, one in (("now", advice.now), ("advised", advice.best)) if row == one]
+    return f"{', '.join(marks)}: " if marks else ""

@@ -40,6 +40,8 @@ FLOATS_N = (-2.0, -1.0, 0.0, 0.5, 1.0, 1.5, 2.0, 3.0)
 """Net buoyancies looked at, positive floats."""
 SHIFTS_MM = (-3.0, 0.0, 3.0, 6.0, 9.0)
 """Shifts of the centre of gravity along the vehicle looked at, positive forward."""
+NEARLY_N = 0.05
+"""Net buoyancies nearer to the vehicle's own than this are not looked at beside it."""
 NEAR = 1.25
 """Ballasts with at most this many times the least mean speed are as good as the best."""
 
@@ -77,7 +79,7 @@ class TrimAdvice:
             return "leave the ballast as it is"
         parts = []
         if change != 0.0:
-            parts.append(f"{'add floats' if change > 0.0 else 'add lead'} of {abs(change):.1f} N")
+            parts.append(f"{'add floats' if change > 0.0 else 'add lead'} of {abs(change):.2f} N")
         if self.best.shift_mm != self.now.shift_mm:
             where = "forward" if self.best.shift_mm > self.now.shift_mm else "aft"
             parts.append(f"move the centre of gravity {abs(self.best.shift_mm - self.now.shift_mm):.0f} mm {where}")
@@ -147,7 +149,8 @@ def trim_advice(
     own = believed - net_weight_N
     force_W = np.zeros(3) if current_N is None else np.asarray(current_N, dtype=np.float64)
     errors = (-unknown_N, 0.0, unknown_N) if unknown_N > 0.0 else (0.0,)
-    buoyancies = sorted({*floats_N, unknown_N, round(own, 6)})
+    kept = {round(own, 6), unknown_N}
+    buoyancies = sorted(kept | {given for given in floats_N if min(abs(given - own) for own in kept) >= NEARLY_N})
     rows = tuple(
         _row(vehicle, poses, grams, view, weights, force_W, errors, float_N - believed, shift_mm, float_N)
         for float_N, shift_mm in product(buoyancies, sorted({*shifts_mm, 0.0}))

@@ -8,11 +8,14 @@ from typing import Any
 import numpy as np
 
 from wakewise.arrays import Array
+from wakewise.errors import InputError
 from wakewise.thrusters.lag_fit import LagFit
 from wakewise.thrusters.rotor_lag import SecondOrderLag
 from wakewise.thrusters.thrust_curve import ThrustCurve
 
 ROWS_PER_SIDE = 6
+_ROUNDING = 0.005
+"""So far beyond its limits a value may be, since they are printed rounded."""
 USUAL_SUPPLY_V = 16.0
 """Four lithium cells when full enough; the voltage that makers of small thrusters quote."""
 
@@ -30,10 +33,12 @@ def curve_facts(
     Raises
     ------
     InputError
-        If the voltage lies outside the table or a wished value is not finite.
+        If the voltage lies outside the table, or a wished value is not finite or beyond what the table holds.
     """
     at = curve.voltage(supply_V)
     low, high = curve.limits_N(at)
+    _within(curve, at, "wished thrust", thrusts_N, (low, high), "N")
+    _within(curve, at, "pulse", pulses_us, curve.pulse_limits_us(at), "us")
     first_low, first_high = curve.first_step_N(at)
     steps = np.linspace(0.0, 1.0, ROWS_PER_SIDE)
     thrusts = np.concatenate([low + steps * (first_low - low), [0.0], first_high + steps * (high - first_high)])
@@ -66,6 +71,18 @@ def curve_facts(
         "notes": list(curve.notes),
         "why": why,
     }
+
+
+def _within(
+    curve: ThrustCurve, supply_V: float, what: str, values: Sequence[float], limits: tuple[float, float], unit: str
+) -> None:
+    """Refuse a question that the table does not answer; in a flight a thruster saturates there."""
+    low, high = limits
+    for value in values:
+        if value < low - _ROUNDING or value > high + _ROUNDING:
+            raise InputError(
+                f"{what}: {value:g} {unit}, {curve.name} at {supply_V:g} V gives {low:.4g} to {high:.4g} {unit}"
+            )
 
 
 def lag_facts(fit: LagFit) -> dict[str, Any]:
