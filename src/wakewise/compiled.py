@@ -1,7 +1,8 @@
 """`njit` as the kernels of this package use it: compiled by Numba, or run as the Python that they are written in.
 
 Numba has nothing for 32-bit computers such as the one in a BlueROV2. What is small enough to be interpreted, such as
-the gentle meter (`wakewise.meter`), runs there from the same lines; everything else would be far too slow.
+the gentle meter (`wakewise.meter`), runs there from the same lines; everything else would be far too slow. With
+NUMBA_DISABLE_JIT=1 kernels are run so where there is a Numba, too: for a debugger, or to see which lines a test runs.
 """
 
 from __future__ import annotations
@@ -12,9 +13,9 @@ from typing import Any
 __all__ = ["COMPILED", "assign", "assign_rows", "njit", "prange"]
 
 try:
-    from wakewise.numba_kernels import njit, prange
+    from wakewise.numba_kernels import JIT, njit, prange
 
-    COMPILED = True
+    COMPILED = JIT
 except ModuleNotFoundError as fault:
     if (fault.name or "").partition(".")[0] not in {"numba", "llvmlite"}:
         raise

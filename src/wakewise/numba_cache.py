@@ -10,11 +10,16 @@ import os
 import stat
 import sys
 import tempfile
-from collections.abc import Callable, MutableMapping
+from collections.abc import Callable, Mapping, MutableMapping
 from pathlib import Path
 
 VARIABLE = "NUMBA_CACHE_DIR"
 CanWrite = Callable[[Path], bool]
+
+
+def is_interpreted(environment: Mapping[str, str] = os.environ) -> bool:
+    """Whether Numba is told to compile nothing (NUMBA_DISABLE_JIT=1)."""
+    return environment.get("NUMBA_DISABLE_JIT", "0").strip() not in ("", "0")
 
 
 def keep_kernels(

@@ -32,6 +32,9 @@ _ARRAY = re.compile(r"(const )?(\w+)\[(\d)([CFA])\]")
 
 TypeWords = str | list[Any] | dict[str, list[Any]]
 
+JIT = not numba.config.DISABLE_JIT
+"""Whether Numba compiles: not with NUMBA_DISABLE_JIT=1, where kernels run as the Python that they are written in."""
+
 prange = numba.prange
 types: Any = numba.types
 
@@ -51,6 +54,8 @@ def njit(function: Callable[..., Any] | None = None, *, apart: bool = False, **o
     def decorate(work: Callable[..., Any]) -> Any:
         if apart and "<locals>" in work.__qualname__:
             raise ValueError(f"kernel {work.__qualname__}: only a module's own kernel can stand apart")
+        if not JIT:
+            return work
         # No kernel is handed to C as a callback, and what that takes is a share of each compilation.
         kernel = numba.njit(**{"error_model": "numpy", "no_cfunc_wrapper": True} | options)(work)
         kernel._cache = KernelCache(work)  # as Dispatcher.enable_caching does it with Numba's own

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from wakewise.errors import InputError
-from wakewise.numba_cache import VARIABLE, can_be_written, user_cache
+from wakewise.numba_cache import VARIABLE, can_be_written, is_interpreted, user_cache
 
 TypeWords = str | list[Any] | dict[str, list[Any]]
 LIST = Path(__file__).with_name("kernels.json")
@@ -86,8 +86,8 @@ def of_jobs(jobs: Iterable[str]) -> tuple[Listed, ...]:
 
 
 def is_warm(jobs: Sequence[str] = JOBS) -> bool:
-    """Whether the jobs were done with the sources, and the Numba, that are here now."""
-    return all(_note(job).exists() for job in jobs if of_jobs([job]))
+    """Whether the jobs were done with the sources, and the Numba, that are here now; nothing is to be done without."""
+    return is_interpreted() or all(_note(job).exists() for job in jobs if of_jobs([job]))
 
 
 _tried: set[str] = set()

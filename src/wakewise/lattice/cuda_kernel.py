@@ -22,7 +22,7 @@ WARP = 32
 
 _collide = cuda.jit(device=True, fastmath=True)(collide)
 _forced = cuda.jit(device=True)(collide_forced)
-_beyond = cuda.jit(device=True, fastmath=True)(pull_beyond.py_func)
+_beyond = cuda.jit(device=True, fastmath=True)(getattr(pull_beyond, "py_func", pull_beyond))
 
 
 def pitch(nz: int) -> int:

@@ -11,6 +11,7 @@ An ordinary store first fetches the line of cache that it will overwrite, a thir
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
@@ -18,10 +19,17 @@ from numba import types
 from numba.core.typing.templates import Signature
 from numba.extending import intrinsic
 
+from wakewise.compiled import COMPILED
+
 LINE = 16
 """Populations in a line of cache."""
 
 _Intrinsic = tuple[Signature, Any]
+
+
+def _word(plain: Callable[..., Any]) -> Callable[[Any], Any]:
+    """A word for kernels; in those that are interpreted `plain` stands for it."""
+    return lambda made: intrinsic(made) if COMPILED else plain
 
 
 def _place(context: Any, builder: ir.IRBuilder, signature: Signature, arguments: Any, which: int) -> Any:
@@ -35,7 +43,7 @@ def _peeked(module: ir.Module) -> Any:
     return module.add_metadata([module.add_metadata(["wakewise lattice: peeked", domain])])
 
 
-@intrinsic
+@_word(lambda array, at: array[at])
 def peek(_: Any, array: Any, at: Any) -> _Intrinsic:
     """array[at], float32 in one dimension, `at` not negative; nothing in the function pokes it."""
 
@@ -47,7 +55,7 @@ def peek(_: Any, array: Any, at: Any) -> _Intrinsic:
     return types.float32(array, at), generate
 
 
-@intrinsic
+@_word(lambda array, at, value: array.__setitem__(at, value))
 def poke(_: Any, array: Any, at: Any, _value: Any) -> _Intrinsic:
     """array[at] = value; nothing in the function peeks it."""
 
@@ -73,19 +81,23 @@ def _copy(past_caches: bool) -> Any:
     return generate
 
 
-@intrinsic
+def _copied(into: Any, at: int, source: Any, start: int) -> None:
+    into[at : at + LINE] = source[start : start + LINE]
+
+
+@_word(_copied)
 def copy_line(_: Any, into: Any, at: Any, source: Any, start: Any) -> _Intrinsic:
     """Write source[start : start + 16] to into[at : at + 16]."""
     return types.void(into, at, source, start), _copy(past_caches=False)
 
 
-@intrinsic
+@_word(_copied)
 def stream_line(_: Any, into: Any, at: Any, source: Any, start: Any) -> _Intrinsic:
     """`copy_line` past the caches; into[at] must begin a line."""
     return types.void(into, at, source, start), _copy(past_caches=True)
 
 
-@intrinsic
+@_word(lambda: None)
 def settle_stores(_: Any) -> _Intrinsic:
     """Wait until all that was streamed can be read by other cores."""
 
