@@ -1,5 +1,6 @@
 """Calibration from drawn boards with a known camera; what is no board is told."""
 
+import json
 import os
 from pathlib import Path
 
@@ -7,18 +8,23 @@ import cv2
 import numpy as np
 import pytest
 
+from wakewise.cli.main import run
 from wakewise.errors import InputError, StageError
-from wakewise.reconstruction import Board, calibrate
+from wakewise.reconstruction import Board, calibrate, read_lens
+from wakewise.reconstruction.calibration import APRILTAG, board_detector
 
 DATA = Path(os.environ.get("WAKEWISE_DATA", Path(__file__).parents[3] / "shared" / "data"))
 BOARD = Board(columns=7, rows=5, square_m=0.03, marker_m=0.022)
 K = np.array([[700.0, 0, 319.5], [0, 700.0, 239.5], [0, 0, 1]])
 
 
-def draw(folder, turns):
+TURNS = [(0, 25, 0), (25, 0, 10), (-25, 10, 0), (10, -28, -15), (-18, -18, 5), (20, 20, 90)]
+
+
+def draw(folder, turns, family="DICT_5X5_1000"):
     """Photographs of the board by a pinhole camera: homographies of its printed image."""
     folder.mkdir()
-    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_1000)
+    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, family))
     printed = cv2.aruco.CharucoBoard((7, 5), 0.03, 0.022, dictionary).generateImage((1050, 750))
     # Printed pixel to board metres: 150 px a square, corner to corner.
     to_board = np.array([[0.0002, 0, 0.0001], [0, 0.0002, 0.0001], [0, 0, 1]])
@@ -33,7 +39,7 @@ def draw(folder, turns):
 @pytest.fixture(scope="module")
 def boards(tmp_path_factory):
     folder = tmp_path_factory.mktemp("boards") / "photos"
-    draw(folder, [(0, 25, 0), (25, 0, 10), (-25, 10, 0), (10, -28, -15), (-18, -18, 5), (20, 20, 90)])
+    draw(folder, TURNS)
     return folder
 
 
@@ -88,3 +94,88 @@ def test_what_is_no_file_among_the_photos_is_let_be(boards, tmp_path):
     (tmp_path / "folder.png").mkdir()
     (tmp_path / ".hidden.png").touch()
     assert calibrate(tmp_path, BOARD).photos == 6
+
+
+@pytest.mark.parametrize("family", ["DICT_6X6_1000", "DICT_ARUCO_ORIGINAL", *APRILTAG])
+def test_the_family_of_the_markers_is_found(family, tmp_path):
+    """ArUco's and AprilTag's, by the corners that the board has with it."""
+    draw(tmp_path / "photos", TURNS[:1], family)
+    grey = cv2.imread(str(tmp_path / "photos" / "0.png"), cv2.IMREAD_GRAYSCALE)
+    name, detector = board_detector([grey], BOARD)
+    assert name == family
+    assert len(detector.detectBoard(grey)[1]) == 24
+
+
+def test_another_board_or_too_few_photos_say_what_is_seen(boards, tmp_path):
+    """Markers, their family and numbers, and what the board that was named would have."""
+    (tmp_path / "0.png").write_bytes((boards / "0.png").read_bytes())
+    with pytest.raises(StageError, match="is found in 1 of 1 photos, at least 3 .*; seen are markers of DICT_5X5_1000"):
+        calibrate(tmp_path, BOARD)
+    with pytest.raises(StageError) as fault:
+        calibrate(tmp_path, Board(columns=4, rows=3, square_m=0.03, marker_m=0.022))
+    assert "seen are markers of DICT_5X5_1000, 17 in a photo and numbered up to 16" in str(fault.value)
+    assert "a board of 4 x 3 squares has 6, numbered up to 5: does --board give its squares?" in str(fault.value)
+
+
+def test_what_calibrate_writes_reconstruct_begins_with(boards, tmp_path, capsys):
+    """As JSON and as COLMAP's cameras.txt: one camera, whose four coefficients were fitted to the same corners."""
+    for name in ("cal.json", "cameras.txt"):
+        out = tmp_path / name
+        arguments = ["calibrate", str(boards), "--board", "7x5", "--square-mm", "30", "--marker-mm", "22"]
+        assert run([*arguments, "--out", str(out)]) == 0
+        assert f"--camera {out}" in capsys.readouterr().out
+        lens = read_lens(out)
+        assert (lens.width, lens.height) == (640, 480)
+        assert lens.params[:4] == pytest.approx([700.0, 700.0, 320.0, 240.0], rel=0.02)
+    found = json.loads((tmp_path / "cal.json").read_text(encoding="utf-8"))
+    assert found["colmap"]["model"] == "OPENCV"
+    assert found["colmap"]["residual_px"] == pytest.approx(found["residuals_px"]["opencv"])
+    assert read_lens(tmp_path / "cal.json").params == pytest.approx(lens.params)
+    assert run(["calibrate", str(boards), "--out", str(tmp_path)]) == 2
+    assert "a file is needed" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("{", "is no whole JSON"),
+        ("[1, 2]", "is no calibration; COLMAP's cameras.txt with one camera, or the JSON of `wakewise calibrate"),
+        ('{"a": 1}', "is no calibration"),
+        ('{"focal_x_px": 700.0}', "earlier version, calibrate again"),
+        (
+            '{"colmap": {"model": "OPENCV", "width": 640, "height": 480, "params": [1, 2]}}',
+            "2 parameters, OPENCV has 8",
+        ),
+        ('{"colmap": {"model": "OPENCV", "width": "640", "height": 480, "params": []}}', "must hold model"),
+        ('{"colmap": {"model": "MAGIC", "width": 640, "height": 480, "params": []}}', "must hold model"),
+        ('{"colmap": {"model": "PINHOLE", "width": 640, "height": 480, "params": [1, 2, 3, "x"]}}', "must hold model"),
+        ('{"colmap": {"model": "PINHOLE", "width": 640, "height": 480, "params": [NaN, 2, 3, 4]}}', "all finite"),
+        ('{"colmap": {"model": "PINHOLE", "width": 0, "height": 480, "params": [1, 2, 3, 4]}}', "must be above 0"),
+    ],
+)
+@pytest.mark.parametrize("look", [[], ["--look"]], ids=["model", "look"])
+def test_a_json_that_is_no_camera_is_refused_in_words(text, words, look, boards, tmp_path, capsys):
+    """Before anything is made, by a look at the photographs, too."""
+    (tmp_path / "cal.json").write_text(text, encoding="utf-8")
+    out, camera = str(tmp_path / "out"), str(tmp_path / "cal.json")
+    assert run(["reconstruct", str(boards), "--out", out, "--camera", camera, *look]) == 2
+    told = capsys.readouterr()
+    assert words in told.err and told.err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("option", ["--camera", "--cameras", "--reference-cameras", "--lens", "--bars", "--fixes"])
+def test_a_look_swallows_no_bad_file(option, boards, tmp_path, capsys):
+    """Whatever the look itself has no need of."""
+    (tmp_path / "bad.txt").write_text("hello", encoding="utf-8")
+    arguments = [
+        "reconstruct",
+        str(boards),
+        "--out",
+        str(tmp_path / "out"),
+        "--look",
+        option,
+        str(tmp_path / "bad.txt"),
+    ]
+    assert run(arguments) == 2
+    assert capsys.readouterr().err.startswith("wakewise: ")

@@ -15,8 +15,14 @@ Photos = Annotated[Path, typer.Argument(help="Folder of photographs of one ChArU
 Squares = Annotated[str, typer.Option("--board", metavar="COLUMNSxROWS", help="Squares across and down.")]
 Square = Annotated[float, typer.Option("--square-mm", help="Side of a square.")]
 Marker = Annotated[float, typer.Option("--marker-mm", help="Side of a marker.")]
-Lens = Annotated[str, typer.Option("--model", help="pinhole, radial (5 coefficients) or rational (8).")]
-Out = Annotated[Path | None, typer.Option("--out", help="Write the figures into this JSON file.", show_default=False)]
+Lens = Annotated[
+    str, typer.Option("--model", help="pinhole, opencv (4 coefficients, as COLMAP's), radial (5) or rational (8).")
+]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", help="File for the camera, which `wakewise reconstruct --camera` reads: JSON with all "
+                 "figures, or .txt, COLMAP's cameras.txt.", show_default=False),
+]  # fmt: skip
 
 
 def calibrate(
@@ -32,20 +38,23 @@ def calibrate(
     from wakewise.extras import need
 
     need("wakewise calibrate", "photos")
-    from wakewise.files import write_json
+    from wakewise.files import write_json, write_text
     from wakewise.reconstruction import Board
     from wakewise.reconstruction import calibrate as solve
+    from wakewise.reconstruction.calibration import cameras_txt
 
+    if out is not None and out.is_dir():
+        raise InputError(f"--out {out}: a folder is there, a file is needed (.json, or .txt for COLMAP's cameras.txt)")
     columns, cross, rows = board.lower().partition("x")
     if not (cross and columns.isdigit() and rows.isdigit()):
         raise InputError(f"--board: '{board}', must be COLUMNSxROWS such as 11x8")
     with Bars().stage("calibrate"):
-        figures = solve(
-            photos,
-            Board(columns=int(columns), rows=int(rows), square_m=1e-3 * square_mm, marker_m=1e-3 * marker_mm),
-            model,
-        ).summary()
-    if out is not None:
+        squares = Board(columns=int(columns), rows=int(rows), square_m=1e-3 * square_mm, marker_m=1e-3 * marker_mm)
+        found = solve(photos, squares, model)
+    figures = found.summary()
+    if out is not None and out.suffix.lower() == ".txt":
+        write_text(out, cameras_txt(found))
+    elif out is not None:
         write_json(out, figures)
     if json:
         print_json(figures)
@@ -64,3 +73,5 @@ def calibrate(
         else:
             table.add_row(key, shown(value))
     print_table(table)
+    if out is not None:
+        typer.echo(f"camera: {out}; reconstruct PHOTOS --camera {out} begins with it")

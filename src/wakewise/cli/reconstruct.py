@@ -59,9 +59,10 @@ Sets = Annotated[
 ]  # fmt: skip
 Camera = Annotated[
     list[str] | None,
-    typer.Option("--camera", metavar="[LENS=]PATH", help="Camera to begin with: COLMAP's cameras.txt or a folder that "
-                 "holds it, such as a trial's. LENS: of the photos of that name (--lens, a folder of photos, or as "
-                 "lenses are listed in the result); may be repeated.", show_default=False),
+    typer.Option("--camera", metavar="[LENS=]PATH", help="Camera to begin with: what `wakewise calibrate --out` wrote, "
+                 "COLMAP's cameras.txt, or a folder that holds it, such as a trial's. LENS: of the photos of that name "
+                 "(--lens, a folder of photos, or as lenses are listed in the result); may be repeated.",
+                 show_default=False),
 ]  # fmt: skip
 LensOption = Annotated[
     list[str] | None,
@@ -114,11 +115,14 @@ def reconstruct_photos(
     settings = check_scenario({"reconstruction": changes}, "--set").reconstruction
     check_kinds(write, "dense" if no_mesh and until is None else until)
     wishes = wishes_of(bar, bars, masks, crop, until, fixes, photos)
+    # Whatever was given is read before anything is made, whether this run needs it or not.
+    lenses, patterns = _lenses(camera), _named("--lens", "left='L_*'", lens) or None
+    references = read_reference_cameras(reference_cameras) if reference_cameras else None
+    known = read_known_cameras(cameras) if cameras else None
     photos = frames_of(photos, out)
     if look:
         look_first(photos, out, settings.threads, json)
         return
-    references = read_reference_cameras(reference_cameras) if reference_cameras else None
     for line in beside(photos):
         typer.echo(f"wakewise: {line}", err=True)
     with logged(out) as log, Bars().stage("reconstruct") as progress:
@@ -127,10 +131,10 @@ def reconstruct_photos(
             out,
             settings,
             focal_px=focal_px,
-            lens=_lenses(camera),
-            lens_patterns=_named("--lens", "left='L_*'", lens) or None,
+            lens=lenses,
+            lens_patterns=patterns,
             reference_positions=references,
-            known=read_known_cameras(cameras) if cameras else None,
+            known=known,
             region=(np.array(region[:3]), region[3]) if region else None,
             wishes=wishes,
             progress=log.watching(progress),
@@ -147,7 +151,6 @@ def reconstruct_photos(
     for line in (*remarks(model), *scale_lines(model), verdict(model)):
         log.say(line)
     write_report_of(out, photos)
-    lenses = _lenses(camera)
 
     def remake(half: Path, folder: Path, places: Any, tell: Any) -> Model:
         return reconstruct(
@@ -156,7 +159,7 @@ def reconstruct_photos(
             settings,
             focal_px=focal_px,
             lens=lenses,
-            lens_patterns=_named("--lens", "left='L_*'", lens) or None,
+            lens_patterns=patterns,
             reference_positions=places,
             wishes=Wishes(masks=masks, crop=wishes.crop),
             progress=tell,

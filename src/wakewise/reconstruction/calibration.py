@@ -20,13 +20,16 @@ from wakewise.reconstruction.photos import SUFFIXES, decode
 
 Points = NDArray[np.float32]
 Fit = tuple[NDArray[np.float64], NDArray[np.float64], dict[str, NDArray[np.float64]]]
-# Markers of 4, 5, 6 and 7 bits; a smaller dictionary is the beginning of the larger one of the same bits.
-DICTIONARIES = ("DICT_4X4_1000", "DICT_5X5_1000", "DICT_6X6_1000", "DICT_7X7_1000", "DICT_ARUCO_ORIGINAL")
-# OpenCV's flags by what the lens model can bend: none; two radial, two tangential and a third radial coefficient; three
-# more that divide. A flat port bends like a lens that divides (T. Treibitz et al., IEEE TPAMI 34(1), 2012,
-# doi 10.1109/TPAMI.2011.105, say where that ends).
+# Markers of 4, 5, 6 and 7 bits, of which a smaller dictionary is the beginning of the larger one.
+ARUCO = ("DICT_4X4_1000", "DICT_5X5_1000", "DICT_6X6_1000", "DICT_7X7_1000", "DICT_ARUCO_ORIGINAL")
+APRILTAG = ("DICT_APRILTAG_36h11", "DICT_APRILTAG_36h10", "DICT_APRILTAG_25h9", "DICT_APRILTAG_16h5")
+# OpenCV's flags by what the lens model can bend: none; two radial and two tangential coefficients, as COLMAP's OPENCV
+# has them; a third radial one; three more that divide. A flat port bends like a lens that divides (T. Treibitz et al.,
+# IEEE TPAMI 34(1), 2012, doi 10.1109/TPAMI.2011.105, say where that ends).
+COLMAPS = "opencv"
 MODELS = {
     "pinhole": cv2.CALIB_FIX_K1 | cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3 | cv2.CALIB_ZERO_TANGENT_DIST,
+    COLMAPS: cv2.CALIB_FIX_K3,
     "radial": 0,
     "rational": cv2.CALIB_RATIONAL_MODEL,
 }
@@ -58,7 +61,9 @@ class Calibration:
 
     residual_px: root mean square distance of board corners in the photographs from where the model puts them;
     residuals_px: the same of every lens model; photo_residual_px: by photograph; left_out: photographs with too few
-    corners, and how many. distortion: OpenCV's order (k1, k2, p1, p2, k3, k4, k5, k6).
+    corners, and how many. distortion: OpenCV's order (k1, k2, p1, p2, k3, k4, k5, k6). colmap: the camera as COLMAP's
+    OPENCV has it, fitted to the same corners whatever `model` the other figures are of; `reconstruct --camera` reads
+    it.
     """
 
     model: str
@@ -77,6 +82,7 @@ class Calibration:
     dictionary: str
     photo_residual_px: dict[str, float]
     left_out: dict[str, int]
+    colmap: dict[str, Any]
 
     def summary(self) -> dict[str, Any]:
         """All figures as plain values for JSON."""
@@ -114,7 +120,8 @@ def calibrate(folder: Path, board: Board, model: str = "radial") -> Calibration:
     if len(found) < MIN_PHOTOS:
         raise StageError(
             f"calibration: the board of {board.columns} x {board.rows} squares is found in {len(found)} of "
-            f"{len(photos)} photos, at least {MIN_PHOTOS} must show {MIN_CORNERS} of its corners"
+            f"{len(photos)} photos, at least {MIN_PHOTOS} must show {MIN_CORNERS} of its corners; "
+            + seen(photos, board, name)
         )
     height, width = next(iter(photos.values())).shape
     fits: dict[str, Fit] = {}
@@ -141,6 +148,42 @@ def calibrate(folder: Path, board: Board, model: str = "radial") -> Calibration:
         dictionary=name,
         photo_residual_px={photo: _rms(error) for photo, error in errors.items()},
         left_out=left_out,
+        colmap=_colmaps(fits[COLMAPS], width, height),
+    )
+
+
+def cameras_txt(found: Calibration) -> str:
+    """The camera as COLMAP's cameras.txt."""
+    camera = found.colmap
+    numbers = " ".join(repr(value) for value in camera["params"])
+    return (
+        f"# Camera list with one line of data per camera:\n#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n"
+        f"1 {camera['model']} {camera['width']} {camera['height']} {numbers}\n"
+    )
+
+
+def _colmaps(fit: Fit, width: int, height: int) -> dict[str, Any]:
+    """COLMAP's camera of a fit; its pixel centres are at +0.5, OpenCV's at 0."""
+    K, distortion, errors = fit
+    params = [K[0, 0], K[1, 1], K[0, 2] + 0.5, K[1, 2] + 0.5, *np.ravel(distortion)[:4]]
+    return {
+        "model": "OPENCV",
+        "width": width,
+        "height": height,
+        "params": [float(value) for value in params],
+        "residual_px": _rms(np.concatenate(list(errors.values()))),
+    }
+
+
+def seen(photos: dict[str, NDArray[np.uint8]], board: Board, name: str) -> str:
+    """What is seen of a board that is not found, in words."""
+    plain = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name)))
+    found = [ids for grey in photos.values() if (ids := plain.detectMarkers(grey)[1]) is not None]
+    most, last = max(len(ids) for ids in found), max(int(ids.max()) for ids in found)
+    has = board.columns * board.rows // 2
+    return (
+        f"seen are markers of {name}, {most} in a photo and numbered up to {last}, and a board of {board.columns} x "
+        f"{board.rows} squares has {has}, numbered up to {has - 1}: does --board give its squares?"
     )
 
 
@@ -167,13 +210,25 @@ def _read(folder: Path) -> dict[str, NDArray[np.uint8]]:
 
 
 def board_detector(photos: list[NDArray[np.uint8]], board: Board) -> tuple[str, Any]:
-    """The dictionary and the pattern of squares (white or black at the origin) that most corners are found with."""
+    """The dictionary and the pattern of squares (white or black at the origin) that most corners are found with.
+
+    Where none are found, the dictionary of which most markers are seen.
+
+    Raises
+    ------
+    StageError
+        If no marker of any is seen.
+    """
     some = photos[:: max(1, len(photos) // 3)][:3]
-    best: tuple[int, str, Any] = (-1, "", None)
-    for name in DICTIONARIES:
+    best: tuple[tuple[int, int], str, Any] = ((-1, -1), "", None)
+    for name in (*ARUCO, *APRILTAG):
+        if name == APRILTAG[0] and best[0][0] >= MIN_CORNERS:
+            break  # which spares the search for them where the board is known
         dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
         plain = cv2.aruco.ArucoDetector(dictionary)
-        if all(plain.detectMarkers(grey)[1] is None for grey in some):
+        markers = [plain.detectMarkers(grey)[1] for grey in some]
+        marked = sum(0 if each is None else len(each) for each in markers)
+        if marked == 0 or len(dictionary.bytesList) < board.columns * board.rows // 2:
             continue
         for legacy in (False, True):
             made = cv2.aruco.CharucoBoard((board.columns, board.rows), board.square_m, board.marker_m, dictionary)
@@ -181,10 +236,10 @@ def board_detector(photos: list[NDArray[np.uint8]], board: Board) -> tuple[str, 
             detector = cv2.aruco.CharucoDetector(made)
             ids = [detector.detectBoard(grey)[1] for grey in some]
             count = sum(0 if each is None else len(each) for each in ids)
-            if count > best[0]:
-                best = (count, name, detector)
+            if (count, marked) > best[0]:
+                best = ((count, marked), name, detector)
     if best[2] is None:
-        raise StageError(f"calibration: no marker of {', '.join(DICTIONARIES)} is found in the first photos")
+        raise StageError(f"calibration: no marker of {', '.join((*ARUCO, *APRILTAG))} is found in the first photos")
     return best[1], best[2]
 
 

@@ -1,7 +1,8 @@
-"""A calibrated camera as COLMAP's OPENCV or OPENCV_FISHEYE has it, from its cameras.txt."""
+"""A calibrated camera as COLMAP's OPENCV or OPENCV_FISHEYE has it, from its cameras.txt or a calibration of ours."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,6 +27,7 @@ LAYOUTS = {
     "RADIAL_FISHEYE": (0, 0, 1, 2, 3, 4, -1, -1),
     "OPENCV_FISHEYE": (0, 1, 2, 3, 4, 5, 6, 7),
 }
+_NEEDED = "COLMAP's cameras.txt with one camera, or the JSON of `wakewise calibrate --out`,"
 COUNTS = {name: max(layout) + 1 for name, layout in LAYOUTS.items()}
 
 
@@ -78,7 +80,7 @@ def lens_of(camera: pycolmap.Camera) -> Lens:
 
 
 def read_lens(path: Path) -> Lens:
-    """The camera of COLMAP's cameras.txt, given the file or a folder that holds it.
+    """The camera of COLMAP's cameras.txt, given the file or a folder that holds it, or of what `calibrate` wrote.
 
     Raises
     ------
@@ -87,11 +89,14 @@ def read_lens(path: Path) -> Lens:
     """
     file = path / "cameras.txt" if path.is_dir() else path
     if not file.is_file():
-        raise InputError(f"{file}: does not exist; COLMAP's cameras.txt with one camera is needed")
+        raise InputError(f"{file}: does not exist; {_NEEDED} is needed")
     try:
-        lines = [line.split() for line in file.read_text(encoding="utf-8").splitlines()]
+        text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
-        raise InputError(f"{file}: is no text file that can be read; COLMAP's cameras.txt is needed") from None
+        raise InputError(f"{file}: is no text file that can be read; {_NEEDED} is needed") from None
+    if file.suffix.lower() == ".json" or text.lstrip()[:1] in ("{", "["):
+        return _from_calibration(file, text)
+    lines = [line.split() for line in text.splitlines()]
     rows = [words for words in lines if words and not words[0].startswith("#")]
     if len(rows) != 1:
         raise InputError(f"{file}: holds {len(rows)} cameras, must hold 1 (id, model, width, height, parameters)")
@@ -106,6 +111,29 @@ def read_lens(path: Path) -> Lens:
     if len(params) != COUNTS[row[1]] or not np.isfinite(params).all():
         raise InputError(f"{file}: {len(params)} parameters, {row[1]} has {COUNTS[row[1]]}, all finite")
     return lens_from(row[1], width, height, params)
+
+
+def _from_calibration(file: Path, text: str) -> Lens:
+    """The camera in what `wakewise calibrate --out` wrote."""
+    try:
+        tree = json.loads(text)
+    except ValueError:
+        raise InputError(f"{file}: is no whole JSON; {_NEEDED} is needed") from None
+    camera = tree.get("colmap") if isinstance(tree, dict) else None
+    if not isinstance(camera, dict):
+        if isinstance(tree, dict) and "focal_x_px" in tree:
+            raise InputError(f"{file}: is a calibration of an earlier version, calibrate again")
+        raise InputError(f"{file}: is no calibration; {_NEEDED} is needed")
+    model, params = camera.get("model"), camera.get("params")
+    size = [side for side in (camera.get("width"), camera.get("height")) if type(side) is int]
+    numbers = isinstance(params, list) and all(type(value) in (int, float) for value in params)
+    if model not in LAYOUTS or len(size) < 2 or not isinstance(params, list) or not numbers:
+        raise InputError(
+            f"{file}: colmap must hold model (one of {', '.join(LAYOUTS)}), width, height and params, a list of numbers"
+        )
+    if len(params) != COUNTS[model] or not np.isfinite(np.array(params, dtype=np.float64)).all():
+        raise InputError(f"{file}: {len(params)} parameters, {model} has {COUNTS[model]}, all finite")
+    return lens_from(model, size[0], size[1], np.array(params, dtype=np.float64))
 
 
 def lens_from(model: str, width: int, height: int, params: Array) -> Lens:
