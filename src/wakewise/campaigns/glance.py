@@ -51,6 +51,11 @@ class Glance:
     trials: int
 
     @property
+    def is_sure(self) -> bool:
+        """Whether the pairs are enough, and the interval of the difference holds no zero."""
+        return self.trials >= FEWEST and self.interval_pct is not None and self.interval_pct[0] > 0.0
+
+    @property
     def sure(self) -> str:
         """How sure the winner is, in words."""
         if self.rival is None:
@@ -59,7 +64,7 @@ class Glance:
             return "one trial each: nobody knows"
         if self.trials < FEWEST:
             return f"{self.trials} pairs are too few to be sure"
-        if self.interval_pct is None or self.interval_pct[0] <= 0.0:
+        if not self.is_sure:
             return "undecided, the interval holds zero"
         return "sure, the interval does not hold zero"
 

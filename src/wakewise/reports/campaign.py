@@ -94,7 +94,7 @@ def _title(judged: Sequence[tuple[Measure, Glance]], compared: str) -> str:
     leading = [one for measure, one in judged if measure == judged[0][0]]
     if len(leading) == 1:
         return won(leading[0])
-    wins = Counter(one.winner for one in leading if one.rival is not None and one.sure.startswith("sure"))
+    wins = Counter(one.winner for one in leading if one.rival is not None and one.is_sure)
     what = leading[0].words
     if not wins:
         return f"No {compared} is surely best in any of {len(leading)} settings ({what})."
@@ -124,12 +124,13 @@ def _glance(judged: Sequence[tuple[Measure, Glance]], compared: str) -> str:
         "trial of the winner beats one of the next best. Each line is a test of its own: of twenty, one is sure by "
         "accident."
     )
-    table = f'<table><thead><tr>{heads}<th class="num">pairs</th></tr></thead><tbody>{rows}</tbody></table>'
+    heads += '<th class="num">pairs</th>'
+    table = f'<table class="glance"><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>'
     return section("glance", "At a glance", lead, f'<div class="wide">{table}</div>')
 
 
 def _chance(one: Glance) -> str:
-    return "" if one.improvement is None else f"{number(100.0 * one.improvement)} %"
+    return "" if one.improvement is None or not one.is_sure else f"{number(100.0 * one.improvement)} %"
 
 
 def _plots(ended: list[Place]) -> str:

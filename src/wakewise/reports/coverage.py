@@ -68,7 +68,7 @@ def _made(trial: Trial) -> str:
     colours, counts = _painted(coverage, surface.vertices_m)
     frame = Frame.around(surface.vertices_m[counts] if counts.any() else surface.vertices_m)
     drawn = draw_surface(surface, colours, SIDES, frame, PIXELS)
-    return panel("Coverage", text, f"<div>{legend}</div>", pictures(drawn, SIDES, "coverage"))
+    return panel("Coverage", text, f'<div class="chips">{legend}</div>', pictures(drawn, SIDES, "coverage"))
 
 
 def _compared(trial: Trial) -> str:

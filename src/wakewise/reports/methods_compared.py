@@ -12,7 +12,7 @@ from wakewise.campaigns.glance import Glance, Measure, Place
 from wakewise.campaigns.statistics import performance_profile, stratified_bootstrap
 from wakewise.reports.figures import NARROW_IN, WIDTH_IN
 from wakewise.reports.ink import CORAL, INK, MUTED, SAND, SLATE, TEAL, VIOLET, dress, key, new_figure
-from wakewise.reports.words import number
+from wakewise.reports.words import number, percent
 
 Row = Mapping[str, Any]
 _ALIKE = 0.005
@@ -46,21 +46,26 @@ def colours_of(methods: Sequence[str]) -> dict[str, str]:
 
 
 def won(glance: Glance) -> str:
-    """Who won, by how much, how sure."""
+    """Who won, by how much, how sure; nobody where the interval of the difference holds zero or pairs are few."""
     value = number(glance.means[glance.winner])
     if glance.rival is None:
         return f"{glance.winner}: {value} {glance.words}."
     if glance.means[glance.winner] == glance.means[glance.rival]:
         return f"{glance.winner} and {glance.rival} are even: {value} {glance.words} each."
+    if not glance.is_sure:
+        other = number(glance.means[glance.rival])
+        much = f" ({_better(glance)})" if glance.less_pct is not None else ""
+        return (
+            f"no difference shown: {glance.winner} {value}, {glance.rival} {other} {glance.words}{much}; {glance.sure}."
+        )
     said = f"{glance.winner} is best with {value} {glance.words}"
     if glance.less_pct is not None:
-        ends = (
-            ""
-            if glance.interval_pct is None
-            else f" ({number(glance.interval_pct[0])} to {number(glance.interval_pct[1])})"
-        )
-        said += f", {number(abs(glance.less_pct))} %{ends} better than {glance.rival}"
+        said += f", {_better(glance)} better than {glance.rival}"
     return f"{said}; {glance.sure}."
+
+
+def _better(glance: Glance) -> str:
+    return " ".join(part for part in percent(glance.less_pct, glance.interval_pct, more=True) if part)
 
 
 def price(glance: Glance) -> str:

@@ -24,10 +24,11 @@
     near.observe(box);
   }
 
-  // A phone begins with the long parts folded, but for the first photographs.
-  if (matchMedia("screen and (max-width: 720px)").matches) {
-    document.querySelectorAll("details.fold").forEach((part, i) => { part.open = i === 0 && !!part.querySelector(".photo"); });
-  }
+  // Long tables begin folded, and on a phone all long parts but the first photographs.
+  const phone = matchMedia("screen and (max-width: 720px)").matches;
+  document.querySelectorAll("details.fold").forEach((part, i) => {
+    part.open = part.open && !!part.querySelector(".photo") && (i === 0 || !phone);
+  });
 
   const loupe = document.getElementById("loupe");
   const shots = [...document.querySelectorAll(".photo:not(.gone)")];

@@ -15,6 +15,7 @@ from wakewise.reports.ink import ERROR_LIMIT_MM, ERROR_STOPS, OVER_LIMIT, css_gr
 from wakewise.reports.trial import Trial
 from wakewise.reports.views import View
 
+_LIGHT, _DARK_WHERE_THE_PAGE_IS = "darkMode:false", "darkMode:matchMedia('(prefers-color-scheme: dark)').matches"
 _CODE = re.compile(r"`([^`]+)`")
 
 
@@ -101,6 +102,7 @@ def scene_box(html: str, legend: str, poster: str = "") -> str:
 
     Until it has drawn itself, and where it cannot, `poster` stands in its place: an image as a data URI.
     """
+    html = html.replace(_LIGHT, _DARK_WHERE_THE_PAGE_IS, 1)
     # A JSON string without "<" cannot end the script that holds it.
     store = json.dumps(html, ensure_ascii=False).replace("<", "\\u003c")
     still = f'<img alt="the model" src="{poster}">' if poster else ""

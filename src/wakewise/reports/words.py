@@ -134,6 +134,25 @@ def fixed(value: float | None, places: int, *, scale: float = 1.0, sign: bool = 
     return f"{round(scale * value, places) + 0.0:{'+' if sign else ''}.{places}f}"
 
 
+TIMES = 3.0
+"""Factor from which on a difference is told as one, and no longer in percent."""
+
+
+def percent(value: float | None, ends: tuple[float, float] | None = None, *, more: bool = False) -> tuple[str, str]:
+    """A difference in percent with its interval, "31.0 %" and "(26.0 to 35.0)"; of more than a factor of 3 as that.
+
+    `value` is how much less in percent, or how much more where `more`, of which -200 % less is 3 times as much.
+    """
+    if value is None:
+        return NONE, ""
+    known = [value, *(ends or ())]
+    ratios = [1.0 + one / 100.0 if more else 1.0 - one / 100.0 for one in known]
+    if max(ratios) <= TIMES:
+        return f"{number(value)} %", "" if ends is None else f"({number(ends[0])} to {number(ends[1])})"
+    inside = "" if ends is None else f"({number(min(ratios[1:]))} to {number(max(ratios[1:]))} times)"
+    return f"{number(ratios[0])} times", inside
+
+
 def duration(seconds: float | None) -> str:
     """A time in the unit that people would say: 40 s, 12 min, 3.5 h."""
     if seconds is None or not math.isfinite(seconds):

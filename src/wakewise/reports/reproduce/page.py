@@ -60,7 +60,8 @@ def _head(tables: Mapping[str, Mapping[str, Any]]) -> str:
     trials, failed = (sum(table[key] or 0 for table in tables.values()) for key in ("made", "failed"))
     took = duration(sum(table["trial_s"] or 0.0 for table in tables.values()))
     title = (
-        f"{counts['met']} of {counts['quoted']} figures of the paper met, {counts['surely'] or 'none'} surely"
+        f"{counts['met']} of {counts['quoted']} figures of the paper met{words.where(counts)}; "
+        f"{counts['surely'] or 'none'} surely"
         if counts["quoted"]
         else "No figure of the paper is quoted for this"
     )
@@ -215,7 +216,7 @@ def _mark(row: Mapping[str, Any]) -> str:
 
 
 def _row(row: Mapping[str, Any], several: bool) -> str:
-    said = row.get("our_order") or words.value(row["ours"])
+    said = row.get("our_order") or words.ours(row)
     more = [row["how"], f"paper: {row['paper_says']}"]
     if row.get("p_holm") is not None:
         more.append(f"paired t-test p {_two(row['p_t'])}, Holm {_two(row['p_holm'])}")
@@ -232,7 +233,7 @@ def _row(row: Mapping[str, Any], several: bool) -> str:
         if row["reading"] == "order"
         else f'<td class="num" title="{escape(row["paper_says"], quote=True)}">{escape(words.quoted(row))}</td>'
         f'<td class="num">{escape(said)}</td><td class="num">{escape(words.interval(row))}</td>'
-        f'<td class="unit">{escape(row["unit"])}</td>'
+        f'<td class="unit">{escape("" if row["reading"] == "less_pct" else row["unit"])}</td>'
     )
     return (
         f'<tr title="{title}"><td>{_unbroken(row["method"])}</td><td>{escape(row["figure"])}</td>'

@@ -256,8 +256,7 @@ def _table(rows: Any) -> list[str]:
         "|---|---|---|--:|--:|--:|--:|---|--:|--:|",
     ]
     for row in rows:
-        unit = f" {row['unit']}" if row["unit"] else ""
-        ours = row.get("our_order") or (words.value(row["ours"]) + unit if row["ours"] is not None else "–")
+        ours = row.get("our_order") or words.ours(row)
         paper = row["paper_says"] if row["paper"] is None and row["asked"] is not None else words.quoted(row)
         paper = row["paper_says"] if row["reading"] == "order" else paper
         p = "" if row.get("p_holm") is None else f"{row['p_holm']:.2g}"

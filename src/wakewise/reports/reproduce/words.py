@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from wakewise.reports.words import number, shown
-from wakewise.studies.reproduce.judged import tally
+from wakewise.reports.words import number, percent, shown
+from wakewise.studies.reproduce.judged import SETUP, tally
 
 Row = Mapping[str, Any]
 Table = Mapping[str, Any]
@@ -22,10 +22,16 @@ def met_of(tables: Mapping[str, Sequence[Row]]) -> str:
     if not counts["quoted"]:
         return "no figure of the paper is quoted here"
     figures = "figures that the paper quotes are" if counts["quoted"] > 1 else "figure that the paper quotes is"
-    said = f"{counts['met']} of {counts['quoted']} {figures} met"
+    said = f"{counts['met']} of {counts['quoted']} {figures} met{where(counts)}"
     more = [f"{counts['surely']} surely"] if counts["surely"] else []
     more += [f"{counts['circular']} more in the paper's own water alone"] if counts["circular"] else []
     return f"{said} ({', '.join(more)})" if more else said
+
+
+def where(counts: Mapping[str, int]) -> str:
+    """In which worlds figures count as met, and how many are in the paper's own set-up."""
+    own = f", {counts['own']} of {counts['own_judged']} in the paper's own set-up ({SETUP})"
+    return f" in some world, whichever{own if counts['own_judged'] else ''}" if counts["worlds"] else ""
 
 
 def verdict(row: Row) -> str:
@@ -40,7 +46,20 @@ def verdict(row: Row) -> str:
 
 def interval(row: Row) -> str:
     """Both ends, or nothing."""
+    if row["reading"] == "less_pct":
+        return percent(row["ours"], _ends(row))[1].strip("()")
     return "" if row["low"] is None else f"{number(row['low'])} to {number(row['high'])}"
+
+
+def ours(row: Row) -> str:
+    """Our figure with its unit; how much less by more than a factor of 3 as that factor."""
+    if row["reading"] == "less_pct":
+        return percent(row["ours"], _ends(row))[0]
+    return value(row["ours"]) if row["ours"] is None else f"{value(row['ours'])} {row['unit']}".strip()
+
+
+def _ends(row: Row) -> tuple[float, float] | None:
+    return None if row["low"] is None or row["high"] is None else (row["low"], row["high"])
 
 
 def quoted(row: Row) -> str:
@@ -91,7 +110,7 @@ def _place(row: Row) -> str:
     where = row["target"] if row["world"] == "-" else row["world"]
     where = f"{where} ({row['target']})" if row["world"] != "-" and row["target"] else where
     ends = interval(row)
-    said = row.get("our_order") or f"{value(row['ours'])} {row['unit']}".strip()
+    said = row.get("our_order") or ours(row)
     head = f"{where}: " if where else ""
     return f"{head}{said}" + (f" ({ends})" if ends else "") + f", n = {shown(row['n'])}"
 

@@ -31,13 +31,16 @@ def glances(table: str, places: Sequence[Place]) -> list[Glance]:
 
 CIRCULAR = ("paper",)
 """Worlds whose water is the planner's own model: what is met there alone is told apart."""
+SETUP = "pump-tank"
+"""The world that is the paper's own set-up: its tank, with the water that pumps move."""
 
 
 def tally(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, int]:
     """How many of the figures that the paper quotes are met, each counted once, however many worlds or flows it has.
 
     `quoted`: figures with a value of the paper and one of ours; `met`: in some world that is not circular; `surely`:
-    there with the whole interval on that side; `circular`: in a circular world alone.
+    there with the whole interval on that side; `circular`: in a circular world alone; `own`, `own_judged`: in the
+    paper's own set-up, and those that have a value there; `worlds`: those that are judged in a world at all.
     """
     found: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
     for name, rows in tables.items():
@@ -49,5 +52,8 @@ def tally(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, int]:
         "quoted": len(found),
         "met": sum(bool(rows) for rows in fair.values()),
         "surely": sum(any(row["sure"] for row in rows) for rows in fair.values()),
+        "own": sum(any(row["met"] and row["world"] == SETUP for row in rows) for rows in found.values()),
+        "own_judged": sum(any(row["world"] == SETUP for row in rows) for rows in found.values()),
+        "worlds": sum(any(row["world"] != "-" for row in rows) for rows in found.values()),
         "circular": sum(not fair[key] and any(row["met"] for row in rows) for key, rows in found.items()),
     }
