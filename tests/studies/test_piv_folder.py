@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import pathlib
 
@@ -62,6 +63,12 @@ def test_every_direction_of_the_jet_is_turned_into_the_jet_frame(way, disk, velo
     np.testing.assert_allclose(samples.across_m_s, 1e-3)
     assert samples.x_m.min() > 0.02
     assert len(samples) == 7 * 7
+    assert samples.warnings == ()
+    masked = np.ones(shape, dtype=bool)
+    masked[5, 4:7] = False
+    fewer = samples_of_vectors(dataclasses.replace(field, valid=masked), settings, 1.0, "test")
+    assert len(fewer) == 7 * 7 - 3
+    assert fewer.warnings == ("3 vectors at 1 N not trusted and left out",)
 
 
 def test_faulty_folders_are_refused(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -112,6 +113,8 @@ def test_samples_refuse_what_cannot_be():
 
 def test_joining_and_taking_are_inverse():
     """Rows that are joined can be taken apart again."""
-    both = joined([_samples(), _samples(thrust_N=[2.0])])
+    one = dataclasses.replace(_samples(thrust_N=[2.0]), warnings=("5 left out",))
+    both = joined([_samples(), one, one])
+    assert both.warnings == ("5 left out",)
     assert both.thrusts_N.tolist() == [1.0, 2.0]
-    assert both.take(both.thrust_N == 2.0).thrust_N.tolist() == [2.0]
+    assert both.take(both.thrust_N == 2.0).thrust_N.tolist() == [2.0, 2.0]

@@ -89,11 +89,12 @@ class JetSamples:
 
 
 def joined(parts: Sequence[JetSamples]) -> JetSamples:
-    """Rows of several sets about the same disk, in order."""
+    """Rows of several sets about the same disk, in order, with the warnings of all."""
     first = parts[0]
     fields = ("x_m", "r_m", "thrust_N", "speed_m_s", "across_m_s")
     arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in fields}
-    return JetSamples(**arrays, disk_diameter_m=first.disk_diameter_m, title=first.title, warnings=first.warnings)
+    warnings = tuple(dict.fromkeys(words for part in parts for words in part.warnings))
+    return JetSamples(**arrays, disk_diameter_m=first.disk_diameter_m, title=first.title, warnings=warnings)
 
 
 @dataclass(frozen=True, kw_only=True)

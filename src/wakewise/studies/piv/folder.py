@@ -120,10 +120,12 @@ def samples_of_vectors(field: Displacements, settings: PivFolder, thrust_N: floa
     down = (rows - settings.disk_px[1]) * settings.m_per_px
     speed = settings.m_per_px / settings.dt_s
     x, side, u, v = _turned(settings.jet_direction, right, down, field.right_px * speed, field.down_px * speed)
-    use = field.valid & (x > 0.0)
+    use = x > 0.0
     rim = np.ones_like(use)
     rim[_EDGE_WINDOWS:-_EDGE_WINDOWS, _EDGE_WINDOWS:-_EDGE_WINDOWS] = False
     use &= ~rim
+    untrusted = int((use & ~field.valid).sum())
+    use &= field.valid
     if not use.any():
         raise InputError(f"{title}: no trusted vector downstream of the disk, check disk_px and jet_direction")
     return JetSamples(
@@ -134,6 +136,7 @@ def samples_of_vectors(field: Displacements, settings: PivFolder, thrust_N: floa
         across_m_s=np.abs(v[use]),
         disk_diameter_m=settings.disk_diameter_m,
         title=title,
+        warnings=(f"{untrusted} vectors at {thrust_N:g} N not trusted and left out",) if untrusted else (),
     )
 
 
