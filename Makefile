@@ -59,7 +59,7 @@ test test-all: setup
 	tests=$$?; wait $$types; types=$$?; cat $(VENV)/types.txt; test $$tests -eq 0 -a $$types -eq 0
 
 bench: setup
-	$(BIN)/wakewise bench
+	$(BIN)/wakewise bench all
 
 BUDGET ?= 2h
 NOTE ?=

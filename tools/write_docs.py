@@ -1,5 +1,5 @@
 """Write docs/commands.md from the commands' own help, docs/scenario.md and docs/vehicle-file.md from the settings' own
-descriptions, and README's table of what the tank gets wrong from that of the tank.
+descriptions, and docs/limits.md's table of what the tank gets wrong from that of the tank.
 
 A test fails when any is stale.
 """
@@ -243,14 +243,14 @@ def limits_lines() -> list[str]:
     return [*rows, "", "What it has not at all:", "", *(f"- {line}" for line in ABSENT)]
 
 
-def readme_page() -> str:
-    """Text of README.md with its table as it should be; the rest is as it is."""
-    text = (DOCS.parent / "README.md").read_text(encoding="utf-8")
+def limits_page() -> str:
+    """Text of docs/limits.md with its table as it should be; the rest is as it is."""
+    text = (DOCS / "limits.md").read_text(encoding="utf-8")
     before, mark, rest = text.partition("<!-- limits: ")
     comment, arrow, rest = rest.partition("-->\n")
     _, end, after = rest.partition("<!-- limits end -->")
     if not (mark and arrow and end):
-        raise ValueError("README.md: the two comments round the table of limits are not there")
+        raise ValueError("docs/limits.md: the two comments round the table of limits are not there")
     return "".join([before, mark, comment, arrow, "\n".join(limits_lines()), "\n", end, after])
 
 
@@ -258,7 +258,7 @@ PAGES = {
     "commands.md": commands_page,
     "scenario.md": scenario_page,
     "vehicle-file.md": vehicle_page,
-    "../README.md": readme_page,
+    "limits.md": limits_page,
 }
 
 if __name__ == "__main__":

@@ -155,6 +155,9 @@ def test_a_world_that_does_not_wait_has_the_deadline_enforced():
     class Sea:
         name, waits = "sea", False
 
+        def begin(self):
+            pytest.fail("nothing is flown")
+
     own = parts().replace(method="dp")
     assert own.replace(world=Sea()).flying.inner.enforce and not own.flying.inner.enforce
 

@@ -60,6 +60,12 @@ def test_the_record_of_a_controller_of_ones_own_can_be_read(tmp_path):
     class Mine:
         name = "mine"
 
+        def init(self):
+            return None
+
+        def step(self, state, dt_s, estimate, goal):
+            return state, ww.Command(thrusts_N=np.zeros(8), wrench_B=np.zeros(6))
+
     left = as_flown(QUICK.parts().replace(controller=Mine()))
     write_scenario(tmp_path / "scenario.yaml", left, {})
     again = read_scenario(tmp_path / "scenario.yaml")

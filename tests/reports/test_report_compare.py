@@ -85,10 +85,10 @@ def test_every_figure_with_a_better_side_has_its_better_value_bold(made_up: Path
 
 def test_a_worse_estimate_beside_calmer_water_is_explained(made_up: Path, tmp_path: Path) -> None:
     """D above, speed below: one sentence says that D is the wake model's estimate; else there is none."""
-    dp = changed(made_up, tmp_path / "dp", disturbance=1.0, target_speed_mean_m_s=0.02)
-    calm = changed(made_up, tmp_path / "calm", disturbance=1.23, target_speed_mean_m_s=0.01)
+    dp = changed(made_up, tmp_path / "dp", disturbance_flown=1.0, disturbance=2.0, target_speed_mean_m_s=0.02)
+    calm = changed(made_up, tmp_path / "calm", disturbance_flown=1.23, disturbance=7.0, target_speed_mean_m_s=0.01)
     text = write_comparison({"dp": dp, "calm": calm}, tmp_path).read_text()
-    assert "disturbance of calm is 1.23 times as high although its water is calmer" in text
+    assert "disturbance_flown of calm is 1.23 times as high although its water is calmer" in text
     assert "although its water is calmer" not in write_comparison({"calm": calm, "dp": dp}, tmp_path).read_text()
 
 

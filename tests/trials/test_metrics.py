@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from wakewise.trials.metrics import DEFINITIONS, UNITS, Gathering, comparison
+from wakewise.trials.metrics import BETTER, DEFINITIONS, UNITS, Gathering, comparison
 
 # The keys that every scan promises to machines that read its JSON.
 PROMISED = [
@@ -72,13 +72,23 @@ def test_a_figure_that_is_there_needs_no_excuse_and_one_that_failed_keeps_its_re
 def test_ratios_are_to_the_first_method_and_never_a_division_by_nothing() -> None:
     """The first method's ratios are 1; a missing or zero base gives null with a reason."""
     figures = {
-        "dp": {"target_speed_mean_m_s": 0.02, "energy_kJ": 2.0, "disturbance": 0.0, "rmse_mm": None},
-        "wake-aware": {"target_speed_mean_m_s": 0.01, "energy_kJ": 3.0, "disturbance": 0.0, "rmse_mm": 1.0},
+        "dp": {"target_speed_mean_m_s": 0.02, "energy_kJ": 2.0, "disturbance_flown": 0.0, "rmse_mm": None},
+        "wake-aware": {"target_speed_mean_m_s": 0.01, "energy_kJ": 3.0, "disturbance_flown": 0.0, "rmse_mm": 1.0},
     }
     ratios = comparison(figures)["ratios"]
     assert ratios["dp"]["target_speed"] == 1.0
     assert ratios["wake-aware"]["target_speed"] == pytest.approx(0.5)
     assert ratios["wake-aware"]["energy"] == pytest.approx(1.5)
-    assert ratios["wake-aware"]["disturbance"] is None
-    assert "zero" in ratios["wake-aware"]["why"]["disturbance"]
+    assert ratios["wake-aware"]["disturbance_flown"] is None
+    assert "zero" in ratios["wake-aware"]["why"]["disturbance_flown"]
     assert "missing" in ratios["wake-aware"]["why"]["rmse"]
+
+
+def test_no_ratio_is_made_of_what_cannot_be_compared() -> None:
+    """A figure whose definition says that methods cannot be compared by it is in no ratio, and has no better side."""
+    alone = {key for key, text in DEFINITIONS.items() if "cannot be compared by it" in text}
+    assert alone == {"disturbance"}
+    both = {key: 1.0 for key in UNITS}
+    made = comparison({"dp": both, "ours": both})["ratios"]["ours"]
+    assert "disturbance_flown" in made and not alone & set(made)
+    assert {BETTER[key] for key in alone} == {"none"}

@@ -229,7 +229,10 @@ methods: [dp, unaware, wake-aware]  # or package.module:make for a controller of
 targets: [branching, brain]       # {corals}, or mesh files
 worlds: [payload]                 # wakewise world list
 seeds: 3                          # seeds 1 to 3, or a list
-variations:                       # fields of the scenario, by dotted names
+scenario:                         # fields of the scenario of all trials, by dotted names or nested (docs/scenario.md)
+  mission.clearance_m: 0.05
+  control: {{w_effort: 0.001}}
+variations:                       # fields of the scenario that a variation changes, in the same two ways
   as-is: {{}}
   closer: {{mission.standoff_m: 0.45}}
 timeout_s: 1800                   # a trial that takes longer is ended

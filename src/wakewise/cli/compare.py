@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from wakewise.cli.console import Bars, no_report, print_json, print_table, shown
+from wakewise.cli.console import Bars, no_report, print_json, print_table, shown, unit_beside
 from wakewise.cli.options import (
     Json,
     Out,
@@ -33,7 +33,7 @@ _ROWS = (
     "exposure_speed_mean_m_s",
     "bed_speed_p95_m_s",
     "turbidity_mean_per_m",
-    "disturbance",
+    "disturbance_flown",
     "position_rmse_mm",
     "path_rmse_mm",
     "velocity_deviation_pct",
@@ -65,8 +65,9 @@ def compare(
     from wakewise.trials import UNITS
 
     names = [name.strip() for name in methods.split(",") if name.strip()]
-    if len(names) != len(set(names)) or not names:
-        raise InputError(f"--methods: '{methods}', must be one or more different names such as dp,wake-aware")
+    if len(names) != len(set(names)) or len(names) < 2:
+        hint = f"; one alone is `wakewise scan --method {names[0]}`" if len(names) == 1 else ""
+        raise InputError(f"--methods: '{methods}', must be two or more different names such as dp,wake-aware{hint}")
     changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, world=world)
     scenarios = {name: load_scenario(preset, scenario, changes | {"method": name}) for name in names}
     folder = out or default_folder(scenarios[names[0]], "compare")
@@ -84,7 +85,7 @@ def compare(
         table.add_column(name, justify="right")
     table.add_column("unit")
     for key in _ROWS:
-        table.add_row(key, *(shown(figures["methods"][name][key]) for name in names), UNITS[key])
+        table.add_row(key, *(shown(figures["methods"][name][key]) for name in names), unit_beside(key, UNITS[key]))
     table.add_section()
     for key in figures["ratios"][names[0]]:
         if key != "why":

@@ -132,7 +132,7 @@ def print_json(value: Any) -> None:
 
 
 def status_line(line: str) -> None:
-    """Write a line over the last one of a terminal, cut to its width so that it never wraps; a line each time elsewhere."""
+    """Write over the last line of a terminal, cut to its width so that nothing wraps; a line each time elsewhere."""
     if sys.stderr.isatty():
         columns = shutil.get_terminal_size().columns
         sys.stderr.write(f"\r{line[: columns - 1]}\x1b[K")
@@ -168,6 +168,14 @@ def shown(value: Any) -> str:
             return f"{value:.2g}"
         return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}" if abs(value) < 10 else f"{value:.1f}"
     return str(value)
+
+
+_IN_NAMES = {"m/s": "m_s", "%": "pct", "1/m": "per_m", "1/s": "per_s"}
+
+
+def unit_beside(key: str, unit: str) -> str:
+    """The unit to print beside a figure's name; nothing where the name ends in it or holds it."""
+    return "" if f"_{_IN_NAMES.get(unit, unit)}_" in f"{key}_" else unit
 
 
 def reasons_once(why: Mapping[str, str], keys: Sequence[str]) -> list[str]:

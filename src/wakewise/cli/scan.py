@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wakewise.cli.console import Bars, no_report, print_json, print_table, reasons_once, shown
+from wakewise.cli.console import Bars, no_report, print_json, print_table, reasons_once, shown, unit_beside
 from wakewise.cli.options import (
     Json,
     Out,
@@ -131,7 +131,7 @@ def _print_figures(scenario: Scenario, figures: dict[str, Any]) -> None:
     table.add_column("value", justify="right")
     table.add_column("unit")
     for key in _HEADLINES:
-        table.add_row(key, shown(figures[key]), figures["units"][key])
+        table.add_row(key, shown(figures[key]), unit_beside(key, figures["units"][key]))
     print_table(table)
     for line in reasons_once(figures["why"], _HEADLINES):
         typer.echo(line)

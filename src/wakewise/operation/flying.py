@@ -194,7 +194,8 @@ def fly(
     lasts_s = route.duration_s if duration_s is None else finite_number(duration_s, "duration_s")
     if round(lasts_s / dt_s) < 1:
         raise InputError(f"duration_s: {lasts_s:g}, must be at least one control step, {dt_s:g} s")
-    finite_number(water_every_s, "water_every_s", above=0.0)
+    if water_every_s != math.inf:  # never
+        finite_number(water_every_s, "water_every_s", above=0.0)
     warm(FLIGHT_JOBS, _Notice() if progress is no_progress else progress)
     if checked:
         _ = parts.preflight

@@ -22,7 +22,7 @@ from wakewise.operation.pilots import PILOTS
 from wakewise.operation.renamed import became
 from wakewise.operation.survey import SurveySettings
 from wakewise.operation.target_settings import TargetSettings
-from wakewise.operation.worlds.library import load_world, world_names
+from wakewise.operation.worlds.library import load_world, own_file, world_names
 from wakewise.operation.worlds.makers import WORLDS
 from wakewise.plugins import names
 from wakewise.reconstruction import ReconstructionSettings
@@ -84,7 +84,8 @@ class Scenario(Settings):
             return value  # what the part that was given calls itself
         known = names({"flow": "world"}.get(kind, kind), _OWN[kind])
         if value not in known and ":" not in value:
-            raise ValueError(f"{guess(value, known)}allowed are {', '.join(known)}, or package.module:make")
+            hint = own_file(value) or guess(value, known)
+            raise ValueError(f"{hint}allowed are {', '.join(known)}, or package.module:make")
         return value
 
     @field_validator("name")

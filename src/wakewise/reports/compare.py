@@ -10,6 +10,7 @@ import cv2
 
 from wakewise.errors import InputError
 from wakewise.files import write_text
+from wakewise.pictures import read_picture
 from wakewise.reports import figures
 from wakewise.reports.errors import ModelErrors, model_errors
 from wakewise.reports.ink import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, data_uri, error_colours
@@ -38,9 +39,10 @@ MAIN = (
     ("photographs placed", "registered_images", "", 1.0),
     ("distance from the wished place, rms", "position_rmse_mm", "mm", 1.0),
     ("energy of the thrusters", "energy_kJ", "kJ", 1.0),
-    ("D at the target, the wake model's estimate", "disturbance_flown", "m²/s²", 1.0),
+    ("disturbance_flown: D at the target, the wake model's estimate", "disturbance_flown", "m²/s²", 1.0),
 )
-_SAME_BY_NATURE = ("seed", "rmse_cap_mm")  # a ratio of these says nothing
+# A ratio of these says nothing: the same by nature, or a sum over the points that each method watches, which differ.
+_NO_RATIO = ("seed", "rmse_cap_mm", "disturbance")
 
 
 def write_comparison(trials: Mapping[str, Path], out: Path) -> Path:
@@ -129,14 +131,12 @@ def _one_draw(trials: Mapping[str, Trial], seeds: set[str]) -> str:
 def _odd_disturbance(trials: Mapping[str, Trial], name: str) -> str:
     """Why D can be worse where the water is calmer; empty where it is not so."""
     speed = _ratio(trials, name, "target_speed_mean_m_s")
-    for key in ("disturbance_flown", "disturbance"):
-        D = _ratio(trials, name, key)
-        if speed is not None and D is not None and speed < 1.0 - _PLAIN and D > 1.0 + _PLAIN:
-            return (
-                f"{key} of {name} is {number(D)} times as high although its water is calmer: D is no measurement but "
-                "the wake model's estimate of the jets"
-                + (", summed over the points that each method watches, which differ." if key == "disturbance" else ".")
-            )
+    D = _ratio(trials, name, "disturbance_flown")
+    if speed is not None and D is not None and speed < 1.0 - _PLAIN and D > 1.0 + _PLAIN:
+        return (
+            f"disturbance_flown of {name} is {number(D)} times as high although its water is calmer: D is no "
+            "measurement but the wake model's estimate of the jets."
+        )
     return ""
 
 
@@ -217,7 +217,7 @@ def _cells(trials: Mapping[str, Trial], key: str, texts: Mapping[str, str | None
             text = f'<span class="null" title="{why}">–</span>'
         cells.append(f'<td class="{"num better" if name in best else "num"}">{text}</td>')
         if i:
-            ratio = None if key in _SAME_BY_NATURE else _ratio(trials, name, key)
+            ratio = None if key in _NO_RATIO else _ratio(trials, name, key)
             cells.append(f'<td class="num unit">{"" if ratio is None else "× " + number(ratio)}</td>')
     return "".join(cells)
 
@@ -255,7 +255,7 @@ def _water(trials: Mapping[str, Trial]) -> str:
 def _rows(picture: Path | None) -> str:
     if picture is None:
         return ""
-    image = cv2.imread(str(picture), cv2.IMREAD_COLOR)
+    image = read_picture(picture)
     if image is None:
         return ""
     jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 86])[1]

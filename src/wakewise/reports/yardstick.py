@@ -115,15 +115,16 @@ def against_dp(trial: Trial) -> Yardstick | None:
     if not flown or not least:
         return None
     words = (
-        "What dp's sharing of the very same forces would have done, by the controller's own wake model: an estimate, "
-        "nothing measured. D is the weighted sum of squared jet speeds at the target."
+        "How much less wash there is than with dp is told by a flight of dp in the same water, which `wakewise "
+        "compare` makes: the speed of the water at the target, of the same seed. Until then there is only the wake "
+        "model's estimate of what dp's sharing of the very same forces would have done. D is the weighted sum of "
+        "squared jet speeds at the target."
     )
     bars = (
         Bar("D as flown, estimated", flown, f"{number(flown)} m²/s²", own=True),
         Bar("D of dp's sharing, estimated", least, f"{number(least)} m²/s²"),
     )
-    ratio = flown / least
-    return Yardstick(title, f"{_against(ratio)} disturbance, by estimate", _good(ratio), words, bars)
+    return Yardstick(title, "not measured: dp has not flown in this water", None, words, bars)
 
 
 def _measured_dp_m_s(trial: Trial) -> float | None:

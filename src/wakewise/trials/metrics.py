@@ -133,7 +133,7 @@ BETTER: dict[str, Better] = {key: better for key, (_, _, better) in _FIGURES.ite
 _RATIOS = {
     "target_speed": "target_speed_mean_m_s",
     "exposure_speed": "exposure_speed_mean_m_s",
-    "disturbance": "disturbance",
+    "disturbance_flown": "disturbance_flown",
     "rmse": "rmse_mm",
     "energy": "energy_kJ",
     "position_rmse": "position_rmse_mm",

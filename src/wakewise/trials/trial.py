@@ -107,6 +107,7 @@ def run_trial(
     parts = parts_of(flight)
     scenario = as_flown(parts)
     check_place(folder, scenario)
+    _ = parts.from_outside  # a name that leads nowhere is refused before a kernel is compiled or a folder made
     if not is_warm(JOBS):
         _ = parts.vehicle  # a file that cannot be used is refused before minutes of compiling
         if scenario.target.kind not in coral_kinds():

@@ -80,6 +80,13 @@ def world_names() -> tuple[str, ...]:
     return tuple(sorted(name for name in names if not name.startswith("_")))
 
 
+def own_file(name: str) -> str:
+    """A hint for whoever gives a file for a world; empty for any other name."""
+    if not name.lower().endswith((".yaml", ".yml")):
+        return ""
+    return f"a world of your own is given as the scenario, `wakewise scan {name}` (docs/worlds.md), by name "
+
+
 @functools.cache
 def load_world(name: str) -> NamedWorld:
     """A world of the library.
@@ -90,7 +97,7 @@ def load_world(name: str) -> NamedWorld:
         If there is none of that name, or its file is not one.
     """
     if name not in world_names():
-        hint = guess(name, world_names())
+        hint = own_file(name) or guess(name, world_names())
         raise InputError(f"world '{name}': not in the library, {hint}allowed are {', '.join(world_names())}")
     own = parse_world(name, _text(name)).file
     return NamedWorld(name=name, file=own.model_copy(update={"fields": every_world() | own.fields}))

@@ -1,7 +1,9 @@
 """What one figure of the paper's tables is, as data: its value where it is known here, its side, how we measure it.
 
-Known are the numbers that this project's own records quote; the paper itself lies in no file of it. A number that is
-not quoted is None and said so, never guessed. `than` names the method against which a claim is a difference.
+The paper: Y. Gao, T. Xu, Q. Liu and Y. Cai, Disturbance-Aware Motion Planning for Over-Actuated Underwater Vehicles
+Exploiting Actuation Redundancy for High-Fidelity 3D Reconstruction (2026). Its figures stand here by section or table;
+a number that it does not give, or that is not quoted, is None and said so, never guessed. `than` names the method
+against which a claim is a difference.
 """
 
 from __future__ import annotations
@@ -133,7 +135,7 @@ def model_claims(paper_rmse: dict[str, float | None], paper_complete: dict[str, 
                 unit="%",
                 paper=share,
                 said=UNQUOTED if share is None else f"{share:g} % of the surface",
-                side="more" if share is not None else "none",
+                side="more" if share is not None and method == OURS else "none",
                 how=COMPLETE,
             )
         )
