@@ -53,11 +53,11 @@ def won(glance: Glance) -> str:
     if glance.means[glance.winner] == glance.means[glance.rival]:
         return f"{glance.winner} and {glance.rival} are even: {value} {glance.words} each."
     if not glance.is_sure:
-        other = number(glance.means[glance.rival])
-        much = f" ({_better(glance)})" if glance.less_pct is not None else ""
-        return (
-            f"no difference shown: {glance.winner} {value}, {glance.rival} {other} {glance.words}{much}; {glance.sure}."
-        )
+        both = f"{glance.winner} {value}, {glance.rival} {number(glance.means[glance.rival])} {glance.words}"
+        much = f", {_better(glance)} apart" if glance.less_pct is not None else ""
+        apart = glance.interval_pct is not None and glance.interval_pct[0] > 0.0
+        head = f"{glance.winner} came out better" if apart else "no difference shown"
+        return f"{head}: {both}{much}; {glance.sure}."
     said = f"{glance.winner} is best with {value} {glance.words}"
     if glance.less_pct is not None:
         said += f", {_better(glance)} better than {glance.rival}"

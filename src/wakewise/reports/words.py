@@ -150,7 +150,7 @@ def percent(value: float | None, ends: tuple[float, float] | None = None, *, mor
     if max(ratios) <= TIMES:
         return f"{number(value)} %", "" if ends is None else f"({number(ends[0])} to {number(ends[1])})"
     inside = "" if ends is None else f"({number(min(ratios[1:]))} to {number(max(ratios[1:]))} times)"
-    return f"{number(ratios[0])} times", inside
+    return f"{number(ratios[0])} times{'' if more else ' as much'}", inside
 
 
 def duration(seconds: float | None) -> str:

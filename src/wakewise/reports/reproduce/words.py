@@ -30,8 +30,8 @@ def met_of(tables: Mapping[str, Sequence[Row]]) -> str:
 
 def where(counts: Mapping[str, int]) -> str:
     """In which worlds figures count as met, and how many are in the paper's own set-up."""
-    own = f", {counts['own']} of {counts['own_judged']} in the paper's own set-up ({SETUP})"
-    return f" in some world, whichever{own if counts['own_judged'] else ''}" if counts["worlds"] else ""
+    own = f", and {counts['own']} of {counts['own_judged']} in {SETUP}, the paper's own set-up"
+    return f" in any world at all{own if counts['own_judged'] else ''}" if counts["worlds"] else ""
 
 
 def verdict(row: Row) -> str:
