@@ -97,6 +97,29 @@ def test_attitude_error_is_against_the_goal():
     assert roll_pitch_rms_deg(true, goal) == pytest.approx(np.sqrt(12.5))
 
 
+def test_a_roll_across_half_a_turn_is_a_small_error():
+    """From 179 to -179 degrees are two, not 358."""
+    goal, true = (np.array([quat_from_euler(np.radians(roll), 0.0, 0.3)]) for roll in (179.0, -179.0))
+    assert roll_pitch_rms_deg(true, goal) == pytest.approx(np.sqrt(2.0**2 / 2.0), abs=1e-6)
+
+
+def test_a_step_counts_for_as_long_as_it_lasts():
+    """Of uneven steps the mean is over time, not over rows; the last lasts as long as the usual one."""
+    steps = pl.DataFrame(
+        {
+            "time_s": [0.0, 1.0, 1.1, 1.2, 1.3],
+            "target_speed_mean_m_s": [1.0, 0.0, 0.0, 0.0, 0.0],
+            "exposing": [True, True, False, False, False],
+            "power_W": [10.0, 0.0, 0.0, 0.0, 100.0],
+        }
+    )
+    figures = flight_figures(steps)
+    assert figures["duration_s"] == pytest.approx(1.4)
+    assert figures["target_speed_mean_m_s"] == pytest.approx(1.0 / 1.4)
+    assert figures["exposure_speed_mean_m_s"] == pytest.approx(1.0 / 1.1)
+    assert figures["energy_kJ"] == pytest.approx(0.020)
+
+
 def test_the_whole_turn_counts_yaw():
     """A quarter turn is 90 degrees about any axis, whichever sign its quaternion has."""
     goal = np.array([quat_from_euler(0.1, 0.2, 0.5)] * 3)

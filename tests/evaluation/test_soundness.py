@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 import trimesh
 
 from wakewise.evaluation import mesh_faults
@@ -34,3 +35,11 @@ def test_each_fault_is_counted_and_said():
     assert fin.crowded_edges >= 1 and fin.duplicate_faces == 0 and "non-manifold" in fin.words()[0]
     assert mesh_faults(mesh(np.concatenate([BALL, [[a, b, b]]]))).flat_faces == 1
     assert mesh_faults(mesh(BALL[1:])).open_edges == 3 and mesh_faults(mesh(BALL[1:])).words() == []
+
+
+@pytest.mark.parametrize("face", [(0, 0, 1), (0, 1, 0), (1, 0, 0), (0, 1, 1), (1, 0, 1), (1, 1, 0), (1, 1, 1)])
+def test_a_face_with_two_corners_in_one_place_is_flat(face):
+    """Whichever two they are: it is counted as flat, and neither as double nor for its edges."""
+    square = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    found = mesh_faults(SimpleNamespace(vertices_m=square, faces=np.array([[0, 1, 2], face])))
+    assert (found.flat_faces, found.duplicate_faces, found.crowded_edges, found.open_edges) == (1, 0, 0, 3)
