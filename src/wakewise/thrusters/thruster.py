@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from wakewise.arrays import Array, frozen
-from wakewise.checks import finite_number
+from wakewise.checks import finite_number, instance_of
 from wakewise.errors import InputError
 
 REACH_M = 10.0
@@ -42,7 +42,7 @@ def mount(record: Mounted) -> None:
     InputError
         If a number is not finite, the axis has no length, or the place is more than 10 m away.
     """
-    where = f"thruster {record.name}"
+    where = f"thruster {instance_of(record.name, str, 'thruster: name')}"
     place = frozen(record.p_BT_m, (3,), f"{where}: p_BT_m")
     axis = frozen(record.axis_B, (3,), f"{where}: axis_B")
     length = float(np.linalg.norm(axis))

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 
 from wakewise.arrays import Array, frozen
+from wakewise.checks import instance_of
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 from wakewise.settings import Faults
@@ -21,7 +21,7 @@ from wakewise.vehicles.hydrodynamics import (
     require_linear_damping,
     require_quadratic_damping,
 )
-from wakewise.vehicles.needs import THRUSTER_FIELDS, THRUSTER_WORDS, VEHICLE_WORDS
+from wakewise.vehicles.needs import THRUSTER_FIELDS, THRUSTER_WORDS, VEHICLE_WORDS, stated
 from wakewise.vehicles.tilt import TiltJoint
 from wakewise.vehicles.vehicle import (
     CurveChoice,
@@ -32,12 +32,12 @@ from wakewise.vehicles.vehicle import (
     require_different_names,
     require_fov,
     require_inertia,
+    require_kinds,
     require_positive,
     require_size,
     thrust_steps,
+    tuple_of,
 )
-
-T = TypeVar("T")
 
 ROUNDING = 1e-3
 """Largest asymmetry of an added mass, relative to its largest element, that passes as rounding in the file."""
@@ -87,7 +87,7 @@ class ThrusterDraft:
         for field in THRUSTER_WORDS:
             value = getattr(self, field)
             if value is not None:
-                require_limit(f"thruster {self.name}", field, float(value))
+                require_limit(f"thruster {self.name}", field, value)
 
     @property
     def wrench_per_newton_B(self) -> Array:
@@ -162,6 +162,10 @@ class VehicleDraft:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        require_kinds(self)
+        tuple_of(self.thrusters, ThrusterDraft, "thrusters")
+        if self.X_BC is not None:
+            instance_of(self.X_BC, Pose, "X_BC")
         faults = Faults()
         for field, shape in (
             ("size_m", (3,)),
@@ -204,8 +208,9 @@ class VehicleDraft:
         n = len(self.thrusters)
         if n > MAX_THRUSTERS:
             raise InputError(f"{n} thrusters, at most {MAX_THRUSTERS} are read")
-        if self.shipped_matrix is not None and n and np.shape(self.shipped_matrix)[-1] != n:
-            raise InputError(f"shipped_matrix: shape {self.shipped_matrix.shape}, allowed (6, {n}), one per thruster")
+        shape = np.shape(self.shipped_matrix) if isinstance(self.shipped_matrix, np.ndarray) else ()
+        if len(shape) == 2 and n and shape[1] != n:
+            raise InputError(f"shipped_matrix: shape {shape}, allowed (6, {n}), one per thruster")
 
     @classmethod
     def of(cls, vehicle: Vehicle) -> VehicleDraft:
@@ -376,13 +381,6 @@ class VehicleDraft:
             camera_fov_rad=stated(self.camera_fov_rad),
             provenance=self.provenance,
         )
-
-
-def stated(value: T | None) -> T:
-    """A value that was found to be there."""
-    if value is None:
-        raise InputError("vehicle: is not whole")
-    return value
 
 
 def _whole(draft: ThrusterDraft) -> Thruster:

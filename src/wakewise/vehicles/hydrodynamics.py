@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wakewise.arrays import Array, freeze
+from wakewise.checks import instance_of
 from wakewise.errors import InputError
 
 AS_BELIEVED, DRAWN = "as-believed", "drawn"
@@ -83,6 +84,8 @@ class DragCase:
     quadratic_damping: Array
 
     def __post_init__(self) -> None:
+        instance_of(self.name, str, "drag_cases: name")
+        instance_of(self.source, str, f"drag_cases.{self.name}: source")
         if self.name in (AS_BELIEVED, DRAWN):
             raise InputError(f"drag_cases: {self.name} is not a name for a case, choose another")
         freeze(self, linear_damping=(6, 6), quadratic_damping=(6, 6))

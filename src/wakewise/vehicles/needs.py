@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
+from wakewise.errors import InputError
+
+T = TypeVar("T")
+
 BLANK = "_"
 """What a vehicle file has in place of a number that is to be filled in."""
 
@@ -39,3 +45,10 @@ THRUSTER_WORDS = {
     "disk_area_m2": "disk",
     "time_constant_s": "lag",
 }
+
+
+def stated(value: T | None) -> T:
+    """A value that was found to be there."""
+    if value is None:
+        raise InputError("vehicle: is not whole")
+    return value

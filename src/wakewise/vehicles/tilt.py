@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wakewise.arrays import Array, freeze
+from wakewise.checks import finite_number
 from wakewise.errors import InputError
 from wakewise.geometry import Pose
 
@@ -39,10 +40,12 @@ class TiltJoint:
     p_BJ_m: Array | None = None
 
     def __post_init__(self) -> None:
+        for field in ("low_rad", "high_rad", "rate_rad_s"):
+            finite_number(getattr(self, field), f"camera_tilt: {field}")
         low, high = math.degrees(self.low_rad), math.degrees(self.high_rad)
         if not -90.0 <= low <= 0.0 <= high <= 90.0 or not low < high:
             raise InputError(f"camera_tilt: range {low:g} to {high:g} deg, must hold 0 and lie within -90 to 90")
-        if not math.isfinite(self.rate_rad_s) or self.rate_rad_s <= 0.0:
+        if self.rate_rad_s <= 0.0:
             raise InputError(f"camera_tilt: rate {math.degrees(self.rate_rad_s):g} deg/s, must be finite and above 0")
         if self.p_BJ_m is not None:
             freeze(self, p_BJ_m=(3,))

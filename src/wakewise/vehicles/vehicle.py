@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +28,11 @@ class Provenance:
     source: str
     estimate: bool
 
+    def __post_init__(self) -> None:
+        instance_of(self.group, str, "provenance: group")
+        instance_of(self.source, str, "provenance: source")
+        instance_of(self.estimate, bool, "provenance: estimate")
+
 
 @dataclass(frozen=True, kw_only=True)
 class CurveChoice:
@@ -35,6 +41,10 @@ class CurveChoice:
     table: str
     supply_V: float
 
+    def __post_init__(self) -> None:
+        instance_of(self.table, str, "thruster_curve: table")
+        finite_number(self.supply_V, "thruster_curve: supply_V", above=0.0)
+
 
 @dataclass(frozen=True, kw_only=True)
 class LeastThrust:
@@ -42,6 +52,10 @@ class LeastThrust:
 
     forward_N: float
     reverse_N: float
+
+    def __post_init__(self) -> None:
+        finite_number(self.forward_N, "thruster_least: forward_N", least=0.0)
+        finite_number(self.reverse_N, "thruster_least: reverse_N", least=0.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -114,10 +128,9 @@ class Vehicle:
         require_size(self.size_m)
         require_inertia(self.inertia_kg_m2)
         instance_of(self.X_BC, Pose, "X_BC")
-        if not isinstance(self.thrusters, tuple):
-            raise InputError(f"thrusters: a {type(self.thrusters).__name__}, must be a tuple of Thruster")
-        for thruster in self.thrusters:
-            instance_of(thruster, Thruster, "thrusters")
+        instance_of(self.hydrodynamics, Hydrodynamics, "hydrodynamics")
+        require_kinds(self)
+        tuple_of(self.thrusters, Thruster, "thrusters")
         if not self.thrusters:
             raise InputError("thrusters: none, there must be at least one")
         require_different_names([t.name for t in self.thrusters])
@@ -203,6 +216,32 @@ def thrust_steps(curve: CurveChoice | None, least: LeastThrust | None) -> Thrust
     return None
 
 
+def require_kinds(record: Any) -> None:
+    """Refuse a vehicle, or a draft of one, whose words, records or lists are something else.
+
+    Raises
+    ------
+    InputError
+        Naming the field.
+    """
+    for field in ("name", "title", "source", "does_not_claim"):
+        instance_of(getattr(record, field), str, field)
+    kinds: tuple[tuple[str, type], ...] = (("tilt", TiltJoint), ("curve", CurveChoice), ("least_thrust", LeastThrust))
+    for field, kind in kinds:
+        if getattr(record, field) is not None:
+            instance_of(getattr(record, field), kind, field)
+    tuple_of(record.drag_cases, DragCase, "drag_cases")
+    tuple_of(record.provenance, Provenance, "provenance")
+
+
+def tuple_of(value: Any, kind: type, field: str) -> None:
+    """Refuse what is no tuple of one kind of record."""
+    if not isinstance(value, tuple):
+        raise InputError(f"{field}: a {type(value).__name__}, must be a tuple of {kind.__name__}")
+    for one in value:
+        instance_of(one, kind, field)
+
+
 def require_positive(field: str, value: float) -> None:
     """Refuse a number that is not finite or not more than 0."""
     finite_number(value, field, above=0.0)
@@ -210,7 +249,7 @@ def require_positive(field: str, value: float) -> None:
 
 def require_fov(camera_fov_rad: float) -> None:
     """Refuse a field of view that no lens with straight lines has."""
-    if not 0.0 < camera_fov_rad < math.pi:
+    if not 0.0 < finite_number(camera_fov_rad, "camera_fov_rad") < math.pi:
         raise InputError(f"camera_fov_rad: {camera_fov_rad:g}, must be more than 0 and less than pi")
 
 

@@ -12,8 +12,9 @@ from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.geometry import Pose, matrix_from_quat, quat_from_euler
 from wakewise.settings import Faults, Settings
-from wakewise.vehicles.draft import ThrusterDraft, VehicleDraft, stated
+from wakewise.vehicles.draft import ThrusterDraft, VehicleDraft
 from wakewise.vehicles.hydrodynamics import DragCase
+from wakewise.vehicles.needs import stated
 from wakewise.vehicles.tilt import TiltJoint
 from wakewise.vehicles.vehicle import CurveChoice, LeastThrust, Provenance
 
