@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from wakewise.cli.console import Bars, print_json, print_table, shown
-from wakewise.cli.options import Json
+from wakewise.cli.options import Json, seed_option
 from wakewise.errors import InputError
 
 Model = Annotated[
@@ -42,7 +42,7 @@ Region = Annotated[
         show_default=False,
     ),
 ]
-Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of every random draw.")]
+Seed = Annotated[int, typer.Option("--seed", callback=seed_option, help="Seed of every random draw.")]
 Threads = Annotated[
     int, typer.Option("--threads", min=1, max=64, help="Threads on a CPU; where others work too, 1 may be the fastest.")
 ]

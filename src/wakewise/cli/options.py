@@ -24,7 +24,20 @@ Sets = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
-Seed = Annotated[int | None, typer.Option("--seed", help="Seed of every random draw.", show_default=False)]
+
+
+def seed_option(value: int | None) -> int | None:
+    """A seed as it was given, if it is one (see `wakewise.settings.seed_number`)."""
+    if value is None:
+        return None
+    from wakewise.settings import seed_number
+
+    return seed_number(value, "--seed")
+
+
+Seed = Annotated[
+    int | None, typer.Option("--seed", callback=seed_option, help="Seed of every random draw.", show_default=False)
+]
 Vehicle = Annotated[
     str | None, typer.Option("--vehicle", help="Library name or vehicle YAML file.", show_default=False)
 ]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from wakewise.cli.console import print_json
-from wakewise.cli.options import Json
+from wakewise.cli.options import Json, seed_option
 from wakewise.physics import TRIM_WATER_KG_M3
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ Every = Annotated[
     float | None,
     typer.Option("--every", metavar="S", help="Times of the answer; else those of the thrusts.", show_default=False),
 ]
-ProbeSeed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the turbulence.")]
+ProbeSeed = Annotated[int, typer.Option("--seed", callback=seed_option, help="Seed of the turbulence.")]
 Turbulence = Annotated[bool, typer.Option("--turbulence", help="With the turbulence of trials; else mean jets.")]
 Swirl = Annotated[bool, typer.Option("--swirl", help="Parcels as wide as a propeller's swirling jets.")]
 Density = Annotated[float, typer.Option("--density", min=900.0, max=1100.0, help="Of the water, kg/m3.")]

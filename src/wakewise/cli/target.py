@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from wakewise.cli.console import print_json
-from wakewise.cli.options import Json, TargetSize
+from wakewise.cli.options import Json, TargetSize, seed_option
 
 if TYPE_CHECKING:
     from wakewise.targets import Target
@@ -33,7 +33,9 @@ Points = Annotated[int, typer.Option(help="Points of the region, 2 to 10000.")]
 Gain = Annotated[
     float, typer.Option(help="How many times more the most delicate feature counts; 0 is the paper's weights.")
 ]
-TargetSeed = Annotated[int, typer.Option("--seed", help="Individual of a procedural coral, and draw of the points.")]
+TargetSeed = Annotated[
+    int, typer.Option("--seed", callback=seed_option, help="Individual of a procedural coral, and draw of the points.")
+]
 
 
 @app.callback()

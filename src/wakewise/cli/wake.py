@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from wakewise.cli.console import Bars, print_json, print_table, shown, write_page
-from wakewise.cli.options import Json
+from wakewise.cli.options import Json, seed_option
 
 app = typer.Typer(
     help="What a jet does to the water: calibrate a model, see how good each is.",
@@ -41,7 +41,7 @@ Held = Annotated[
     list[float] | None,
     typer.Option("--test-thrust", metavar="N", help="Hold this thrust out for the test; may be repeated. Else drawn."),
 ]
-Seed = Annotated[int, typer.Option("--seed", help="Seed of the split and of the resamples.")]
+Seed = Annotated[int, typer.Option("--seed", callback=seed_option, help="Seed of the split and of the resamples.")]
 Resamples = Annotated[int, typer.Option("--bootstrap", min=0, max=10000, help="Resamples for the 95 % intervals.")]
 FitOut = Annotated[
     Path | None, typer.Option("--out", help="Write the model here, for a scenario to take.", show_default=False)
@@ -259,7 +259,9 @@ World = Annotated[str, typer.Option("--world", help="World of the library to fly
 Method = Annotated[str, typer.Option("--method", help="Who holds the hover.")]
 Minutes = Annotated[float, typer.Option("--minutes", min=0.5, max=30.0, help="How long the hover is.")]
 HeldStill = Annotated[bool, typer.Option("--held", help="Hold the vehicle and let its bow thrusters push in turn.")]
-FlightSeed = Annotated[int, typer.Option("--seed", help="Seed of the world, which draws the jets' width.")]
+FlightSeed = Annotated[
+    int, typer.Option("--seed", callback=seed_option, help="Seed of the world, which draws the jets' width.")
+]
 
 
 @app.command("calibrate-flight")

@@ -8,12 +8,14 @@ from typing import Annotated, Any
 import typer
 
 from wakewise.cli.console import print_json, print_table
-from wakewise.cli.options import Json
+from wakewise.cli.options import Json, seed_option
 
 app = typer.Typer(help="Worlds: list, show what each is made of and why.", no_args_is_help=False, rich_markup_mode=None)
 
 Name = Annotated[str, typer.Argument(help="A world of the library; see `wakewise world list`.")]
-Seed = Annotated[int | None, typer.Option("--seed", min=0, help="Show what this seed draws.", show_default=False)]
+Seed = Annotated[
+    int | None, typer.Option("--seed", callback=seed_option, help="Show what this seed draws.", show_default=False)
+]
 _WIDTH = 100
 
 
