@@ -166,8 +166,8 @@ def _print_thrusters(facts: dict[str, Any]) -> None:
         [
             t["number"],
             t["name"],
-            *(f"{value + 0.0:.3f}" for value in t["position_m"]),
-            " ".join(f"{value + 0.0:+.3f}" for value in t["axis"]),
+            *(f"{value:z.3f}" for value in t["position_m"]),
+            " ".join(f"{value:+z.3f}" for value in t["axis"]),
             shown(t["max_forward_N"]),
             shown(t["max_reverse_N"]),
         ]
@@ -181,7 +181,7 @@ def _print_allocation(facts: dict[str, Any]) -> None:
     typer.echo(f"rank {facts['rank']} of 6, {facts['actuation']}")
     typer.echo(f"null space of dimension {len(facts['null_space'])}{':' if facts['null_space'] else ''}")
     for vector in facts["null_space"]:
-        thrusts = " ".join(f"{value + 0.0:+.3f}" for value in vector["thrusts"])
+        thrusts = " ".join(f"{value:+z.3f}" for value in vector["thrusts"])
         typer.echo(f"  {vector['name']}: {thrusts}  ({vector['words']})")
     wrench = facts["achievable_wrench"]
     if wrench is None:

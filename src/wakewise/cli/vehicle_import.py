@@ -218,9 +218,9 @@ def _tell(draft: VehicleDraft, comparison: Comparison | None, out: Path | None) 
         for column in ("name", "x m", "y m", "z m", "force axis", "forward N", "reverse N", "disk m2", "lag s"):
             table.add_column(column, justify="left" if column in ("name", "force axis") else "right")
         for t in draft.thrusters:
-            axis = " ".join(f"{value:+.3f}" for value in t.axis_B)
+            axis = " ".join(f"{value:+z.3f}" for value in t.axis_B)
             limits = (t.max_forward_N, t.max_reverse_N, t.disk_area_m2, t.time_constant_s)
-            table.add_row(plain(t.name), *(f"{v:.3f}" for v in t.p_BT_m), axis, *(shown(v) for v in limits))
+            table.add_row(plain(t.name), *(f"{v:z.3f}" for v in t.p_BT_m), axis, *(shown(v) for v in limits))
         print_table(table)
     for note in draft.notes:
         typer.echo(f"  {note}")
