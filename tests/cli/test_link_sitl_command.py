@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import socket
 import threading
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -42,19 +43,28 @@ def test_the_stand_in_speaks_mavlink_and_says_how_it_went(capsys: Capture) -> No
 
 @pytest.mark.slow
 def test_a_tank_behind_the_stand_in(capsys: Capture, tmp_path: Path) -> None:
-    """Both commands as a user starts them: frames are answered, none lost, the vehicle where its mission begins."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    beside = ["link", "stand-in", "--physics", f"127.0.0.1:{port}", "--out", "127.0.0.1:9", "--seconds", "12"]
+    """Both commands as a user starts them: frames are answered, none lost, the vehicle where its mission begins.
+
+    It begins under water here, so the autopilot calls that a depth of 0, and the difference is told and counted.
+    """
+    with ExitStack() as stack:
+        free = [stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(2)]
+        for each in free:
+            each.bind(("127.0.0.1", 0))
+        port, watch = (each.getsockname()[1] for each in free)
+    beside = ["link", "stand-in", "--physics", f"127.0.0.1:{port}", "--out", f"127.0.0.1:{watch}", "--seconds", "12"]
     other = threading.Thread(target=run, args=(beside,))
     other.start()
-    assert run(["link", "sitl", "--port", str(port), "--world", "still-tank", "--seconds", "5", "--json"]) == 0
+    asked = ["link", "sitl", "--port", str(port), "--world", "still-tank", "--seconds", "5", "--held", "0"]
+    assert run([*asked, "--watch", f"127.0.0.1:{watch}", "--json"]) == 0
     said = json.loads(capsys.readouterr().out.partition("\nt ")[0])
     other.join()
     assert (said["vehicle"], said["world"], said["lost"], said["refused"]) == ("bluerov2-heavy", "still-tank", 0, 0)
     assert said["frames"] > 100
     assert 0.1 < said["depth_m"] < 3.0
+    assert said["depth_apart"] == said["depth_looks"] > 0
+    assert said["depth_apart_most_m"] == pytest.approx(said["depth_m"], abs=0.1)
+    assert said["stage"] == ""
 
 
 @pytest.mark.parametrize(
@@ -64,6 +74,7 @@ def test_a_tank_behind_the_stand_in(capsys: Capture, tmp_path: Path) -> None:
         (["sitl", "--world", "no-such"], "no-such"),
         (["sitl", "--rate", "5"], "--rate 5"),
         (["sitl", "--port", "70000"], "--port 70000"),
+        (["sitl", "--watch", "nowhere"], "must be HOST:PORT"),
         (["sitl", "--host", "300.1.1.1"], "300.1.1.1"),
         (["sitl", "--params", "text.params"], "line 1"),
         (["sitl", "--params", "six.params"], "drives motors 1, 2"),
