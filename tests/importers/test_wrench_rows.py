@@ -107,6 +107,15 @@ def test_motor_factors_are_no_wrench(tmp_path: Path, factors: np.ndarray, column
         assert any(note.startswith("QUESTIONED: thruster_matrix holds motor factors") for note in known.notes)
 
 
+def test_signs_that_read_as_a_wrench_are_questioned(tmp_path: Path) -> None:
+    """Roll, pitch, yaw, surge, sway, heave of six motors: with forces first no moment is along its force, by luck."""
+    rows = "[[0,0,1,-1,1,0],[0,0,-1,-1,-1,0],[0,0,-1,1,1,0],[0,0,1,1,-1,0],[1,0,0,0,0,-1],[-1,0,0,0,0,-1]]"
+    notes = imported(tmp_path, f"{DOWN}thruster_matrix: {rows}").notes
+    assert any(n.startswith("QUESTIONED: thruster_matrix holds -1, 0 and 1 only") and "--rows" in n for n in notes)
+    known = imported(tmp_path, f"{DOWN}thruster_matrix: {rows}\nrows: [roll, pitch, yaw, surge, sway, heave]")
+    assert "cannot make pitch alone" in known.notes[-1]
+
+
 def test_a_moment_along_its_own_force_is_refused(tmp_path: Path) -> None:
     """A propeller's reaction, some centimetres, passes."""
     text = "tam: [[1,0],[0,1],[0,0],[TWIST,0],[0,0],[0.5,-0.5]]"

@@ -158,6 +158,11 @@ def settle(raw: Array, order: Order | None, what: str, place: Place | None, note
     if fits:
         chosen = fits[0]
         others = [r for r in fits[1:] if not np.array_equal(r[0], chosen[0])]
+        if place is not None and np.isin(raw, (-1.0, 0.0, 1.0)).all():
+            notes.append(
+                f"{QUESTION}{what} holds -1, 0 and 1 only, like motor factors; taken as {chosen[1]}, a guess; "
+                f"{ROWS_OPTION} (or ArduSub's roll,pitch,yaw,throttle,forward,lateral) says what the rows are"
+            )
         if others:
             notes.append(
                 f"{QUESTION}{what} reads as {chosen[1]} and as {others[0][1]}; the first is taken, a guess; "
