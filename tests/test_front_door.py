@@ -21,6 +21,11 @@ def test_about_fifteen_names_and_all_of_them_are_there():
         _ = ww.nothing
 
 
+def test_completion_shows_the_names_and_nothing_else():
+    """`ww.<Tab>`: what is exported; no helper of the page, no module that it imported."""
+    assert [name for name in dir(ww) if not name.startswith("__")] == sorted(ww.__all__)
+
+
 def test_importing_it_imports_no_room():
     """`import wakewise` pulls in neither arrays nor compilers: rooms are fetched when asked for."""
     heavy = "numpy, numba, scipy, polars, pydantic, cv2, pycolmap, matplotlib"

@@ -47,7 +47,8 @@ class _Door(ModuleType):
             super().__setattr__(name, value)
 
     def __dir__(self) -> list[str]:
-        return sorted({*self.__dict__, *self._homes})
+        """The exports, and what every module has; not what the page itself imported."""
+        return sorted({*self._homes, *(name for name in self.__dict__ if name.startswith("__"))})
 
 
 def lazy_door(name: str, *extras: str) -> None:
