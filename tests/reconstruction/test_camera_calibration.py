@@ -109,7 +109,9 @@ def test_the_family_of_the_markers_is_found(family, tmp_path):
 def test_another_board_or_too_few_photos_say_what_is_seen(boards, tmp_path):
     """Markers, their family and numbers, and what the board that was named would have."""
     (tmp_path / "0.png").write_bytes((boards / "0.png").read_bytes())
-    with pytest.raises(StageError, match="is found in 1 of 1 photos, at least 3 .*; seen are markers of DICT_5X5_1000"):
+    with pytest.raises(
+        StageError, match=r"is found in 1 of 1 photos, at least 3 .*; seen are markers of DICT_5X5_1000"
+    ):
         calibrate(tmp_path, BOARD)
     with pytest.raises(StageError) as fault:
         calibrate(tmp_path, Board(columns=4, rows=3, square_m=0.03, marker_m=0.022))

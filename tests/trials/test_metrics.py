@@ -88,7 +88,7 @@ def test_no_ratio_is_made_of_what_cannot_be_compared() -> None:
     """A figure whose definition says that methods cannot be compared by it is in no ratio, and has no better side."""
     alone = {key for key, text in DEFINITIONS.items() if "cannot be compared by it" in text}
     assert alone == {"disturbance"}
-    both = {key: 1.0 for key in UNITS}
+    both = dict.fromkeys(UNITS, 1.0)
     made = comparison({"dp": both, "ours": both})["ratios"]["ours"]
     assert "disturbance_flown" in made and not alone & set(made)
     assert {BETTER[key] for key in alone} == {"none"}
