@@ -121,14 +121,15 @@ def _vehicle(facts: Facts) -> Iterator[Row]:
 
 
 def _firmware(facts: Facts) -> Iterator[Row]:
-    least, tried = (".".join(map(str, version)) for version in (LEAST_FIRMWARE, TRIED_FIRMWARE))
+    least = ".".join(map(str, LEAST_FIRMWARE))
+    tried = " and ".join(".".join(map(str, version)) for version in TRIED_FIRMWARE)
     asked = f"ArduSub {least} or later"
     if facts.heard is None or facts.heard.firmware is None:
         yield _unknown("firmware", asked, facts, "not said by the autopilot" if facts.heard is not None else "")
         return
     found = ".".join(map(str, facts.heard.firmware))
     if facts.heard.firmware >= LEAST_FIRMWARE:
-        also = "" if facts.heard.firmware[:2] == TRIED_FIRMWARE[:2] else f"tried on {tried} only: run --motor-test"
+        also = "" if facts.heard.firmware[:2] in TRIED_FIRMWARE else f"tried on {tried} only: run --motor-test"
         yield Row(what="firmware", asked=asked, found=found, verdict="go", do=also)
     else:
         yield _row("firmware", asked, found, False, f"update ArduSub to {least} or later: its Lua lacks what is called")

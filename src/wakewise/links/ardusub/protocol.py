@@ -123,5 +123,5 @@ FIGURES_PERIOD_S: Final = 0.5
 # What it runs on.
 LEAST_FIRMWARE: Final = (4, 5, 0)
 """Oldest ArduSub whose Lua has every binding that the script calls."""
-TRIED_FIRMWARE: Final = (4, 6, 0)
-"""ArduSub that the way through message 139 was tried on: its development version of May 2024."""
+TRIED_FIRMWARE: Final = ((4, 6), (4, 7))
+"""ArduSub that the script was tried on: development versions of May 2024 and July 2025, in simulation."""

@@ -62,7 +62,8 @@ class DepthWatch:
         if not math.isfinite(self.off_m):
             return "autopilot's depth not heard"
         told = f"autopilot's depth {self.off_m:+.2f} m from the truth"
-        return told + (f" (WRONG; {self.apart} of {self.looks} looks)" if self.apart else "")
+        told += " WRONG" if abs(self.off_m) > APART_M else ""
+        return told + (f" ({self.apart} of {self.looks} looks over {APART_M:g} m)" if self.apart else "")
 
     def facts(self) -> dict[str, float | int | None]:
         """Figures as JSON has them."""
