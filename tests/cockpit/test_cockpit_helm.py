@@ -196,7 +196,7 @@ class AnyHelm(RuleBasedStateMachine):
             assert number > before.hands.seq
             self.quickest = min(self.quickest, late_s)
             self.sent = {0: (client, sent_s)}
-            if self.now_s - before.renewed_s > STALE_S:
+            if before.hands.seq >= 0 and self.now_s - before.renewed_s > STALE_S:
                 assert not self.helm.axes(self.now_s).any()
         else:
             np.testing.assert_array_equal(self.helm.axes(self.now_s), before.axes(self.now_s))

@@ -9,7 +9,7 @@ import threading
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from typing import Any
 
 import pytest
@@ -135,8 +135,9 @@ def test_a_port_that_is_taken_is_said_in_one_line(server: Server) -> None:
 
 
 def dialled(server: Server, says: bytes) -> socket.socket:
-    caller = socket.create_connection(("127.0.0.1", server.port), timeout=5.0)
-    caller.sendall(says)
+    caller = socket.create_connection(("127.0.0.1", server.port), timeout=20.0)
+    with suppress(ConnectionError):  # closed already, for one that came after it
+        caller.sendall(says)
     return caller
 
 
@@ -147,7 +148,7 @@ def test_connections_that_say_nothing_keep_nobody_out(says: bytes) -> None:
     server.start()
     try:
         with ExitStack() as stack:
-            for _ in range(3 * PER_ADDRESS):
+            for _ in range(PER_ADDRESS + 60):
                 stack.enter_context(dialled(server, says))
             assert got(server, "/state.json")[0] == 200
             assert threading.active_count() - before <= PER_ADDRESS + 3
@@ -169,7 +170,7 @@ def test_a_connection_that_was_let_in_is_kept_whatever_others_do(server: Server)
 
         assert not asks(page).will_close
         own = page.sock
-        for _ in range(2 * PER_ADDRESS):
+        for _ in range(PER_ADDRESS + 60):
             stack.enter_context(dialled(server, b""))
         assert not asks(page).will_close
         assert page.sock is own

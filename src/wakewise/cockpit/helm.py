@@ -124,7 +124,8 @@ class Helm:
         if not self.may(client, lease, now_s) or seq <= self.hands.seq or not math.isfinite(t_ms):
             return self, False
         hands = self.hands.then(seq, 1e-3 * t_ms, axes, now_s)
-        armed = (self.armed and now_s - self.renewed_s <= STALE_S) or not axes.any()
+        paused = self.hands.seq >= 0 and now_s - self.renewed_s > STALE_S
+        armed = (self.armed and not paused) or not axes.any()
         return replace(self, hands=hands, armed=armed, renewed_s=now_s), True
 
     def press(self, client: str, lease: str, what: str, now_s: float) -> tuple[Helm, bool]:

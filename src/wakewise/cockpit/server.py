@@ -57,6 +57,7 @@ STUCK_S = 10.0
 _HELLO_WITHIN_S, _MOST_AMISS, _MOST_THROTTLED = 5.0, 50, 40
 _REFUSED, _TOO_MUCH, _FULL = 4401, 1008, 1013
 _SYSTEM_KEEPS = 1 << 17  # bytes
+_BACKLOG = 512  # connections that the system keeps until they are taken
 _QUIET = logging.getLogger("wakewise.cockpit")
 _QUIET.addHandler(logging.NullHandler())
 _QUIET.propagate = False
@@ -169,6 +170,7 @@ class Server:
                 ping_timeout=20.0,
                 close_timeout=1.0,
                 server_header=None,
+                backlog=_BACKLOG,
                 logger=_QUIET,
             )
         except OSError as fault:

@@ -65,6 +65,6 @@ export class Sticks {
   #send() {
     if (!this.#helm.mine) return;
     this.#seq += 1;
-    this.#link.send({ type: "sticks", seq: this.#seq, t: Math.round(performance.now()), axes: this.axes, lease: this.#helm.lease });
+    this.#link.send({ type: "sticks", seq: this.#seq, t: Math.round(10 * performance.now()) / 10, axes: this.axes, lease: this.#helm.lease });
   }
 }
