@@ -52,6 +52,17 @@ def test_an_answer_at_its_limits_is_made_exact() -> None:
     np.testing.assert_array_equal(sharp[at_high], 8.0)
 
 
+def test_the_null_space_falls_apart_into_thrusters_that_have_nothing_to_do_with_one_another() -> None:
+    """Four horizontal and four vertical thrusters give one line each, and the two span the whole null space."""
+    B = np.array(load_vehicle("paper").allocation_matrix)
+    layout = compile_layout(B, np.full(8, -5.0), np.full(8, 8.0))
+    assert [block.shape for block in layout.blocks] == [(8, 1), (8, 1)]
+    np.testing.assert_array_equal(layout.owners.sum(axis=0), np.ones(8))
+    span = np.hstack(layout.blocks)
+    np.testing.assert_allclose(B @ span, 0.0, atol=1e-9)
+    np.testing.assert_allclose(span @ (span.T @ layout.null), layout.null, atol=1e-9)
+
+
 def test_moments_count_as_forces_at_the_lever_arm() -> None:
     """The root mean square one, so that a vehicle twice as large weighs its axes alike."""
     B = np.array(load_vehicle("paper").allocation_matrix)

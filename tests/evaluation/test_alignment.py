@@ -66,6 +66,30 @@ def test_a_third_of_wrong_pairs_changes_nothing():
     assert np.allclose(found.apply(B), right.apply(B), atol=0.002)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_nearly_half_of_wrong_pairs_change_nothing(seed):
+    """Wrong pairs that are scattered to one side draw least squares off: the median of random triples does not."""
+    rng = np.random.default_rng(seed)
+    B = rng.normal(size=(40, 3))
+    A = B @ rotation(0.2, 0.4, -0.3).T + rng.normal(0, 0.002, B.shape)
+    bad = np.arange(40) < 18
+    A[bad] += rng.normal(0.0, 3.0, (18, 3)) + 3.0
+    _, inliers = robust_similarity(B, A, np.random.default_rng(0))
+    assert not inliers[bad].any()
+    assert inliers[~bad].sum() >= 20
+
+
+def test_pairs_that_fit_exactly_all_count():
+    """Where the right ones fit but for rounding, rounding rejects none of them."""
+    rng = np.random.default_rng(2)
+    B = rng.normal(size=(60, 3))
+    A = 3.7 * B @ rotation(1.0, -0.4, 0.3).T + [10.0, 20.0, 30.0]
+    bad = np.arange(60) < 15
+    A[bad] += rng.normal(0.0, 3.0, (15, 3))
+    _, inliers = robust_similarity(B, A, rng)
+    np.testing.assert_array_equal(inliers, ~bad)
+
+
 def test_without_wrong_pairs_least_squares_stands():
     """Noise alone rejects no pair: the robust fit is the least-squares one."""
     rng = np.random.default_rng(5)

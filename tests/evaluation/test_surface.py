@@ -166,6 +166,15 @@ def test_a_reference_in_other_units_is_told(factor):
     assert "metres" in str(caught.value) and "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(("factor", "told"), [(19.0, False), (21.0, True), (1 / 19.0, False), (1 / 21.0, True)])
+def test_a_scale_is_suspicious_beyond_a_factor_of_twenty(factor, told):
+    """Of the whole extent, which is told from the middle nine tenths so that stray points do not count."""
+    line = np.linspace(-RADIUS, RADIUS, 1001)[:, None] * np.ones(3) / np.sqrt(3.0)
+    stray = np.array([[9.0, 9.0, 9.0]])
+    truth = SimpleNamespace(vertices_m=line, faces=np.array([[0, 1, 2]]))
+    assert (suspicious_scale(np.concatenate([factor * line, stray]), truth) is not None) == told
+
+
 def test_each_point_has_its_error_and_its_colour():
     """Errors of single points are those that the median is of; blue is 0, green half of 3 mm, red 3 mm and more."""
     found = compare_surface(shell(50_000, RADIUS + 0.0005, np.random.default_rng(0)), ball(), icp=False)

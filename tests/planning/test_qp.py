@@ -7,12 +7,14 @@ from dataclasses import replace
 import daqp
 import numpy as np
 import pytest
-from plan_cases import model, problem
+from plan_cases import REGION, VEHICLE, model, problem
 
+from wakewise.errors import InputError
 from wakewise.planning import qp as qp_module
-from wakewise.planning.guard import Guard
+from wakewise.planning.guard import Guard, check_start
 from wakewise.planning.planner import Planner
 from wakewise.planning.qp import BoxQP
+from wakewise.planning.surroundings import Surroundings
 
 SIZE = 24
 
@@ -77,3 +79,14 @@ def test_a_plan_beyond_either_limit_is_not_flown(side: str, breaks: bool) -> Non
     found = guard.ask(problem, None, 0.0)
     assert (found.plan is None) == breaks
     assert guard.counts == ({"limits": 1} if breaks else {})
+
+
+def test_a_start_nearer_to_something_than_the_clearance_is_refused() -> None:
+    """Not only one that touches: the same place is a start where less is asked for."""
+    state = np.zeros(13)
+    state[2], state[3] = 1.0, 1.0
+    lowest = 1.0 + 0.5 * VEHICLE.size_m[2]
+    around = Surroundings(planes=((0.0, 0.0, -1.0, -(lowest + 0.10)),))
+    check_start(VEHICLE, REGION, state, around, clearance_m=0.05)
+    with pytest.raises(InputError, match=r"comes within 0\.\d+ m of plane 1, allowed is 0\.15 m"):
+        check_start(VEHICLE, REGION, state, around, clearance_m=0.15)
