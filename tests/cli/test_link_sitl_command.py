@@ -63,7 +63,7 @@ def test_a_tank_behind_the_stand_in(capsys: Capture, tmp_path: Path) -> None:
     assert said["frames"] > 100
     assert 0.1 < said["depth_m"] < 3.0
     assert said["depth_apart"] == said["depth_looks"] > 0
-    assert said["depth_apart_most_m"] == pytest.approx(said["depth_m"], abs=0.1)
+    assert said["depth_apart_most_m"] == pytest.approx(said["depth_m"], abs=0.3)
     assert said["stage"] == ""
 
 

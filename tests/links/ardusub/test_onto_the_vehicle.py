@@ -99,7 +99,8 @@ def test_a_fresh_autopilot_is_no_go_until_the_script_is_on_it() -> None:
     start_script(wire)
     facts = survey(wire, HEAVY, seconds=0.3)
     assert [row.what for row in check(facts) if row.verdict != "go"] == ["motors seen"]
-    assert verdict(check(facts)) == "go"
+    assert verdict(check(facts)) == "unseen"
+    assert verdict(check(facts), motors_seen=False) == "go"
     assert facts.parameters[protocol.ENABLE_PARAMETER] == 0.0
 
 
