@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import io
 import json
+import signal
 import socket
 import threading
 import time
@@ -259,3 +260,27 @@ def test_nobody_there_is_one_line(capsys: Capture, monkeypatch: pytest.MonkeyPat
         where = f"udpin:127.0.0.1:{probe.getsockname()[1]}"
     assert run(["link", "ardusub", "--motor-test", "--connection", where]) != 0
     assert "no heartbeat of system 1" in capsys.readouterr().err
+
+
+def test_ctrl_c_ends_a_session_in_its_own_words(
+    capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is how a session ends: code 0, what was let go of and where it is kept, nothing of going on; twice is once."""
+
+    def interrupted(session: object, where: str) -> None:
+        raise KeyboardInterrupt
+
+    def stopped(session: object, why: str) -> None:
+        signal.raise_signal(signal.SIGINT)  # an impatient second one
+        assert why == "Ctrl-C"
+
+    monkeypatch.setattr("wakewise.cli.link_ardusub._watch", interrupted)
+    monkeypatch.setattr("wakewise.operation.at_sea.session.SeaSession.start", lambda session: None)
+    monkeypatch.setattr("wakewise.operation.at_sea.session.SeaSession.stop", stopped)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        where = f"udpin:127.0.0.1:{probe.getsockname()[1]}"
+    assert run(["link", "ardusub", "--connection", where, "--out", str(tmp_path / "sea")]) == 0
+    told = capsys.readouterr().err
+    assert f"let go of the vehicle (Ctrl-C); kept: {tmp_path / 'sea'}" in told
+    assert "again" not in told

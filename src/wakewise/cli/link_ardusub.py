@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+import threading
 import time
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -212,12 +215,26 @@ def ardusub(
         except KeyboardInterrupt:  # how a session ends: nothing of it could be gone on with
             why = "Ctrl-C"
         finally:
-            session.stop(why)
+            with _uninterrupted():
+                session.stop(why)
             _say(f"let go of the vehicle ({why}); kept: {folder}")
     if session.fault is not None:
         raise session.fault
     if json:
         print_json({"folder": str(folder), "engagements": session.warden.engagement.entries, **session.figures()})
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Let a second, impatient Ctrl-C not cut short what lets go of the vehicle and writes its folder."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _carried(stack: ExitStack, vehicle_at: Endpoint, ground_at: Endpoint | None) -> tuple[Any, Any]:
