@@ -37,6 +37,9 @@ class Deaf:
 
     name = "deaf"
 
+    def __repr__(self):
+        return "deaf"
+
 
 @pytest.mark.parametrize("name", PARTS)
 @pytest.mark.parametrize("given", [None, 3, "brain", [1.0, 2.0], {"x": 1}, Deaf(), Deaf, np.zeros(3)], ids=repr)
