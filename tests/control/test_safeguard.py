@@ -119,7 +119,7 @@ def test_without_an_estimate_the_last_thrusts_fade():
     assert guard.counts["held"] == 3
 
 
-def test_where_the_world_waits_a_late_answer_is_counted_and_flown():
+def test_where_the_world_waits_a_late_answer_is_counted_and_flown(caplog):
     """The same seed must give the same flight on a busy machine: the command is untouched, only the count tells."""
     clock = iter(np.arange(0.0, 100.0, 0.03))
     guard, commands = flown(lambda: None, steps=4)
@@ -131,6 +131,7 @@ def test_where_the_world_waits_a_late_answer_is_counted_and_flown():
         state, late = slow.step(state, 0.02, HERE, GOAL)
         assert np.array_equal(late.thrusts_N, command.thrusts_N) and late.fallback is None
     assert slow.counts == {"late": 3}
+    assert [record.levelname for record in caplog.records if "late" in record.message] == ["INFO", "DEBUG", "DEBUG"]
 
 
 def test_where_it_does_not_wait_the_deadline_holds_by_the_wall_clock():

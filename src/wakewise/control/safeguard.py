@@ -120,7 +120,8 @@ class Safeguard:
         took_s = now() - began
         # What is compiled on the first step is not the method's pace.
         if took_s > dt_s and not state.first and (trouble is None or trouble[0] != "late"):
-            self._count("late", f"late: {1e3 * took_s:.0f} ms of {1e3 * dt_s:.0f} allowed")
+            words = f"late: {1e3 * took_s:.0f} ms of {1e3 * dt_s:.0f} allowed"
+            self._count("late", words, harmless=not self.enforce)
         if trouble is None and command is not None:
             return replace(state, inner=inner, thrusts_N=command.thrusts_N, failed_s=0.0, first=False), command
         kind, words = trouble or ("failed", "no command")
@@ -198,11 +199,12 @@ class Safeguard:
         thrusts = state.thrusts_N * np.exp(-dt_s / HOLD_S)
         return replace(state, thrusts_N=thrusts), Command(thrusts_N=thrusts, wrench_B=np.zeros(6), fallback=words)
 
-    def _count(self, kind: str, words: str) -> str:
-        """Count and log a trouble; returns its words."""
+    def _count(self, kind: str, words: str, harmless: bool = False) -> str:
+        """Count and log an event; returns its words. Nobody is warned of what changes no thrust."""
         self.counts[kind] = self.counts.get(kind, 0) + 1
         # The first of a kind is news, the thousandth is not.
-        log.log(logging.WARNING if self.counts[kind] == 1 else logging.DEBUG, "control: %s", words)
+        level = logging.DEBUG if self.counts[kind] > 1 else logging.INFO if harmless else logging.WARNING
+        log.log(level, "control: %s", words)
         return words
 
 

@@ -73,11 +73,12 @@ class Guard:
         if self.strict is None:
             self.strict = is_strict() and not self.enforce
 
-    def count(self, kind: str, words: str) -> str:
-        """Count and log a trouble; returns its words."""
+    def count(self, kind: str, words: str, harmless: bool = False) -> str:
+        """Count and log an event; returns its words. Nobody is warned of what changes no thrust."""
         self.counts[kind] = self.counts.get(kind, 0) + 1
         # The first of a kind is news, the thousandth is not.
-        log.log(logging.WARNING if self.counts[kind] == 1 else logging.DEBUG, "planner: %s", words)
+        level = logging.DEBUG if self.counts[kind] > 1 else logging.INFO if harmless else logging.WARNING
+        log.log(level, "planner: %s", words)
         return words
 
     def ask(self, make: Callable[[], PlanProblem], previous: Horizon | None, age_s: float) -> Guarded:
@@ -99,13 +100,13 @@ class Guard:
         if trouble is None and self.clock() - began > self.deadline_s:
             words = f"plan late: {1e3 * (self.clock() - began):.0f} ms of {1e3 * self.deadline_s:.0f} allowed"
             if not self.enforce:
-                self.count("late", words)
+                self.count("late", words, harmless=True)
             else:
                 trouble = ("late", words)
         if trouble is None:
             if self.planner.crowded:
                 words = f"goal inside clearance: nearer than {1e3 * CLEARANCE_M:.0f} mm, plans stay off it"
-                self.count("goal inside clearance", words)
+                self.count("goal inside clearance", words, harmless=True)
             return Guarded(plan, 0.0, None)
         words = self.count(*trouble)
         if previous is not None and age_s <= USABLE_SHARE * stage_s * len(previous.commands_N):
