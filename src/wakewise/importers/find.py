@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wakewise.checks import path_of
 from wakewise.errors import InputError
 from wakewise.importers.stated_matrix import read_number_matrix
 from wakewise.importers.wrench_rows import (
@@ -31,7 +32,7 @@ _BASED = re.compile(r"^base:\s*[\"']?([\w-]+)", re.MULTILINE)
 
 
 def find_vehicle(
-    name_or_path: str,
+    name_or_path: str | Path,
     *,
     convention: str = "auto",
     thrust: str = "auto",
@@ -50,7 +51,8 @@ def find_vehicle(
     InputError
         If there is no such vehicle or file, it cannot be read as a vehicle, or an option does not apply to it.
     """
-    path = Path(name_or_path)
+    path = path_of(name_or_path, "vehicle")
+    name_or_path = name_or_path if isinstance(name_or_path, str) else str(path)
     told = {
         "frame": convention != "auto",
         "thrust direction": thrust != "auto",
@@ -59,10 +61,7 @@ def find_vehicle(
         "rows": rows is not None,
     }
     useless = ", ".join(word for word, given in told.items() if given)
-    try:
-        is_file, is_folder = path.is_file(), path.is_dir()
-    except (OSError, ValueError) as fault:
-        raise InputError(f"vehicle {name_or_path[:80]!r}: no name of a file ({type(fault).__name__})") from fault
+    is_file, is_folder = path.is_file(), path.is_dir()
     if name_or_path and is_folder and name_or_path not in draft_names():
         raise InputError(f"vehicle {name_or_path}: is a folder, name the vehicle's file in it")
     reader = _reader_from_outside(path)
@@ -95,12 +94,12 @@ def _reader_from_outside(path: Path) -> Callable[[Path], VehicleDraft] | None:
     return reader
 
 
-def any_vehicle(name_or_path: str) -> Vehicle:
+def any_vehicle(name_or_path: str | Path) -> Vehicle:
     """A vehicle that can fly, from the library or any file that can be read as a vehicle.
 
     Parameters
     ----------
-    name_or_path : str
+    name_or_path : str or Path
         A name of the library, or the path of a vehicle file: ours (YAML), URDF, xacro, SDF, Stonefish, a matrix, or a
         format that an installed package offers.
 
@@ -117,7 +116,7 @@ def any_vehicle(name_or_path: str) -> Vehicle:
     8
     """
     draft = find_vehicle(name_or_path)
-    draft.require_whole(name_or_path)
+    draft.require_whole(str(name_or_path))
     return draft.vehicle()
 
 

@@ -24,6 +24,9 @@ _MATRIX_KEY = re.compile(
 )
 _NOT_MATRIX = re.compile(r"weight|controller|update|rate|slack|topic|solver", re.IGNORECASE)
 _DOWN_WORDS = re.compile(r"(^|[^a-z])(ned|frd|fsd)([^a-z]|$)", re.IGNORECASE)
+_WORLD_WORDS = frozenset({"world", "odom", "map", "inertial", "earth", "global", "local"})
+_BODY_WORDS = frozenset({"body", "base", "baselink", "vehicle", "robot"})
+_BARE_WORDS = frozenset({"frame", "frames", "id", "tf", "name", "convention"})
 _UP_WORDS = re.compile(r"(^|[^a-z])(enu|flu|nwu)([^a-z]|$)", re.IGNORECASE)
 
 
@@ -125,14 +128,9 @@ def _frame(root: Item, entries: Entries, found: Found, *, geometry: bool) -> tup
     """FRD or FLU from the file's own frames, names of thrusters, or a comment; else a guess that is questioned."""
     if found.frame_why:
         return found.frame, found.frame_why
-    for path, item in entries:
-        if isinstance(item.value, str):
-            for pattern, frame in ((_DOWN_WORDS, "FRD"), (_UP_WORDS, "FLU")):
-                # Only names of frames tell; a topic may mention either.
-                if re.search(r"frame|tf", " ".join(path), re.IGNORECASE) and pattern.search(item.value):
-                    item.seen = True
-                    said = f"detected: {path[-1]} is {item.value} ({item.place.file.name}:{item.place.line})"
-                    return ("FRD", said) if frame == "FRD" else ("FLU", said)
+    named = _named_frame(entries, found)
+    if named is not None:
+        return named
     here = found.thrusters[0].place.line if found.thrusters else found.matrix_line
     spoken = {
         frame: place
@@ -168,6 +166,59 @@ def _frame(root: Item, entries: Entries, found: Found, *, geometry: bool) -> tup
     if geometry:
         return "FRD", "inferred: lists of thruster positions in this form are FRD; no key says so"
     return "FLU", "inferred: ROS files state matrices in base_link, which is FLU; no key says so"
+
+
+def _named_frame(entries: Entries, found: Found) -> tuple[Frame, str] | None:
+    """Frame that a key names: of the body before a bare frame before any other; keys of the world's frame do not count.
+
+    Raises
+    ------
+    InputError
+        If two keys name different frames of the body.
+    """
+    ranked: list[tuple[int, Frame, str, Item]] = []
+    for path, item in entries:
+        # Only names of frames tell; a topic may mention either.
+        if not isinstance(item.value, str) or not re.search(r"frame|tf", " ".join(path), re.IGNORECASE):
+            continue
+        down, up = _DOWN_WORDS.search(item.value), _UP_WORDS.search(item.value)
+        rank = _rank(path, item.value)
+        if rank is not None and (down or up):
+            ranked.append((rank, "FRD" if down else "FLU", path[-1], item))
+    if not ranked:
+        return None
+    best = min(rank for rank, *_ in ranked)
+    ranked = [entry for entry in ranked if entry[0] == best]
+    _, frame, key, item = ranked[0]
+    said = f"{key} is {item.value} ({item.place.file.name}:{item.place.line})"
+    for _, other, name, against in ranked[1:]:
+        if other != frame and best == 0:
+            raise PlacedError(
+                f"{against.place}: {name} is {against.value}, but {said}; both name the body's frame, which is one"
+            )
+        if other != frame:
+            found.notes.append(
+                f"{QUESTION}frames differ: {said}, which is taken, and {name} is {against.value} "
+                f"({against.place.file.name}:{against.place.line})"
+            )
+            break
+    item.seen = True
+    return frame, f"detected: {said}"
+
+
+def _rank(path: tuple[str, ...], value: str) -> int | None:
+    """0 for a key of the body's frame, 1 for a bare frame, 2 for any other, None for the world's."""
+    own = _words(path[-1])
+    bare = own <= _BARE_WORDS
+    around = [own, *(_words(key) for key in path[-2::-1])] if bare else [own]
+    told = next((words for words in around if words & (_WORLD_WORDS | _BODY_WORDS)), frozenset[str]())
+    if told & _WORLD_WORDS or (_words(value) & _WORLD_WORDS and not _words(value) & _BODY_WORDS):
+        return None
+    return 0 if told else 1 if bare else 2
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", text))
 
 
 def _geometry(found: Found) -> tuple[Array, Array]:

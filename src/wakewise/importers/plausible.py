@@ -19,6 +19,8 @@ from wakewise.vehicles.draft import MAX_THRUSTERS, VehicleDraft
 UNIT_SLACK = 0.02
 """How far a force column may be from length 1: entries of two digits, such as 0.7 for cos 45 deg, pass."""
 
+MAX_ARM_M = 10.0
+"""Longest arm of a thruster about the body's origin that is believed."""
 _COUNT = re.compile(r"^((num|number|n|no|count)_?(of_)?thrusters?|thrusters?_(count|num|number))$", re.IGNORECASE)
 _LIST = re.compile(
     r"^thrusters?(_(names?|ids?|joints?|links?|frames?|topics?|pins?|channels?|labels?|list))?$", re.IGNORECASE
@@ -53,7 +55,7 @@ def require_force_columns(matrix: Array, what: str) -> None:
     Raises
     ------
     InputError
-        If it has no columns or too many, or a force column is not of length 1.
+        If it has no columns or too many, a force column is not of length 1, or a moment has an arm beyond `MAX_ARM_M`.
     """
     if matrix.shape[1] == 0:
         raise PlacedError(f"{what} has no columns, must have one per thruster")
@@ -65,6 +67,13 @@ def require_force_columns(matrix: Array, what: str) -> None:
         raise PlacedError(
             f"{what}: the force of column {i + 1} has length {lengths[i]:.4g}, must be 1 (a column is the wrench that "
             f"one newton of a thruster makes)"
+        )
+    arms_m = np.linalg.norm(matrix[3:], axis=0) / lengths
+    i = int(np.argmax(arms_m))
+    if not arms_m[i] <= MAX_ARM_M:
+        raise PlacedError(
+            f"{what}: the moment of column {i + 1} is {arms_m[i]:.4g} N m per newton, an arm of more than "
+            f"{MAX_ARM_M:g} m; are these metres?"
         )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from wakewise.importers.bodies import Bodies, moving_parts
 from wakewise.importers.found import QUESTION, Found, FoundThruster
 from wakewise.importers.plugins import question_steered
-from wakewise.importers.thruster_forms import short
+from wakewise.importers.thruster_forms import disk_area_m2, short
 from wakewise.importers.urdf import origin
 from wakewise.importers.xml import Element, PlacedError, number, numbers
 
@@ -132,7 +132,7 @@ def _thruster(actuator: Element, bodies: Bodies, density: float | None, found: F
     diameter = None
     if propeller is not None and propeller.attributes.get("diameter") is not None:
         diameter = number(propeller.attributes["diameter"], propeller.place, "diameter")
-        thruster.disk_area_m2 = 0.25 * math.pi * diameter**2
+        thruster.disk_area_m2 = disk_area_m2(diameter, propeller.place)
     steady = _lag(actuator, thruster)
     text = None if specs is None else specs.attributes.get("max_setpoint")
     top = None if text is None or specs is None else abs(number(text, specs.place, "max_setpoint"))

@@ -10,7 +10,7 @@ from wakewise.arrays import Array
 from wakewise.importers.bodies import Bodies, Joint
 from wakewise.importers.found import QUESTION, Found, FoundThruster
 from wakewise.importers.urdf import origin
-from wakewise.importers.xml import Element, PlacedError, number, numbers
+from wakewise.importers.xml import Element, Place, PlacedError, number, numbers
 
 GZ_RULE = "positive thrust pushes along the joint axis, whatever the sign of thrust_coefficient (gz-sim's Thruster)"
 UUV_RULE = "positive thrust pushes along the joint axis, +x of the thruster where none is given (UUV Simulator)"
@@ -18,6 +18,9 @@ HIPPO_RULE = (
     "positive thrust pushes along +x of the thruster's link, turned round by a clockwise propeller (HippoCampus)"
 )
 ORCA_RULE = "positive thrust pushes along +z of each thruster's origin, turned round by a negative pos_force (orca2)"
+
+DIAMETERS_M = (0.005, 2.0)
+"""Smallest and largest propeller of an underwater vehicle."""
 
 
 def words(plugin: Element) -> str:
@@ -99,12 +102,28 @@ def _gz(plugin: Element, bodies: Bodies) -> FoundThruster:
     thruster = on_joint(joint, bodies)
     diameter = number_in(plugin, "propeller_diameter")
     if diameter is not None:
-        thruster.disk_area_m2 = 0.25 * math.pi * diameter**2
+        thruster.disk_area_m2 = disk_area_m2(diameter, plugin.place)
     if (plugin.value("use_angvel_cmd") or "false").lower() not in {"true", "1"}:
         high, low = number_in(plugin, "max_thrust_cmd"), number_in(plugin, "min_thrust_cmd")
         thruster.max_forward_N = high if high is not None and high >= 0.0 else None
         thruster.max_reverse_N = -low if low is not None and low <= 0.0 else None
     return thruster
+
+
+def disk_area_m2(diameter_m: float, place: Place) -> float:
+    """Area in m^2 of a propeller's disk.
+
+    Raises
+    ------
+    InputError
+        If the diameter is none that an underwater vehicle's propeller has.
+    """
+    low_m, high_m = DIAMETERS_M
+    if not low_m <= diameter_m <= high_m:
+        raise PlacedError(
+            f"{place}: propeller diameter {diameter_m:g} must be from {low_m:g} to {high_m:g} m; are these metres?"
+        )
+    return 0.25 * math.pi * diameter_m**2
 
 
 def where_on(joint: Joint, bodies: Bodies) -> Array:

@@ -170,6 +170,9 @@ class _Converter:
             table: dict[str, Item] = {}
             for key, child in node.value:
                 if isinstance(key, yaml.ScalarNode):
+                    if key.value in table:
+                        line = key.start_mark.line + 1 if key.start_mark else place.line
+                        raise PlacedError(f"{Place(self.path, line)}: {str(key.value)[:80]} stands twice")
                     table[str(key.value)] = self.item(child, depth + 1)
             return Item(table, place)
         return Item(str(node.value), place)
