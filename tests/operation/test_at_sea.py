@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -188,27 +189,32 @@ def test_depth_is_held_while_engaged_in_alt_hold_and_after_hand_back():
     assert np.abs(np.array(depths["after"]) - held[-1]).max() < 0.07
 
 
-def test_a_session_with_a_button_of_the_autopilots_ends_in_one_line(tmp_path, monkeypatch):
-    """The stand-in's default table, whose button 4 disarms: no parts are made, and the fault names what is free."""
+class Deaf:
+    """A connection on which nothing comes: the warden is told by hand."""
+
+    def receive(self, timeout_s):
+        time.sleep(timeout_s)
+        return [], 0
+
+
+def session_of(folder, monkeypatch, **wardens) -> SeaSession:
+    """A session that compiles nothing and hears nothing by itself."""
     monkeypatch.setattr("wakewise.operation.at_sea.session.warm", lambda jobs, progress: None)
-    companion = Aboard(Rehearsal(load_vehicle("bluerov2-heavy"), loop_hz=50.0), buttons={"engage": 4})
-
-    class Deaf:
-        """A connection on which nothing comes: the warden is told by hand."""
-
-        def receive(self, timeout_s):
-            time.sleep(timeout_s)
-            return [], 0
-
-    session = SeaSession(
+    return SeaSession(
         scenario=Scenario(vehicle="bluerov2-heavy", method="dp").replace(**SEA),
         receiving=Deaf(),
         send=lambda name, fields: None,
-        folder=tmp_path / "sea",
+        folder=folder,
         spare=WhatToSpare(),
         session=1,
-        wardens={"buttons": {"engage": 4, "scan": 0}},
+        wardens=wardens,
     )
+
+
+def test_a_session_with_a_button_of_the_autopilots_ends_in_one_line(tmp_path, monkeypatch):
+    """The stand-in's default table, whose button 4 disarms: no parts are made, and the fault names what is free."""
+    companion = Aboard(Rehearsal(load_vehicle("bluerov2-heavy"), loop_hz=50.0), buttons={"engage": 4})
+    session = session_of(tmp_path / "sea", monkeypatch, buttons={"engage": 4, "scan": 0})
     companion.flight.run(3.0)
     session.warden.known = companion.warden.known
     session.start()
@@ -217,6 +223,48 @@ def test_a_session_with_a_button_of_the_autopilots_ends_in_one_line(tmp_path, mo
     assert isinstance(session.fault, InputError)
     assert str(session.fault) == "--buttons engage=4: BTN4_FUNCTION is 4 (disarm) on this autopilot; free is 15"
     assert not (tmp_path / "sea" / "steps.parquet").exists()
+
+
+def test_a_flight_begins_where_the_vehicle_is_when_its_parts_are_made(tmp_path, monkeypatch):
+    """It moves while they are made: an estimator that began where it was would take the step for a load."""
+    companion = aboard()
+    companion.flight.run(1.0)
+    session = session_of(tmp_path / "sea", monkeypatch)
+    session.warden.known = companion.warden.known
+    facts = companion.warden.facts()
+    session.warden.facts = lambda: facts
+    before = session._here()
+
+    def moved(sea):
+        assert sea.parts.start.X_WB.p_m == pytest.approx(before.X_WB.p_m)
+        known = session.warden.known
+        place_W_m = np.asarray(known.place_W_m) + np.array([0.2, 0.0, 0.3])
+        session.warden.known = replace(known, place_W_m=place_W_m)
+        return 0.0
+
+    monkeypatch.setattr("wakewise.operation.at_sea.session.rehearse", moved)
+    sea = session._prepared()
+    assert sea.parts.start.X_WB.p_m == pytest.approx(before.X_WB.p_m + np.array([0.2, 0.0, 0.3]))
+
+
+def test_a_session_waits_for_a_hull_that_is_still_afloat(tmp_path, monkeypatch):
+    """Before a dive the vehicle floats on its tether: the session says how much of it is above, and goes on waiting."""
+    companion = aboard()
+    companion.flight.run(1.0)
+    session = session_of(tmp_path / "sea", monkeypatch)
+    session.warden.known = replace(companion.warden.known, depth_m=0.0)
+    facts = replace(companion.warden.facts(), depth_m=0.0)
+    said = []
+
+    def looked():
+        said.append(session.preparing)
+        if len(said) == 3:
+            session._over.set()
+        return facts
+
+    session.warden.facts = looked
+    assert session._prepared() is None
+    assert said[-1] == "waits until the hull is under water, 0.13 m of it are above"
 
 
 def test_sticks_never_break_the_surface_at_sea():

@@ -10,13 +10,15 @@ from __future__ import annotations
 import math
 import threading
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from wakewise.arrays import Array
 from wakewise.errors import InputError, StageError
-from wakewise.geometry import Pose
+from wakewise.geometry import Pose, matrix_from_quat
 from wakewise.importers import any_vehicle
 from wakewise.interfaces import BodyState
 from wakewise.links.ardusub.drive import VehicleDrive
@@ -187,15 +189,18 @@ class SeaSession:
                 )
                 if not age_s < warden.limits.heartbeat_s
             ]  # fmt: skip
-            if not lacking:
+            above_m = 0.0 if lacking else self._above_water_m()
+            if not lacking and above_m <= 0.0:
                 break
-            self.preparing = f"waits for {', '.join(lacking)} of system {warden.known.system}"
+            self.preparing = (
+                f"waits for {', '.join(lacking)} of system {warden.known.system}"
+                if lacking
+                else f"waits until the hull is under water, {above_m:.2f} m of it are above"
+            )
         else:
             return None
         self.preparing = "makes the parts"
-        known = warden.known
-        assert known.place_W_m is not None  # a position was heard
-        start = BodyState(X_WB=Pose(known.place_W_m, attitude_of(known)))
+        start = self._here()
         middle, radius, region = self.spare.found(start, self.vehicle.size_m[0], float(self.vehicle.X_BC.p_m[2]))
         warden.target_W_m = middle
         sea = at_sea(
@@ -217,7 +222,20 @@ class SeaSession:
                 f"method {self.scenario.method}: a step takes {1e3 * took_s:.0f} ms on this computer, the control "
                 f"period is {1e3 * period_s:.0f} ms; end what else runs here, or take a lighter method, such as instant"
             )
-        return sea
+        # The vehicle may have moved while parts were made: an estimator that begins where it was takes the step to
+        # where it is for a load, and the controller would push against that.
+        return replace(sea, parts=sea.parts.replace(start=self._here()))
+
+    def _here(self) -> BodyState:
+        """Where the vehicle is now, as heard; a position was heard."""
+        known = self.warden.known
+        assert known.place_W_m is not None
+        return BodyState(X_WB=Pose(known.place_W_m, attitude_of(known)))
+
+    def _above_water_m(self) -> float:
+        """How far the highest corner of the hull's box is above the surface (m); negative if it is below."""
+        R_WB = matrix_from_quat(attitude_of(self.warden.known))
+        return float(0.5 * np.abs(R_WB[2]) @ np.array(self.vehicle.size_m)) - self.warden.known.depth_m
 
     def _flight(self) -> LiveFlight:
         assert self.live is not None  # nobody asks before there is one
