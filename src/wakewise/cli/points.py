@@ -34,7 +34,9 @@ def read_points(path: Path, vehicle: Vehicle, X_WB: Pose) -> tuple[Array, Array]
     head = [name.strip() for name in rows[0]] if rows else []
     if sorted(head) != sorted(columns):
         how = other_separator(head)
-        raise InputError(f"--points {path}: columns {', '.join(head) or 'none'}, allowed: {', '.join(columns)}{how}")
+        lacks = ", ".join(name for name in columns if name not in head)
+        what = f"lacks column {lacks}" if lacks else f"columns {', '.join(head)}"
+        raise InputError(f"--points {path}: {what}, allowed: {', '.join(columns)}{how}")
     values = []
     for line, row in enumerate(rows[1:], start=2):
         if not any(cell.strip() for cell in row):
