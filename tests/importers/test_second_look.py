@@ -113,3 +113,82 @@ def test_a_propeller_of_another_unit_is_refused(tmp_path: Path, diameter: str, b
         else:
             with pytest.raises(InputError, match=r"propeller diameter .* must be from 0.005 to 2 m; are these metres"):
                 read()
+
+
+# Keys that are not read
+
+
+def asked(draft: VehicleDraft) -> str:
+    return "\n".join(note for note in draft.notes if note.startswith("QUESTIONED: not read"))
+
+
+@pytest.mark.parametrize(
+    "key", ["units: centimetres", "length_unit: furlong", "unit_angle: grad", "given_in: cm", "scale: {of: kgf}"]
+)
+def test_units_that_are_not_read_are_questioned(tmp_path: Path, key: str) -> None:
+    """By their key, or by the value; SI units are those that are taken."""
+    assert "names a unit that is not taken" in asked(listed(tmp_path, f"frame: frd\n{key}\n"))
+    assert not asked(listed(tmp_path, "frame: frd\nunits: m\nforce_unit: N\nother: here\n"))
+
+
+@pytest.mark.parametrize(
+    "key", ["reversed_thrusters: [0]", "thruster_signs: [1, -1]", "motor_directions: [1, -1]", "inverted: true"]
+)
+def test_turning_keys_beside_thrusters_or_a_matrix_are_questioned(tmp_path: Path, key: str) -> None:
+    matrix = "tam: [[1,1],[0,0],[0,0],[0,0],[0,0],[-0.1,0.1]]\n"
+    for draft in (listed(tmp_path, f"frame: frd\n{key}\n"), imported(tmp_path, f"frame: frd\n{key}\n{matrix}")):
+        assert "which may turn the thrust round" in asked(draft)
+    assert not asked(listed(tmp_path, "frame: frd\ninverted: false\ncamera: {flip: true}\n"))
+
+
+@pytest.mark.parametrize(
+    ("key", "doubt"),
+    [
+        ("negate: true", "round"),
+        ("mirrored: yes", "round"),
+        ("backwards: true", "round"),
+        ("multiplier: -1", "round"),
+        ("multiplier: 1.0", ""),
+        ("hand: left", "round"),
+        ("prop: ccw", "round"),
+        ("cw: true", "round"),
+        ("gain: -1.0", "round"),
+        ("calib: {k: -2e-3}", "round"),
+        ("min_rpm: -3000", ""),
+        ("gain: 1.0", ""),
+        ("enabled: false", "off"),
+        ("active: 0", "off"),
+        ("disabled: true", "off"),
+        ("enabled: true", ""),
+        ("handle: 3", ""),
+    ],
+)
+def test_what_may_turn_or_stop_one_thruster_is_questioned(tmp_path: Path, key: str, doubt: str) -> None:
+    said = asked(listed(tmp_path, "frame: frd\n", f", {key}"))
+    assert said.endswith(doubt) and bool(said) == bool(doubt)
+
+
+# SDF
+
+
+def test_a_mass_that_the_simulator_computes_is_missing(tmp_path: Path) -> None:
+    """Neither the default of 1 kg nor a mass beside `auto` is taken."""
+    draft = modelled(tmp_path, AUTO='auto="true"')
+    assert draft.mass_kg is None and draft.inertia_kg_m2 is None and "mass" in draft.missing
+    assert any("inertial auto" in note for note in draft.notes)
+    assert modelled(tmp_path, AUTO='auto="false"').mass_kg == 10.0
+
+
+@pytest.mark.parametrize(
+    ("version", "axis"), [("1.3", [1, 0, 0]), ("1.4", [1, 0, 0]), ("1.5", [0, -1, 0]), ("1.10", [0, -1, 0])]
+)
+def test_axes_before_sdf_1_5_are_in_the_model(tmp_path: Path, version: str, axis: list[float]) -> None:
+    """Those of later versions are in the joint, which is turned by 90 degrees to the left here."""
+    np.testing.assert_allclose(modelled(tmp_path, VERSION=version).thrusters[0].axis_B, axis, atol=1e-12)
+
+
+@pytest.mark.parametrize(("izz", "questioned"), [("1.5", False), ("2.0", False), ("2.01", False), ("3", True)])
+def test_an_inertia_that_no_body_has_is_questioned(tmp_path: Path, izz: str, questioned: bool) -> None:
+    """Rounding of a flat plate's apart."""
+    notes = modelled(tmp_path, IZZ=izz).notes
+    assert any(note.startswith("QUESTIONED: inertia: the principal moments") for note in notes) == questioned

@@ -47,6 +47,8 @@ class Link:
     p_LG_m: Array = field(default_factory=lambda: np.zeros(3))
     inertia_kg_m2: Array | None = None
     added_mass: Array | None = None
+    computed: bool = False
+    """Whether the simulator computes mass and inertia from shapes and densities, so that the file states none."""
     shapes: list[Shape] = field(default_factory=list)
 
 
@@ -183,6 +185,14 @@ def read_mass(bodies: Bodies, found: Found) -> None:
     InputError
         If the masses add up to nothing, or the inertia is not positive definite.
     """
+    computed = [link for link in bodies.links.values() if link.computed]
+    if computed:
+        names = ", ".join(link.name for link in computed[:4])
+        found.notes.append(
+            f"{QUESTION}mass: not taken: the simulator computes that of {names} "
+            f"from shapes and densities (inertial auto) ({computed[0].place.file.name}:{computed[0].place.line})"
+        )
+        return
     weighed = [link for link in bodies.links.values() if link.mass_kg is not None]
     if not weighed:
         return

@@ -13,6 +13,7 @@ from wakewise.importers.layouts import listed_names, read_geometry
 from wakewise.importers.names import vote
 from wakewise.importers.plausible import claims_in, require_count, require_same_count
 from wakewise.importers.thruster_lists import LOOKS_LIKE_THRUSTERS
+from wakewise.importers.unread import not_read, title, words_in
 from wakewise.importers.wrench_rows import Order, component_in_comment, order_in_comment, order_of, order_of_one, settle
 from wakewise.importers.xml import PlacedError
 from wakewise.importers.yaml_parameters import Entries, read_parameters
@@ -53,14 +54,14 @@ def read_yaml(root: Item, name: str, found: Found, rows: Order | None = None) ->
     alike = [(path, item) for path, item in entries if LOOKS_LIKE_THRUSTERS.search(path[-1]) and _holds_figures(item)]
     if not (geometry or matrix or parameters):
         where = f" (line {alike[0][1].place.line})" if alike else ""
-        said = f"; {_title(alike[0][0])}{where} is of a form that is not known" if alike else ""
+        said = f"; {title(alike[0][0])}{where} is of a form that is not known" if alike else ""
         raise PlacedError(
             f"{root.place}: {name} holds no allocation matrix, no thruster positions with directions, "
             f"and no vehicle parameters under a key that is known{said}"
         )
     if alike and not (geometry or matrix):
         where = f"{alike[0][1].place.file.name}:{alike[0][1].place.line}"
-        names = ", ".join(_title(path) for path, _ in alike[:4])
+        names = ", ".join(title(path) for path, _ in alike[:4])
         found.notes.append(
             f"{QUESTION}not read: {names}, which look like thrusters in a form that is not known ({where})"
         )
@@ -69,7 +70,7 @@ def read_yaml(root: Item, name: str, found: Found, rows: Order | None = None) ->
     found.frame, found.frame_why = _frame(root, entries, found, geometry=geometry)
     if geometry and not found.thrust_rule:
         found.thrust_rule = "positive thrust pushes along the directions that the file lists"
-    found.notes += _not_read(root)
+    found.notes += not_read(root)
 
 
 def read_matrix_only(root: Item, found: Found, rows: Order | None = None) -> None:
@@ -86,7 +87,6 @@ def read_matrix_only(root: Item, found: Found, rows: Order | None = None) -> Non
     found.frame, found.frame_why = _frame(root, entries, found, geometry=False)
 
 
-_TURNING = re.compile(r"flip|revers|invert|(^|_)sign|polarity|spin|^directions?$", re.IGNORECASE)
 _ALONE = 0.9
 _LIFT_M = 1e-3
 _NEAR_LINES = 40
@@ -99,29 +99,6 @@ def _holds_figures(item: Item) -> bool:
         return False
     tables = [member for member in item.table().values() if member.table()]
     return item.is_numbers() or any(not isinstance(member.value, str) for member in item.items()) or len(tables) > 1
-
-
-def _title(path: tuple[str, ...]) -> str:
-    return ".".join(key for key in path if key)[:80]
-
-
-def _not_read(root: Item) -> list[str]:
-    """Keys that no reader took, each once; those that may turn a thrust are questioned."""
-    count: dict[str, list[tuple[tuple[str, ...], Item]]] = {}
-    for path, item in root.unread():
-        count.setdefault(path[-1], []).append((path, item))
-    plain: list[str] = []
-    doubts: list[str] = []
-    for key, places in count.items():
-        said = _title(places[0][0]) if len(places) == 1 else f"{key[:60]} ({len(places)} times)"
-        among = any(LOOKS_LIKE_THRUSTERS.search(part) for part in places[0][0][:-1])
-        turning = _TURNING.search(key) and any(item.value not in ("false", "False", "0", "") for _, item in places)
-        (doubts if among and turning else plain).append(said)
-    notes = [f"{QUESTION}not read: {key}, which may turn the thrust round" for key in doubts[:6]]
-    if plain:
-        more = f" and {len(plain) - 20} more" if len(plain) > 20 else ""
-        notes.append(f"not read: {', '.join(plain[:20])}{more}")
-    return notes
 
 
 def _frame(root: Item, entries: Entries, found: Found, *, geometry: bool) -> tuple[Frame, str]:
@@ -208,17 +185,13 @@ def _named_frame(entries: Entries, found: Found) -> tuple[Frame, str] | None:
 
 def _rank(path: tuple[str, ...], value: str) -> int | None:
     """0 for a key of the body's frame, 1 for a bare frame, 2 for any other, None for the world's."""
-    own = _words(path[-1])
+    own = words_in(path[-1])
     bare = own <= _BARE_WORDS
-    around = [own, *(_words(key) for key in path[-2::-1])] if bare else [own]
+    around = [own, *(words_in(key) for key in path[-2::-1])] if bare else [own]
     told = next((words for words in around if words & (_WORLD_WORDS | _BODY_WORDS)), frozenset[str]())
-    if told & _WORLD_WORDS or (_words(value) & _WORLD_WORDS and not _words(value) & _BODY_WORDS):
+    if told & _WORLD_WORDS or (words_in(value) & _WORLD_WORDS and not words_in(value) & _BODY_WORDS):
         return None
     return 0 if told else 1 if bare else 2
-
-
-def _words(text: str) -> frozenset[str]:
-    return frozenset(word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", text))
 
 
 def _geometry(found: Found) -> tuple[Array, Array]:

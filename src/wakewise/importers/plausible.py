@@ -19,6 +19,7 @@ from wakewise.vehicles.draft import MAX_THRUSTERS, VehicleDraft
 UNIT_SLACK = 0.02
 """How far a force column may be from length 1: entries of two digits, such as 0.7 for cos 45 deg, pass."""
 
+_ROUNDING = 0.02
 MAX_ARM_M = 10.0
 """Longest arm of a thruster about the body's origin that is believed."""
 _COUNT = re.compile(r"^((num|number|n|no|count)_?(of_)?thrusters?|thrusters?_(count|num|number))$", re.IGNORECASE)
@@ -30,6 +31,18 @@ _DOF_WORDS = re.compile(r"(?<![0-9.])([3-6])[ _-]?dofs?(?![a-z])", re.IGNORECASE
 _FULL_WORDS = re.compile(r"(fully|over)[ _-]?actuated|holonomic", re.IGNORECASE)
 _MANY = 6
 _DOF_KEY = re.compile(r"^(dofs?|num_dofs?|degrees_of_freedom)$", re.IGNORECASE)
+
+
+def question_inertia(found: Found) -> None:
+    """Question principal moments of inertia of which one exceeds the sum of the others, as no body's does."""
+    if found.inertia_kg_m2 is None:
+        return
+    low, middle, high = np.linalg.eigvalsh(0.5 * (found.inertia_kg_m2 + found.inertia_kg_m2.T))
+    if high > (low + middle) * (1.0 + _ROUNDING):
+        found.notes.append(
+            f"{QUESTION}inertia: the principal moments {low:.4g}, {middle:.4g} and {high:.4g} kg m2 are no body's: "
+            f"the largest must not exceed the sum of the others"
+        )
 
 
 def is_unit(length: Any) -> Any:

@@ -16,7 +16,13 @@ from wakewise.importers.found import FRAME_CHOICES, QUESTION, THRUST_CHOICES, Fo
 from wakewise.importers.matrices import read_matrix_only, read_yaml
 from wakewise.importers.outline import read_outline
 from wakewise.importers.packages import Folders
-from wakewise.importers.plausible import question_names, question_rank, require_count, require_force_columns
+from wakewise.importers.plausible import (
+    question_inertia,
+    question_names,
+    question_rank,
+    require_count,
+    require_force_columns,
+)
 from wakewise.importers.plugins import read_thrusters
 from wakewise.importers.sdf import left_out, read_sdf
 from wakewise.importers.stonefish import read_stonefish
@@ -85,6 +91,7 @@ def import_vehicle(
             order = told_order(rows)
             found = _read(path, packages or {}, arguments or {}, order, skip_missing=skip_missing)
             require_count(len(found.thrusters), f"{path}: ")
+            question_inertia(found)
             draft = make_draft(found, convention, thrust)
             draft = draft if matrix is None else _with_matrix(draft, matrix, convention, rows)
             if not draft.thrusters and draft.shipped_matrix is not None:

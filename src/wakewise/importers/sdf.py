@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from wakewise.arrays import Array
@@ -48,8 +50,15 @@ def left_out(notes: list[str]) -> str:
 
 
 def _models(root: Element) -> list[Element]:
-    direct = root.all("model")
-    return direct + [m for world in root.all("world") for m in world.all("model")]
+    models = root.all("model") + [m for world in root.all("world") for m in world.all("model")]
+    version = re.match(r"\s*(\d{1,4})\.(\d{1,4})", root.attributes.get("version", ""))
+    if version and (int(version[1]), int(version[2])) < (1, 5):
+        # Before SDF 1.5 axes of joints are in the axes of the model.
+        for axis in (e for model in models for e in model.walk() if e.tag == "axis"):
+            xyz = axis.first("xyz")
+            if xyz is not None and axis.first("use_parent_model_frame") is None:
+                xyz.attributes.setdefault("expressed_in", "__model__")
+    return models
 
 
 def _thruster_count(model: Element) -> tuple[int, int]:
@@ -213,6 +222,7 @@ def _link(element: Element, name: str, X_BL: Pose) -> Link:
     if inertial is not None:
         link.place = inertial.place
         mass = inertial.value("mass")
+        link.computed = inertial.attributes.get("auto", "").strip().lower() in {"1", "true"}
         link.mass_kg = checked_mass("1" if mass is None else mass, inertial.place, name)
         at, _ = pose_element(inertial)
         link.p_LG_m = at.p_m
