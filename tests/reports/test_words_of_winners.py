@@ -1,14 +1,15 @@
 """Nobody is called best whom the trials do not show to be; ratios are told as such; a count says of which worlds."""
 
 import re
+from dataclasses import replace
 from importlib import resources
 
 import pytest
 from test_campaign_page import campaign
 
-from wakewise.campaigns.glance import Glance
+from wakewise.campaigns.glance import Glance, Measure, glance
 from wakewise.reports.campaign import campaign_page
-from wakewise.reports.methods_compared import won
+from wakewise.reports.methods_compared import price, won
 from wakewise.reports.page import chip, missing, prose, scene_box
 from wakewise.reports.reproduce import words
 from wakewise.reports.words import duration, percent
@@ -54,6 +55,22 @@ def test_few_pairs_that_agree_are_told_as_what_came_out():
         "wake-aware came out better: wake-aware 0.900, smooth 1 mm RMSE, 10 % (5 to 15) apart; "
         "3 pairs are too few to be sure."
     )
+
+
+def test_the_price_of_less_wash_counts_silt():
+    """Silt between camera and target stands beside energy; what is alike, or was not measured, is left out."""
+    assert price(replace(judged(), silt_ratio=1.81)) == (
+        "It takes as much energy as smooth. Silt between camera and target: 1.81 times that of smooth. No trial failed."
+    )
+    assert "Silt" not in price(judged()) + price(replace(judged(), silt_ratio=1.0))
+    places = [
+        {"world": "mud", "method": method, "target": "brain", "seed": seed, "reason": None}
+        | {"figures": {"rmse_mm": rmse, "energy_kJ": 2.0, "ray_optical_depth": silt * seed}}
+        for seed in (1, 2)
+        for method, rmse, silt in (("dp", 1.0, 0.1), ("wake-aware", 0.9, 0.3))
+    ]
+    found = glance(Measure("rmse_mm", "mm RMSE", 1.0, True), "mud", places)
+    assert found is not None and found.silt_ratio == pytest.approx(3.0) and found.energy_ratio == pytest.approx(1.0)
 
 
 def test_a_page_calls_nobody_best_whom_few_trials_favour(tmp_path):

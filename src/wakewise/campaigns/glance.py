@@ -33,7 +33,8 @@ class Glance:
     """Methods in one world in a few words.
 
     `means` are in the unit of `words`, worst last; `less_pct` is how much better the winner is than `rival`, the best
-    of the others, with its interval; `energy_ratio` what it costs over the rival; `failed` counts trials by method.
+    of the others, with its interval; `energy_ratio` what it costs over the rival, `silt_ratio` the silt between camera
+    and target over the rival's; `failed` counts trials by method.
     """
 
     world: str
@@ -49,6 +50,7 @@ class Glance:
     energy_ratio: float | None
     failed: dict[str, int]
     trials: int
+    silt_ratio: float | None = None
 
     @property
     def is_sure(self) -> bool:
@@ -74,7 +76,6 @@ def glance(measure: Measure, world: str, places: Sequence[Place]) -> Glance | No
     figure, words, scale, less = measure
     here = [place for place in places if place["world"] == world]
     values: dict[str, dict[tuple[str, int], float]] = {}
-    energy: dict[str, dict[tuple[str, int], float]] = {}
     failed: dict[str, int] = {}
     for place in here:
         method, known = place["method"], (place["target"], place["seed"])
@@ -85,9 +86,6 @@ def glance(measure: Measure, world: str, places: Sequence[Place]) -> Glance | No
             value = WORST.get(figure)
         if value is not None:
             values.setdefault(method, {})[known] = scale * float(value)
-        spent = place["figures"].get("energy_kJ")
-        if spent is not None:
-            energy.setdefault(method, {})[known] = float(spent)
     both = [known for known in next(iter(values.values()), {}) if all(known in own for own in values.values())]
     if not both:
         return None
@@ -107,9 +105,8 @@ def glance(measure: Measure, world: str, places: Sequence[Place]) -> Glance | No
         told["p_t"] = paired_test(ours, theirs).p_t
         groups = [by_target(values[who], both) for who in (winner, rival)]
         told["improvement"] = probability_of_improvement(*groups, less_is_better=less)[0]
-        spent = [[energy.get(who, {}).get(known) for known in both] for who in (winner, rival)]
-        if all(value is not None for side in spent for value in side) and sum(v or 0.0 for v in spent[1]) > 0.0:
-            told["energy_ratio"] = sum(v or 0.0 for v in spent[0]) / sum(v or 0.0 for v in spent[1])
+        told["energy_ratio"] = _ratio(here, "energy_kJ", winner, rival, both)
+        told["silt_ratio"] = _ratio(here, "ray_optical_depth", winner, rival, both)
     return Glance(
         world=world,
         figure=figure,
@@ -121,6 +118,20 @@ def glance(measure: Measure, world: str, places: Sequence[Place]) -> Glance | No
         trials=len(both),
         **told,
     )
+
+
+def _ratio(
+    places: Sequence[Place], figure: str, one: str, other: str, pairs: Sequence[tuple[str, int]]
+) -> float | None:
+    """Sum of a figure over pairs by one method over that by another; None where a trial lacks it or there is none."""
+    known = {(p["method"], p["target"], p["seed"]): p["figures"].get(figure) for p in places}
+    sums = []
+    for method in (one, other):
+        values = [known.get((method, *pair)) for pair in pairs]
+        if any(value is None for value in values):
+            return None
+        sums.append(sum(float(value) for value in values if value is not None))
+    return sums[0] / sums[1] if sums[1] > 0.0 else None
 
 
 def worst_trials(measure: Measure, world: str, places: Sequence[Place]) -> dict[str, Place]:

@@ -75,6 +75,8 @@ def price(glance: Glance) -> str:
         alike = abs(glance.energy_ratio - 1.0) < _ALIKE
         much = "as much energy as" if alike else f"{number(glance.energy_ratio)} times the energy of"
         said.append(f"It takes {much} {glance.rival}.")
+    if glance.silt_ratio is not None and abs(glance.silt_ratio - 1.0) >= _ALIKE:
+        said.append(f"Silt between camera and target: {number(glance.silt_ratio)} times that of {glance.rival}.")
     lost = {method: count for method, count in glance.failed.items() if count}
     if lost:
         said.append("Failed: " + ", ".join(f"{method} {count}" for method, count in lost.items()) + ".")
