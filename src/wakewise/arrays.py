@@ -67,6 +67,9 @@ def frozen(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
 
 def _real(value: ArrayLike, name: str) -> NDArray[Any]:
     """`value` as an array of real numbers, of whatever type."""
+    parts = (value, *value) if isinstance(value, (list, tuple)) else (value,)
+    if any(isinstance(part, np.ma.MaskedArray) and np.ma.is_masked(part) for part in parts):
+        raise InputError(f"{name}: is masked in part, allowed: real numbers, all of them known")
     try:
         array = np.asarray(value)
     except Exception as fault:  # ragged lists, and whatever the conversion of a thing from outside raises

@@ -1,19 +1,23 @@
-"""Checks of single values at the public doors: a word of a list, a whole number, a number, a thing of a kind."""
+"""Checks of single values at the public doors: a word of a list, a number, a path, a thing of a kind."""
 
 from __future__ import annotations
 
 import math
 import operator
+import os
 from collections.abc import Sequence
 from difflib import get_close_matches
 from numbers import Real
-from typing import Any, TypeVar
+from pathlib import Path
+from typing import Any, NoReturn, TypeVar
 
 from wakewise.errors import InputError
 
 T = TypeVar("T")
 _SHOWN = 60
 """Longest value that a message quotes whole."""
+_LONGEST_NAME = 255
+"""So many bytes file systems let the name of a file or folder have."""
 
 
 def quoted(value: object) -> str:
@@ -91,6 +95,60 @@ def finite_number(value: object, name: str, above: float | None = None, least: f
         )
         raise InputError(f"{name}: {number:g}, must be finite{bound}")
     return number
+
+
+def path_of(value: object, name: str) -> Path:
+    """The value as a path, which the operating system takes as one, whether anything is there or not.
+
+    Raises
+    ------
+    InputError
+        If it is no text or path, or no file or folder can have that name.
+    """
+    if not isinstance(value, (str, os.PathLike)) or not isinstance(text := os.fspath(value), str):
+        raise InputError(f"{name}: {quoted(value)}, must be a path")
+    try:
+        os.lstat(text)
+        reason = None
+    except (FileNotFoundError, NotADirectoryError, PermissionError):
+        reason = None  # told of, with what was looked for, by whoever opens it
+    except OSError as fault:
+        reason = fault.strerror or type(fault).__name__
+    except ValueError:  # NUL, or half of a character
+        return _no_path(text, name, "it holds what no name can hold")
+    if any(len(os.fsencode(part)) > _LONGEST_NAME for part in Path(text).parts):
+        reason = f"a name has at most {_LONGEST_NAME} bytes"
+    return Path(text) if reason is None else _no_path(text, name, reason)
+
+
+def _no_path(text: str, name: str, reason: str) -> NoReturn:
+    raise InputError(f"{name}: {quoted(text)}, must be a path ({reason})")
+
+
+def truth(value: object, name: str) -> bool:
+    """The value as a bool; neither words nor numbers nor arrays are one.
+
+    Raises
+    ------
+    InputError
+        If it is neither True nor False.
+    """
+    if type(value).__name__ not in ("bool", "bool_"):
+        raise InputError(f"{name}: {quoted(value)}, must be True or False")
+    return bool(value)
+
+
+def callable_of(value: T, name: str) -> T:
+    """The value itself, if it can be called.
+
+    Raises
+    ------
+    InputError
+        If it cannot.
+    """
+    if not callable(value):
+        raise InputError(f"{name}: {quoted(value)}, must be a function")
+    return value
 
 
 def instance_of(value: Any, kind: type[T], name: str) -> T:

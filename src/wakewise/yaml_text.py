@@ -10,6 +10,7 @@ from typing import Any
 
 import yaml
 
+from wakewise.checks import path_of
 from wakewise.errors import InputError
 
 MOST_BYTES = 4_000_000
@@ -83,21 +84,23 @@ def _refers_to_itself(tree: Any) -> bool:
     return False
 
 
-def text_of(path: Path) -> str:
-    """Text of a file that a person wrote.
+def text_of(path: Path, most_bytes: int = MOST_BYTES, encoding: str = "utf-8") -> str:
+    """Text of a file that a person or a program wrote; of a larger one than allowed no more is read than shows it.
 
     Raises
     ------
+    InputError
+        If no file can have that name.
     OSError, UnicodeDecodeError
         If it cannot be read as text.
     YamlError
-        If it is larger than `MOST_BYTES`.
+        If it is larger than `most_bytes`.
     """
-    with path.open("rb") as file:
-        data = file.read(MOST_BYTES + 1)
-    if len(data) > MOST_BYTES:
-        raise YamlError(f"larger than {1e-6 * MOST_BYTES:g} MB, which no such file is", None)
-    return data.decode("utf-8")
+    with path_of(path, "file").open("rb") as file:
+        data = file.read(most_bytes + 1)
+    if len(data) > most_bytes:
+        raise YamlError(f"larger than {1e-6 * most_bytes:g} MB, which no such file is", None)
+    return data.decode(encoding)
 
 
 def yaml_file(path: Path) -> Any:

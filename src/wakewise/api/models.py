@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
 from wakewise.arrays import frozen
-from wakewise.checks import finite_number, instance_of
+from wakewise.checks import finite_number, instance_of, path_of, quoted, truth
 from wakewise.control import MAKERS
 from wakewise.errors import InputError
 from wakewise.extras import need
 from wakewise.plugins import names
+from wakewise.settings import seed_number
 from wakewise.targets import find_target, is_mesh_file
 
 if TYPE_CHECKING:
@@ -63,17 +65,23 @@ def reconstruct(
     >>> ww.reconstruct("photos", "runs/photos").summary()["registered_images"]  # doctest: +SKIP
     """
     need("ww.reconstruct", "photos")
-    from wakewise.reconstruction import read_lens, read_reference_cameras
+    from wakewise.reconstruction import ReconstructionSettings, read_lens, read_reference_cameras
     from wakewise.reconstruction import reconstruct as build
 
+    if region is not None and (not isinstance(region, (tuple, list)) or len(region) != 2):
+        raise InputError(f"region: {quoted(region)}, must be a centre and a radius, ((x, y, z), r) in m")
+    sphere = None if region is None else (frozen(region[0], (3,), "region"), finite_number(region[1], "region", 0.0))
+    pictures, place = path_of(photos, "photos"), path_of(out, "out")
+    lens = None if camera is None else path_of(camera, "camera")
+    references = None if reference_cameras is None else path_of(reference_cameras, "reference_cameras")
     return build(
-        Path(photos),
-        Path(out),
-        settings,
-        focal_px=focal_px,
-        lens=None if camera is None else read_lens(Path(camera)),
-        reference_positions=None if reference_cameras is None else read_reference_cameras(Path(reference_cameras)),
-        region=None if region is None else (frozen(region[0], (3,), "region"), float(region[1])),
+        pictures,
+        place,
+        None if settings is None else instance_of(settings, ReconstructionSettings, "settings"),
+        focal_px=None if focal_px is None else finite_number(focal_px, "focal_px", above=0.0),
+        lens=None if lens is None else read_lens(lens),
+        reference_positions=None if references is None else read_reference_cameras(references),
+        region=sphere,
     )
 
 
@@ -119,21 +127,26 @@ def evaluate(
     from wakewise.reconstruction import read_cloud
     from wakewise.targets import Mesh, read_mesh
 
-    points = read_cloud(Path(cloud)).points_m if isinstance(cloud, (str, Path)) else frozen(cloud, (None, 3), "cloud")
+    icp = truth(icp, "icp")
+    if isinstance(cloud, (str, os.PathLike)):
+        points = read_cloud(path_of(cloud, "cloud")).points_m
+    else:
+        points = frozen(cloud, (None, 3), "cloud")
     bed = None if bed_z_m is None else finite_number(bed_z_m, "bed_z_m")
-    mesh = (
-        read_mesh(Path(reference)) if isinstance(reference, (str, Path)) else instance_of(reference, Mesh, "reference")
-    )
+    if isinstance(reference, (str, os.PathLike)):
+        mesh = read_mesh(path_of(reference, "reference"))
+    else:
+        mesh = instance_of(reference, Mesh, "reference")
     centres = None if camera_centres_m is None else frozen(camera_centres_m, (None, 3), "camera_centres_m")
     return evaluate_surface(points, mesh, crop=Crop(bed_z_m=bed), camera_centres_W_m=centres, icp=icp)
 
 
-def load_target(kind: str, *, bed_z_m: float = 1.5, seed: int = 0, size_m: float | None = None) -> Target:
+def load_target(kind: str | Path, *, bed_z_m: float = 1.5, seed: int = 0, size_m: float | None = None) -> Target:
     """A target standing on the bed: a procedural coral by name, a mesh file, or one from outside.
 
     Parameters
     ----------
-    kind : str
+    kind : str or Path
         "branching", "brain", "plate", the path of a mesh file, a plug-in's name, or ``package.module:make``.
     bed_z_m : float
         Depth of the bed, more than 0.
@@ -153,7 +166,7 @@ def load_target(kind: str, *, bed_z_m: float = 1.5, seed: int = 0, size_m: float
     >>> ww.load_target("plate").bed_z_m
     1.5
     """
-    if seed != 0 and is_mesh_file(kind):
+    if seed_number(seed) != 0 and is_mesh_file(kind):
         raise InputError(f"seed: {seed}, a mesh file has but one individual, leave it out")
     return find_target(kind, bed_z_m, seed, size_m)
 

@@ -20,6 +20,8 @@ from wakewise.targets import Region
 from wakewise.vehicles import Vehicle
 from wakewise.wake import Superposition, WakeView, wake_model
 
+LARGEST = 1e9
+"""In N and N m: larger forces and moments, whose squares overflow sooner or later, are those of no vehicle."""
 PoseLike = Pose | Sequence[float] | Array
 """A pose of the body in the world, or its x, y, z (m), roll, pitch, yaw (rad)."""
 
@@ -90,13 +92,17 @@ def allocate(
     True
     """
     layout = layout_of(vehicle, failed)
-    wrench = frozen(wrench_B, (6,), "wrench_B")
+    wrench = _within(frozen(wrench_B, (6,), "wrench_B"), "wrench_B")
     weights = {
         "w_disturbance": finite_number(w_disturbance, "w_disturbance", least=0.0),
         "w_effort": finite_number(w_effort, "w_effort", above=0.0),
         "w_previous": finite_number(w_previous, "w_previous", least=0.0),
     }
-    before = None if previous_N is None else frozen(previous_N, (len(vehicle.thrusters),), "previous_N")
+    before = (
+        None
+        if previous_N is None
+        else _within(frozen(previous_N, (len(vehicle.thrusters),), "previous_N"), "previous_N")
+    )
     whole_number(budget, "budget", 1)
     view = None if region is None else view_of(vehicle, region, wake, superposition)
     X_WB = None if pose is None else pose_of(pose)
@@ -240,9 +246,16 @@ def _vehicle(vehicle: Vehicle) -> Vehicle:
     return instance_of(vehicle, Vehicle, "vehicle")
 
 
+def _within(values: Array, name: str) -> Array:
+    worst = float(np.abs(values).max(initial=0.0))
+    if worst > LARGEST:
+        raise InputError(f"{name}: holds {worst:.3g}, allowed at most {LARGEST:g} N or N m")
+    return values
+
+
 def _model(wake: WakeModel | str) -> WakeModel:
     return wake_model(wake) if isinstance(wake, str) else able(wake, ("unit_velocity",), "wake", "wake model")
 
 
 def _thrusts(vehicle: Vehicle, thrusts_N: ArrayLike) -> Array:
-    return frozen(thrusts_N, (len(_vehicle(vehicle).thrusters),), "thrusts_N")
+    return _within(frozen(thrusts_N, (len(_vehicle(vehicle).thrusters),), "thrusts_N"), "thrusts_N")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wakewise.checks import quoted
+from wakewise.checks import able, callable_of, path_of, quoted
 from wakewise.errors import InputError
 from wakewise.extras import need
 from wakewise.files import named
@@ -71,7 +71,10 @@ def trial(
     from wakewise.trials import Quiet, run_trial
     from wakewise.trials.reporting import report_attempt
 
-    watch, place, draft = watch or Quiet(), _path(folder), Draft()
+    place, draft = path_of(folder, "folder"), Draft()
+    watch = Quiet() if watch is None else able(watch, ("stage",), "watch", "watch")
+    if told is not None:
+        callable_of(told, "told")
     with_parts = _early(lambda missing: begin_report(place, draft, missing))
     figures = run_trial(flight, place, watch, told, with_parts)
     report = None
@@ -112,11 +115,12 @@ def compare(flights: Mapping[str, Parts | Scenario], folder: str | Path, watch: 
         raise InputError(f"flights: {quoted(flights)}, must be names with parts or scenarios")
     if len(flights) < 2:
         raise InputError(f"compare: {len(flights)} flights, at least two are needed to compare; one alone is a `trial`")
+    place = path_of(folder, "folder")
     for name in flights:
         if not isinstance(name, str):
             raise InputError(f"flights: {quoted(name)}, must be a name")
-        named(_path(folder), name, "compare")
-    watch, place = watch or Quiet(), _path(folder)
+        named(place, name, "compare")
+    watch = Quiet() if watch is None else able(watch, ("stage",), "watch", "watch")
     drafts = {name: Draft() for name in flights}
     with_parts = _early(lambda name, lacks: begin_report(place / name, drafts[name], lacks))
     figures = compare_methods(flights, place, watch, with_parts)
@@ -138,9 +142,3 @@ def _early(begin: Callable[..., None]) -> Callable[..., None]:
             begin(*given)
 
     return parts
-
-
-def _path(folder: str | Path) -> Path:
-    if not isinstance(folder, (str, Path)):
-        raise InputError(f"folder: {quoted(folder)}, must be a path")
-    return Path(folder)

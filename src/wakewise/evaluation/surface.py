@@ -15,6 +15,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from wakewise.arrays import Array, BoolArray, IntArray, freeze
+from wakewise.checks import truth
 from wakewise.errors import InputError, StageError
 from wakewise.evaluation.alignment import Refinement, refine_icp
 from wakewise.evaluation.thresholds import Share, shares
@@ -258,6 +259,7 @@ def compare_surface(
         If too little of the cloud lies near the truth to say anything, its scale is suspicious, or ICP says that the
         two do not belong together.
     """
+    icp = truth(icp, "icp")
     suspicion = suspicious_scale(cloud_W_m, mesh)
     if suspicion is not None:
         raise StageError(suspicion)

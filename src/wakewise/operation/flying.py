@@ -14,7 +14,7 @@ from typing import Any, TypedDict, cast
 
 import polars as pl
 
-from wakewise.checks import finite_number, quoted
+from wakewise.checks import callable_of, finite_number, quoted, truth
 from wakewise.errors import InputError, StageError, WakewiseError
 from wakewise.evaluation import flight_figures
 from wakewise.extras import has
@@ -188,14 +188,19 @@ def fly(
     >>> flight.steps.height, flight.parts.method
     (50, 'dp')
     """
+    callable_of(progress, "progress")
+    for name, call in (("watch", watch), ("exposed", exposed)):
+        if call is not None:
+            callable_of(call, name)
+    checked = truth(checked, "checked")
+    if not (isinstance(water_every_s, (float, int)) and water_every_s == math.inf):  # never
+        finite_number(water_every_s, "water_every_s", above=0.0)
     parts = parts_of(flight)
     route, _ = parts.route, parts.vehicle  # what cannot be used is refused before minutes of compiling
     dt_s = 1.0 / parts.scenario.control.rate_hz
     lasts_s = route.duration_s if duration_s is None else finite_number(duration_s, "duration_s")
     if round(lasts_s / dt_s) < 1:
         raise InputError(f"duration_s: {lasts_s:g}, must be at least one control step, {dt_s:g} s")
-    if water_every_s != math.inf:  # never
-        finite_number(water_every_s, "water_every_s", above=0.0)
     warm(FLIGHT_JOBS, _Notice() if progress is no_progress else progress)
     if checked:
         _ = parts.preflight

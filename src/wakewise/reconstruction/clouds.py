@@ -9,6 +9,7 @@ import numpy as np
 import trimesh
 
 from wakewise.arrays import Array, BoolArray, IntArray, freeze
+from wakewise.checks import path_of
 from wakewise.errors import InputError
 from wakewise.files import whole_file
 from wakewise.sizes import broken_ply
@@ -56,6 +57,7 @@ def read_cloud(path: Path) -> Cloud:
     InputError
         If the file is missing, is no point file, or holds no finite points.
     """
+    path = path_of(path, "cloud")
     if not path.is_file():
         raise InputError(f"{path}: does not exist; a file of points is needed (.ply)")
     try:

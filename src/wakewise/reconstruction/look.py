@@ -18,6 +18,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from wakewise.arrays import Array, BoolArray, IntArray
+from wakewise.errors import InputError
 from wakewise.interfaces import Progress, no_progress
 from wakewise.reconstruction.dense import in_order
 from wakewise.reconstruction.film_frames import sharpness_of
@@ -37,6 +38,8 @@ CELLS = (8, 6)
 """The picture's parts, across and down, that coverage is counted in."""
 THUMBS_PX = ((60, 640), (200, 400), (10**9, 240))
 """Longest side of small copies for up to so many photographs, so that a page holds them all."""
+_LEAST_SIDE_PX = 4
+"""Narrower in the copy that is matched, a picture has no detail that could be measured."""
 _RATIO, _GEOMETRY_PX = 0.8, 2.0
 
 
@@ -96,10 +99,14 @@ def look_at(folder: Path, threads: int = 2, progress: Progress = no_progress) ->
     Raises
     ------
     InputError
-        If they cannot be read, see `read_photos`.
+        If they cannot be read, see `read_photos`; if one is so narrow that nothing of it is left in a small copy.
     """
     store = PhotoStore(folder)
     found = read_photos(folder, store, threads)
+    for photo in found:
+        if min(photo.width, photo.height) * min(1.0, MATCHED_PX / max(photo.width, photo.height)) < _LEAST_SIDE_PX:
+            size = f"{photo.width} x {photo.height}"
+            raise InputError(f"{folder / photo.name}: {size} pixels, too narrow for a photograph; leave it out")
     names = [photo.name for photo in found]
     thumb_px = next(size for count, size in THUMBS_PX if len(names) <= count)
     before = cv2.getNumThreads()
@@ -190,7 +197,8 @@ def _within(image: Image, most: int) -> Image:
     shrink = most / max(image.shape[:2])
     if shrink >= 1.0:
         return image
-    return np.asarray(cv2.resize(image, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    size = [max(1, round(shrink * side)) for side in image.shape[1::-1]]
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
 def _judged(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
-from wakewise.checks import finite_number
+from wakewise.checks import finite_number, path_of, quoted
 from wakewise.errors import InputError
 from wakewise.plugins import find, offered
 from wakewise.settings import guess, seed_number
@@ -17,12 +18,12 @@ MeshMaker = Callable[[int], Mesh]
 """What a target from outside is made by: a seed to a mesh in a z-up frame, in metres, whose bed is at z = 0."""
 
 
-def find_target(kind: str, bed_z_m: float, seed: int = 0, size_m: float | None = None) -> Target:
+def find_target(kind: str | Path, bed_z_m: float, seed: int = 0, size_m: float | None = None) -> Target:
     """The target of that name, standing on the bed.
 
     Parameters
     ----------
-    kind : str
+    kind : str or Path
         A procedural coral, the path of a mesh file, a name that an installed package offers (entry points
         `wakewise.targets`), or ``package.module:make``; see `MeshMaker`.
     bed_z_m : float
@@ -42,10 +43,12 @@ def find_target(kind: str, bed_z_m: float, seed: int = 0, size_m: float | None =
     return place_on_bed(name, mesh, depth_m)
 
 
-def find_mesh(kind: str, seed: int = 0, size_m: float | None = None) -> tuple[str, Mesh]:
+def find_mesh(kind: str | Path, seed: int = 0, size_m: float | None = None) -> tuple[str, Mesh]:
     """Name and mesh of the same target, with z up and its bed at z = 0; as `find_target`."""
     individual = seed_number(seed)
-    path = Path(kind).expanduser()
+    kind, path = _place(kind)
+    if size_m is not None and (isinstance(size_m, bool) or not isinstance(size_m, (float, int))):
+        raise InputError(f"size_m: {quoted(size_m)}, must be a number of metres")
     if not is_mesh_file(kind):
         if size_m is not None:
             raise InputError(f"target '{kind}': size_m {size_m:g} scales a mesh file, this one has its own size")
@@ -61,8 +64,15 @@ def find_mesh(kind: str, seed: int = 0, size_m: float | None = None) -> tuple[st
     return path.stem, load_mesh(path, size_m)
 
 
-def is_mesh_file(kind: str) -> bool:
+def is_mesh_file(kind: str | Path) -> bool:
     """Whether a target's name is taken as that of a mesh file, not of a procedural target or one from outside."""
+    kind, path = _place(kind)
     if kind in coral_kinds():
         return False
-    return Path(kind).expanduser().exists() or not (kind in offered("target") or ":" in kind)
+    return path.exists() or not (kind in offered("target") or ":" in kind)
+
+
+def _place(kind: str | Path) -> tuple[str, Path]:
+    """A target's name as text, and the path that it is if it is one."""
+    path = path_of(kind, "target")
+    return kind if isinstance(kind, str) else str(path), Path(os.path.expanduser(path))  # noqa: PTH111  (never raises)

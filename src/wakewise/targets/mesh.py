@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.arrays import Array, IntArray, freeze, frozen_indices
+from wakewise.checks import path_of
 from wakewise.errors import InputError
 from wakewise.files import write_bytes
 from wakewise.sizes import broken_ply
@@ -145,7 +146,7 @@ def read_mesh(path: Path | str) -> Mesh:
     InputError
         If the file is missing, empty, unreadable, holds no faces or a vertex that is not finite.
     """
-    path = Path(path)
+    path = path_of(path, "mesh file")
     vertices, faces = _read(path)
     if len(faces) == 0:
         raise FacelessFileError(

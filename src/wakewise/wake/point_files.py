@@ -17,6 +17,7 @@ import numpy as np
 
 from wakewise.arrays import Array, BoolArray, IntArray
 from wakewise.errors import InputError
+from wakewise.yaml_text import YamlError, text_of
 
 COLUMNS: dict[str, str] = {
     "x_m": "along the jet from the disk's middle",
@@ -30,6 +31,8 @@ COLUMNS: dict[str, str] = {
     "disk_diameter_m": "optional, the same on every row",
 }
 """Columns of a data file and what they hold."""
+MOST_BYTES = 50_000_000
+"""Some 500,000 velocities; a larger file is of another kind."""
 _SPEEDS = ("u_m_s", "v_m_s", "w_m_s")
 _LIMIT_M, _LIMIT_M_S, _LIMIT_N = 100.0, 100.0, 1e6
 _NAMES = {
@@ -148,7 +151,9 @@ def _notes(columns: list[_Column], dropped: Counter[str]) -> tuple[str, ...]:
 
 def _lines(path: Path) -> list[str]:
     try:
-        return path.read_text(encoding="utf-8-sig").splitlines()
+        return text_of(path, MOST_BYTES, "utf-8-sig").splitlines()
+    except YamlError as fault:
+        raise InputError(f"{path}: cannot be read ({fault.reason})") from None
     except (OSError, UnicodeDecodeError) as fault:
         reason = fault.strerror if isinstance(fault, OSError) else "it is no text"
         raise InputError(f"{path}: cannot be read ({reason})") from None
