@@ -157,7 +157,7 @@ def test_bad_options_are_one_line(capsys: Capsys, points: Path, more: list[str],
     ("text", "said"),
     [
         ("", "columns none"),
-        ("x_m,y_m,z_m\n0,0,1\n", "columns x_m, y_m, z_m, allowed"),
+        ("x_m,y_m,z_m\n0,0,1\n", "columns x_m, y_m, z_m, lacks weight, allowed"),
         ("x_m,y_m,z_m,weight\n", "holds no points"),
         ("x_m,y_m,z_m,weight\n0,0,1,-1\n", "line 2 has weight -1"),
         ("x_m,y_m,z_m,weight\n0,0,1,nan\n", "four finite numbers"),

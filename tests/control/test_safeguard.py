@@ -126,6 +126,7 @@ def test_where_the_world_waits_a_late_answer_is_counted_and_flown(caplog):
     assert guard.counts == {}
     slow = safeguarded(Troubled(lambda: None), VEHICLE, SETTINGS)
     slow.clock = lambda: float(next(clock))
+    caplog.set_level("DEBUG", logger="wakewise")
     state = slow.init()
     for command in commands:
         state, late = slow.step(state, 0.02, HERE, GOAL)

@@ -3,6 +3,8 @@
 import re
 from dataclasses import dataclass
 
+import pytest
+
 import wakewise as ww
 
 
@@ -32,6 +34,7 @@ def test_what_nobody_knows_is_not_said():
     assert str(ww.fly(parts.replace(world=Sea(parts.world)), duration_s=0.4)) == "dp, seed 1: 0 s"
 
 
+@pytest.mark.usefixtures("fallbacks_fly")
 def test_steps_that_were_not_the_methods_own_are_counted():
     """A controller that raises is flown by dp, and the line says how often."""
 

@@ -53,7 +53,7 @@ def seven(good):
     ("act", "words"),
     [
         (raises, "theirs: raised ZeroDivisionError: no such thing (test_foreign.py:"),
-        (nan, "theirs: raised InputError: thrusts_N: holds NaN"),
+        (nan, "theirs: raised NotFinite: thrusts_N: holds NaN"),
         (seven, "theirs: gave 7 thrusts, needs 8"),
         (lambda good: good.thrusts_N, "theirs: gave ndarray, must be a Command"),
     ],

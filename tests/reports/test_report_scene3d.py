@@ -98,7 +98,8 @@ def test_the_bed_has_the_tanks_size_whatever_the_target_is_scaled_to(made_up: Pa
     folder = tmp_path / "scaled"
     shutil.copytree(made_up, folder, ignore=shutil.ignore_patterns("*.html", "images"))
     tree = yaml.safe_load((folder / "scenario.yaml").read_text())
-    tree |= {"target": {"kind": "brain", "size_m": 0.25}, "tank": {"size_m": [7, 4, 1.7]}}
+    trimesh.creation.icosphere(2, 0.1).export(tmp_path / "ball.ply")
+    tree |= {"target": {"kind": str(tmp_path / "ball.ply"), "size_m": 0.25}, "tank": {"size_m": [7, 4, 1.7]}}
     (folder / "scenario.yaml").write_text(yaml.safe_dump(tree, sort_keys=False))
     _, server = layers(read_trial(folder), None)
     grid = server.scene.add_grid.call_args.kwargs

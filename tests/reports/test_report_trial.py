@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import polars as pl
+import trimesh
 import yaml
 
 from wakewise.reports.report import report_page
@@ -41,7 +42,9 @@ def test_columns_that_hold_nothing_are_absent(made_up: Path, tmp_path: Path) -> 
 
 def test_the_bed_is_the_tanks_however_large_the_target(made_up: Path, tmp_path: Path) -> None:
     """A scenario whose target has a size_m of its own leaves the tank its size, in the bed's depth and in the scene."""
-    folder = rewritten(made_up, tmp_path, target={"kind": "brain", "size_m": 0.25}, tank={"size_m": [7, 4, 1.7]})
+    trimesh.creation.icosphere(2, 0.1).export(tmp_path / "ball.ply")
+    target = {"kind": str(tmp_path / "ball.ply"), "size_m": 0.25}
+    folder = rewritten(made_up, tmp_path, target=target, tank={"size_m": [7, 4, 1.7]})
     trial = read_trial(folder)
     assert trial.bed_z_m == 1.7
     assert trial.settings is not None

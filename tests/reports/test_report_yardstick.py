@@ -80,7 +80,7 @@ def test_a_dp_flight_of_another_scenario_is_no_yardstick(made_up: Path, tmp_path
     (other / "scenario.yaml").write_text(yaml.safe_dump(tree))
     found = against_dp(read_trial(folder))
     assert found is not None
-    assert "by estimate" in found.verdict
+    assert "not measured: dp has not flown" in found.verdict
 
 
 def test_the_bed_is_judged_by_its_grains_and_by_the_record(made_up: Path, tmp_path: Path) -> None:

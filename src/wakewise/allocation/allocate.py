@@ -7,6 +7,7 @@ of a wrench that the limits do not allow (`reach`), so that they can be compared
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -112,7 +113,9 @@ class Weights:
 
     def __post_init__(self) -> None:
         for name in ("disturbance", "effort", "previous"):
-            finite_number(getattr(self, name), f"weight {name}", least=0.0)
+            value = getattr(self, name)
+            if type(value) is not float or not 0.0 <= value < math.inf:
+                finite_number(value, f"weight {name}", least=0.0)
 
     @cached_property
     def packed(self) -> Array:
@@ -224,14 +227,15 @@ def gentle_allocation(
         If the wrench, the Gram matrix or the previous thrusts have a wrong shape or are not finite, the priority is not
         a list of axes, or the budget is less than 1.
     """
-    instance_of(layout, Layout, "layout")
-    instance_of(weights, Weights, "weights")
+    if type(layout) is not Layout or type(weights) is not Weights or type(budget) is not int or budget < 1:
+        instance_of(layout, Layout, "layout")
+        instance_of(weights, Weights, "weights")
+        whole_number(budget, "budget", 1)
     n = layout.B.shape[1]
     requested = frozen(wrench_B, (6,), "wrench")
     G = frozen(gram, (2 * n, 2 * n), "Gram matrix")
     # Copies, here and of the lines: kernels are compiled for arrays that may be written to, and not again for others.
     previous = np.zeros(n) if previous_N is None else frozen(previous_N, (n,), "previous thrusts").copy()
-    whole_number(budget, "budget", 1)
     if priority is not None:
         parse_priority(priority)
     packed = weights.packed

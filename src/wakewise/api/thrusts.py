@@ -115,7 +115,7 @@ def allocate(
         effort=weights["w_effort"],
         previous=weights["w_previous"],
     )
-    return gentle_allocation(layout, wrench, view.gram(X_WB), cost, before, priority, budget)
+    return gentle_allocation(layout, wrench, _gram(view, X_WB), cost, before, priority, budget)
 
 
 def disturbance(
@@ -151,7 +151,7 @@ def disturbance(
     """
     thrusts = _thrusts(vehicle, thrusts_N)
     view = view_of(vehicle, region, wake, superposition)
-    return wakes.disturbance(view.gram(pose_of(pose)), thrusts)
+    return wakes.disturbance(_gram(view, pose_of(pose)), thrusts)
 
 
 def velocity(
@@ -259,3 +259,9 @@ def _model(wake: WakeModel | str) -> WakeModel:
 
 def _thrusts(vehicle: Vehicle, thrusts_N: ArrayLike) -> Array:
     return _within(frozen(thrusts_N, (len(_vehicle(vehicle).thrusters),), "thrusts_N"), "thrusts_N")
+
+
+def _gram(view: WakeView, X_WB: Pose) -> Array:
+    """The Gram matrix at a pose; a wake model that answers NaN there is refused."""
+    n = len(view.positions_B_m)
+    return frozen(view.gram(X_WB), (2 * n, 2 * n), "wake model: its Gram matrix")

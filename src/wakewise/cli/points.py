@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from wakewise.vehicles import Vehicle
 
 
+_MOST_BYTES = 20_000_000
+
+
 def read_points(path: Path, vehicle: Vehicle, X_WB: Pose) -> tuple[Array, Array]:
     """Points, shape (n, 3), in the frame that X_WB places the vehicle in, and weights, shape (n,), of a CSV file.
 
@@ -25,17 +28,18 @@ def read_points(path: Path, vehicle: Vehicle, X_WB: Pose) -> tuple[Array, Array]
 
     from wakewise.errors import InputError
     from wakewise.separators import other_separator
+    from wakewise.yaml_text import YamlError, text_of
 
     columns = ("x_m", "y_m", "z_m", "weight")
     try:
-        rows = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines(), strict=True))
-    except (OSError, UnicodeDecodeError, csv.Error) as fault:
+        rows = list(csv.reader(text_of(path, _MOST_BYTES, "utf-8-sig").splitlines(), strict=True))
+    except (OSError, YamlError, UnicodeDecodeError, csv.Error) as fault:
         raise InputError(f"--points {path}: cannot be read as CSV, {fault}") from None
     head = [name.strip() for name in rows[0]] if rows else []
     if sorted(head) != sorted(columns):
         how = other_separator(head)
         lacks = ", ".join(name for name in columns if name not in head)
-        what = f"lacks column {lacks}" if lacks else f"columns {', '.join(head)}"
+        what = f"columns {', '.join(head) or 'none'}" + (f", lacks {lacks}" if lacks else "")
         raise InputError(f"--points {path}: {what}, allowed: {', '.join(columns)}{how}")
     values = []
     for line, row in enumerate(rows[1:], start=2):

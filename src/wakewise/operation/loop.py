@@ -66,7 +66,7 @@ def _finite(part: str, time_s: float) -> Iterator[None]:
     """Say of a part, and when, that it diverged, where numbers without end come of it."""
     try:
         yield
-    except (NotFinite, np.linalg.LinAlgError, ArithmeticError) as fault:
+    except (NotFinite, np.linalg.LinAlgError, OverflowError, FloatingPointError) as fault:
         raise StageError(f"the simulation diverged at t = {time_s:.2f} s in the {part}: {fault}") from fault
 
 

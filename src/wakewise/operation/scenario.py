@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
 
+from wakewise.checks import quoted
 from wakewise.control import MAKERS, ControlSettings
 from wakewise.errors import InputError
 from wakewise.estimation import FilterSettings
@@ -200,8 +201,8 @@ def load_scenario(preset: str | None, path: Path | None, overrides: dict[str, An
     layers: list[dict[str, Any]] = []
     source = "scenario"
     if preset is not None:
-        if preset not in PRESETS:
-            raise InputError(f"--preset: '{preset}', allowed are {', '.join(PRESETS)}")
+        if not isinstance(preset, str) or preset not in PRESETS:
+            raise InputError(f"--preset: '{quoted(preset)}', allowed are {', '.join(PRESETS)}")
         text = resources.files("wakewise.operation").joinpath("presets", f"{preset}.yaml").read_text(encoding="utf-8")
         layers.append(read_yaml(text))
     if path is not None:

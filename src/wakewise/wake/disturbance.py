@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wakewise.arrays import Array, frozen
-from wakewise.checks import one_of
+from wakewise.checks import one_of, quoted
 from wakewise.compiled import njit
 from wakewise.errors import InputError
 from wakewise.interfaces import WakeModel
@@ -85,7 +85,8 @@ def gram(
     InputError
         If shapes do not belong together, something is not finite, a weight is negative or an area not positive.
     """
-    one_of(superposition, SUPERPOSITIONS, "superposition")
+    if str(superposition) not in SUPERPOSITIONS:
+        one_of(superposition, SUPERPOSITIONS, "superposition")
     same_sizes(region_points_W, weights, origins_W, axes_W, areas_m2)
     place = (region_points_W, weights, origins_W, axes_W, areas_m2)
     if flow is not None and isinstance(free_jet(model), AxialJet):
@@ -118,14 +119,22 @@ def unit_velocity(
 ) -> Array:
     """What a wake model answers, shape (m, n, 3), held against what it must be (see `WakeModel.unit_velocity`).
 
+    NaN passes: a controller whose Gram matrix is not finite does without, and a flight goes on.
+
     Raises
     ------
     InputError
-        If it is of another shape or not finite.
+        If it is no array of numbers of that shape.
     """
     answer = model.unit_velocity(points_W_m, origins_W_m, directions_W, areas_m2)
-    name = getattr(model, "name", type(model).__name__)
-    return frozen(answer, (len(origins_W_m), len(points_W_m), 3), f"wake model {name}: unit_velocity")
+    shape = (len(origins_W_m), len(points_W_m), 3)
+    if not isinstance(answer, np.ndarray) or answer.dtype.kind not in "fiu" or answer.shape != shape:
+        raise InputError(f"{_called(model)}: must be an array of numbers of shape {shape}, is {quoted(answer)}")
+    return np.asarray(answer, dtype=np.float64)
+
+
+def _called(model: WakeModel) -> str:
+    return f"wake model {getattr(model, 'name', type(model).__name__)}: unit_velocity"
 
 
 def velocity(
@@ -137,7 +146,7 @@ def velocity(
     coherent D.
     """
     jets = -np.sign(thrusts_N)[:, None] * axes_W
-    alone = unit_velocity(model, points_W_m, origins_W_m, jets, areas_m2)
+    alone = frozen(unit_velocity(model, points_W_m, origins_W_m, jets, areas_m2), (None, None, 3), _called(model))
     return np.asarray(np.einsum("i,inx->nx", np.sqrt(np.abs(thrusts_N)), alone))
 
 

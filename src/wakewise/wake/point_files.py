@@ -17,6 +17,7 @@ import numpy as np
 
 from wakewise.arrays import Array, BoolArray, IntArray
 from wakewise.errors import InputError
+from wakewise.physics import GRAVITY_M_S2
 from wakewise.yaml_text import YamlError, text_of
 
 COLUMNS: dict[str, str] = {
@@ -45,7 +46,7 @@ _LENGTHS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2}
 _UNITS: dict[str, dict[str, float]] = {
     "m": _LENGTHS,
     "m_s": {f"{unit}/s": factor for unit, factor in _LENGTHS.items()},
-    "N": {"n": 1.0, "kgf": 9.80665, "gf": 9.80665e-3, "lbf": 4.4482216152605},
+    "N": {"n": 1.0, "kgf": GRAVITY_M_S2, "gf": 1e-3 * GRAVITY_M_S2, "lbf": 4.4482216152605},
 }
 _SPOKEN = {"m": "m, mm or cm", "m_s": "m/s, mm/s or cm/s", "N": "N, kgf, gf or lbf"}
 _FLAGS: dict[str, tuple[str, Callable[[float], bool]]] = {

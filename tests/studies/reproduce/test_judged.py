@@ -25,4 +25,5 @@ def test_a_figure_counts_once_and_not_for_being_met_in_the_papers_own_water():
 
     rows = [row("mud", False), row("reef", True), row("paper", True)]
     rows += [row("paper", True, "g"), row("mud", False, "g"), row("mud", True, "h", paper=None)]
-    assert tally({"t": rows}) == {"quoted": 2, "met": 1, "surely": 1, "circular": 1}
+    counted = {"quoted": 2, "met": 1, "surely": 1, "circular": 1, "own": 0, "own_judged": 0, "worlds": 2}
+    assert tally({"t": rows}) == counted

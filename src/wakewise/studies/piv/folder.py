@@ -12,7 +12,6 @@ from pydantic import Field, ValidationError
 from wakewise.arrays import Array
 from wakewise.errors import InputError
 from wakewise.extras import need
-from wakewise.pictures import read_picture
 from wakewise.settings import Settings, describe_faults
 from wakewise.studies.piv.images import Picture
 from wakewise.studies.piv.processing import Engine, displacements
@@ -61,6 +60,8 @@ def read_pairs(folder: Path) -> dict[str, tuple[Picture, Picture]]:
 def _read(path: Path) -> Picture:
     need("reading pictures of a jet", "piv", only=("cv2",))
     import cv2
+
+    from wakewise.pictures import read_picture
 
     picture = read_picture(path, cv2.IMREAD_GRAYSCALE)
     if picture is None:
