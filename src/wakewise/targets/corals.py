@@ -33,7 +33,7 @@ LARGEST_DIMENSION_M = 0.15
 Segment = tuple[Array, Array, float, float]
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=8, typed=True)
 def coral(kind: str, seed: int = 0) -> Mesh:
     """Procedural coral or soft target of one of the kinds.
 
