@@ -42,17 +42,17 @@ def test_a_place_can_be_written_if_what_stands_there_can(tmp_path: Path) -> None
 
 
 def test_a_home_that_cannot_be_looked_into_is_no_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another user's, as of a service with HOME=/root: that is no error, whatever asking for it raises."""
+    """As of a service with the HOME of another user: that is no error, whatever asking for it raises."""
 
     def refused(_: Path) -> bool:
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(Path, "exists", refused)
-    assert not can_be_written(Path("/root/.cache/numba"))
+    assert not can_be_written(Path("/home/of-another/.cache/numba"))
 
 
 def test_a_user_who_cannot_read_the_home_imports_and_runs(tmp_path: Path) -> None:
-    """A service's user with HOME=/root: kernels go to the folder for temporary files."""
+    """A service whose HOME is another user's: kernels go to the folder for temporary files."""
     source = Path(sys.modules["wakewise"].__file__ or "").parents[1]
     home, tmp = tmp_path / "home", tmp_path / "tmp"
     home.mkdir(mode=0o700)
