@@ -68,6 +68,7 @@ def test_every_other_door_refuses_a_name_that_no_file_can_have(value):
     refused(ww.evaluate, value, coral)
     refused(ww.evaluate, points, value)
     refused(ww.Scenario.load, value)
+    assert refused(ww.Scenario.load, 5) == "scenario: 5, must be a path"
     refused(ww.load_target, value)
     refused(ww.load_vehicle, value)
     assert refused(ww.trial, ww.Scenario.preset("quick"), value).startswith("folder: ")

@@ -277,9 +277,10 @@ def _watch(session: SeaSession, where: str) -> None:
 
     from wakewise.errors import InputError
 
-    _say(f"listening at {where}; Enter consents and takes back, Ctrl-C ends")
     terminal, told, due_s = sys.stderr.isatty(), "", 0.0
     keys = sys.stdin if sys.stdin is not None and sys.stdin.isatty() else None
+    consent = "no terminal, so only --buttons engage=N consents" if keys is None else "Enter consents and takes back"
+    _say(f"listening at {where}; {consent}, Ctrl-C ends")
     while session.running:
         if session.warden.buttons_amiss:
             raise InputError(session.warden.buttons_amiss)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
 
-from wakewise.checks import quoted
+from wakewise.checks import path_of, quoted
 from wakewise.control import MAKERS, ControlSettings
 from wakewise.errors import InputError
 from wakewise.estimation import FilterSettings
@@ -130,7 +130,7 @@ class Scenario(Settings):
     @classmethod
     def load(cls, path: str | Path, which: str | None = None, /, **changes: Any) -> Scenario:
         """A scenario file, laid over a preset if one is named, with some fields changed; as for `preset`."""
-        return load_scenario(which, Path(path), changes)
+        return load_scenario(which, path_of(path, "scenario"), changes)
 
     def replace(self, **changes: Any) -> Scenario:
         """The same scenario with some fields changed, by their dotted names; checked as a file is.
