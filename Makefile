@@ -22,13 +22,15 @@ help:
 
 setup: $(STAMP)
 
-$(STAMP): requirements.lock pyproject.toml
+PACKAGES := . packages/wakewise-ardusub packages/wakewise-paper packages/wakewise-nerf benchmarks
+
+$(STAMP): requirements.lock pyproject.toml $(wildcard packages/*/pyproject.toml) benchmarks/pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "wakewise needs Python 3.11 or newer; PYTHON=/path/to/python3.11 make $(MAKECMDGOALS)"; exit 2; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || \
 		{ echo "python3-venv is missing: apt-get install python3-venv"; exit 2; }
 	sh tools/install.sh $(BIN)/python requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation $(addprefix --editable ,$(PACKAGES))
 	@$(BIN)/python tools/check_libraries.py
 	@touch $@
 

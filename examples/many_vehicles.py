@@ -3,8 +3,8 @@
 import numpy as np
 
 import wakewise as ww
-from wakewise.geometry import matrix_from_quat
-from wakewise.vehicles import compile_body, pack_bodies, perturbed, step_batch
+from wakewise.core.geometry import matrix_from_quat
+from wakewise.robot.vehicles import compile_body, pack_bodies, perturbed, step_batch
 
 rov, rng, n = ww.load_vehicle("bluerov2-heavy"), np.random.default_rng(1), 400
 drawn = [perturbed(rov, rng, mass_pct=10, damping_pct=40, added_mass_pct=30, trim_N=2) for _ in range(n)]

@@ -5,7 +5,7 @@ import sys
 import trimesh
 
 import wakewise as ww
-from wakewise.targets import Mesh, place_on_bed
+from wakewise.scene.targets import Mesh, place_on_bed
 
 parts = ww.Scenario.preset("quick").parts()
 if sys.argv[2:]:  # a mesh file: PLY, STL, OBJ, OFF or GLB, z up, scaled to 0.2 m

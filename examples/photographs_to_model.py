@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import wakewise as ww
-from wakewise.studies.photo_sets import planned_views, write_photos
+from wakewise_paper.photo_sets import planned_views, write_photos
 
 out = Path("runs/photographs")
 if sys.argv[1:]:  # a folder of photographs and, for scale, a CSV of camera centres: name, x_m, y_m, z_m

@@ -6,28 +6,28 @@ from collections import Counter
 from collections.abc import Collection, Sequence
 
 BESIDE = (
-    "tests/benches/test_campaign_bench.py",
-    "tests/campaigns/",
-    "tests/cli/test_campaign_command.py",
-    "tests/cli/test_computer_faults.py",
-    "tests/cli/test_heartbeat.py",
-    "tests/cli/test_link_meter_command.py",
-    "tests/cli/test_link_sitl_command.py",
-    "tests/cli/test_link_wire_commands.py",
-    "tests/cockpit/test_pictures.py",
-    "tests/cockpit/test_server.py",
-    "tests/links/ardusub/test_ardusub_page.py",
-    "tests/links/autopilot/test_behind_real_bytes.py",
-    "tests/links/sensors/",
-    "tests/meter/",
-    "tests/reconstruction/test_colmap.py",
-    "tests/studies/gentle/test_gentle_bench.py",
+    "benchmarks/tests/test_campaign_bench.py",
+    "tests/experiments/campaigns/",
+    "tests/ui/cli/test_campaign_command.py",
+    "tests/ui/cli/test_computer_faults.py",
+    "tests/ui/cli/test_heartbeat.py",
+    "packages/wakewise-ardusub/tests/cli/test_link_meter_command.py",
+    "packages/wakewise-ardusub/tests/cli/test_link_sitl_command.py",
+    "packages/wakewise-ardusub/tests/cli/test_link_wire_commands.py",
+    "tests/ui/cockpit/test_pictures.py",
+    "tests/ui/cockpit/test_server.py",
+    "packages/wakewise-ardusub/tests/link/test_ardusub_page.py",
+    "packages/wakewise-ardusub/tests/sitl/test_behind_real_bytes.py",
+    "packages/wakewise-ardusub/tests/sensors/",
+    "packages/wakewise-ardusub/tests/wash_meter/",
+    "tests/vision/reconstruction/test_colmap.py",
+    "packages/wakewise-paper/tests/wash_reduction/test_gentle_bench.py",
     "tests/test_alone.py",
     "tests/test_core.py",
-    "tests/trials/test_surface_maker.py",
+    "tests/experiments/trials/test_surface_maker.py",
 )
 """Files and folders whose tests mostly wait, for a clock or for another process, and load few kernels themselves."""
-LONGEST = "tests/trials/test_whole_trial.py"
+LONGEST = "tests/experiments/trials/test_whole_trial.py"
 """Takes twice as long as any other: begun last, it would be waited for."""
 
 

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from wakewise.errors import InputError
-from wakewise.files import whole_file
-from wakewise.processes import LOCK, alone, half_done, is_running, sweep
+from wakewise.core.errors import InputError
+from wakewise.core.files import whole_file
+from wakewise.core.run_lock import LOCK, alone, half_done, is_running, sweep
 
 HOLD = """
 import sys, time
 from pathlib import Path
-from wakewise.files import whole_file, whole_folder
-from wakewise.processes import alone
+from wakewise.core.files import whole_file, whole_folder
+from wakewise.core.run_lock import alone
 folder = Path(sys.argv[1])
 with alone(folder), whole_file(folder / "a.db"), whole_folder(folder / "images" / "b"):
     print("held", flush=True)
@@ -95,8 +95,8 @@ def test_a_number_used_again_is_another_process() -> None:
 def test_many_that_begin_at_once_take_turns_or_are_refused(tmp_path: Path) -> None:
     """Of six processes that try again and again, never two are inside."""
     code = (
-        "import sys, time\nfrom pathlib import Path\nfrom wakewise.errors import InputError\n"
-        "from wakewise.processes import alone\nfolder, end, inside = Path(sys.argv[1]), time.time() + 1.5, 0\n"
+        "import sys, time\nfrom pathlib import Path\nfrom wakewise.core.errors import InputError\n"
+        "from wakewise.core.run_lock import alone\nfolder, end, inside = Path(sys.argv[1]), time.time() + 1.5, 0\n"
         "while time.time() < end:\n"
         "    try:\n"
         "        with alone(folder):\n"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from wakewise.extras import EXTRAS, how_to_install
+from wakewise.core.optional_dependencies import EXTRAS, how_to_install
 
 BLOCKED = sorted({module for modules in EXTRAS.values() for module in modules})
 _WITHOUT = f"""
@@ -46,17 +46,19 @@ def test_rooms_of_the_core_and_all_settings_are_imported_without_extras(tmp_path
     """Scenario holds the settings of every room; the names of a lazy room that need no extra can be had."""
     found = without_extras(
         """
-import wakewise, wakewise.imaging, wakewise.reconstruction, wakewise.reports, wakewise.trials
-import wakewise.allocation, wakewise.control, wakewise.estimation, wakewise.importers, wakewise.lattice
-import wakewise.missions, wakewise.planning, wakewise.tank, wakewise.targets, wakewise.thrusters, wakewise.wake
+import wakewise, wakewise.vision.imaging, wakewise.vision.reconstruction, wakewise.ui.reports
+import wakewise.experiments.trials
+import wakewise.allocation, wakewise.control, wakewise.estimation, wakewise.robot.importers, wakewise.simulation.lattice
+import wakewise.scene.missions, wakewise.planning, wakewise.simulation.tank, wakewise.scene.targets, wakewise.wake
+import wakewise.robot.thrusters
 import wakewise.api, wakewise.operation.parts, wakewise.operation.flying, wakewise.operation.recorder
-import wakewise.studies.gentle.flight, wakewise.studies.wake_validation, wakewise.benches
-import wakewise.reports.vehicle, wakewise.reconstruction.nerf, wakewise.reconstruction.lenses
-import wakewise.trials.export
-from wakewise.evaluation import flight_figures, umeyama
-from wakewise.imaging import ImagingSettings
+import wakewise_paper.wash_reduction.flight, wakewise_paper.wake_validation, wakewise_benchmarks
+import wakewise.ui.reports.vehicle, wakewise_nerf.field, wakewise.vision.reconstruction.lenses
+import wakewise.experiments.trials.export
+from wakewise.vision.evaluation import flight_figures, umeyama
+from wakewise.vision.imaging import ImagingSettings
 from wakewise.operation import load_scenario
-from wakewise.reconstruction import read_cloud
+from wakewise.vision.reconstruction import read_cloud
 load_scenario("quick", None, {})
 """,
         tmp_path,
@@ -94,7 +96,7 @@ def test_a_campaign_of_flights_is_made_without_extras(tmp_path):
     (tmp_path / "model.yaml").write_text(text + "stages: model\n")
     found = without_extras(
         """
-from wakewise.cli.main import run
+from wakewise.ui.cli.main import run
 assert run("campaign run model.yaml --out model".split()) == 2
 assert run("campaign run fly.yaml --out fly".split()) == 0
 assert run("campaign table fly --write fly.csv --json".split()) == 0
@@ -122,7 +124,7 @@ def test_commands_of_the_core_run_without_extras(tmp_path):
 import json
 from contextlib import redirect_stdout
 from io import StringIO
-from wakewise.cli.main import run
+from wakewise.ui.cli.main import run
 answers = {}
 for words in (
     "vehicle check paper --json",
@@ -136,7 +138,7 @@ for words in (
         code = run(words.split())
     assert code == 0, words
     answers[words.split(" --")[0]] = json.loads(out.getvalue())
-from wakewise.benches.paper_planner import PaperPlanner
+from wakewise_benchmarks.paper_planner import PaperPlanner
 print(json.dumps(answers))
 """,
         tmp_path,
@@ -173,7 +175,7 @@ def test_a_command_says_in_one_line_which_extra_it_needs(words, extras, tmp_path
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
         "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
     )
-    found = without_extras(f"from wakewise.cli.main import run\nsys.exit(run({words.split()!r}))", tmp_path)
+    found = without_extras(f"from wakewise.ui.cli.main import run\nsys.exit(run({words.split()!r}))", tmp_path)
     assert found.returncode == 2, found.stderr
     (line,) = found.stderr.strip().splitlines()
     assert line.startswith("wakewise: ")
@@ -185,7 +187,7 @@ def test_python_is_told_which_extra_a_name_needs(tmp_path):
     """The error of a room's door is an ImportError too, and names the room's name and the package."""
     found = without_extras(
         """
-from wakewise.errors import MissingExtra, WakewiseError
+from wakewise.core.errors import MissingExtra, WakewiseError
 assert issubclass(MissingExtra, WakewiseError) and issubclass(MissingExtra, ImportError)
 lines = []
 for room, name in (
@@ -239,9 +241,9 @@ HEAVY = ("numpy", "scipy", "numba", "polars", "pydantic", "yaml", "rich", "matpl
     ("script", "heavy"),
     [
         ("import wakewise", HEAVY),
-        ("from wakewise.cli.main import run\nassert run(['--help']) == 0", HEAVY),
+        ("from wakewise.ui.cli.main import run\nassert run(['--help']) == 0", HEAVY),
         (
-            "import wakewise.campaigns.worker, wakewise.campaigns.flights",
+            "import wakewise.experiments.campaigns.worker, wakewise.experiments.campaigns.flights",
             ("cv2", "embreex", "pycolmap", "small_gicp", "PIL", "matplotlib", "trimesh"),
         ),
         (

@@ -151,7 +151,7 @@ def test_wake_models_are_ranked_by_measured_velocities(tmp_path):
 def test_photographs_become_a_model_in_metres(tmp_path):
     """Photographs with camera centres: all of them register and the model has a scale; a folder is all it takes."""
     import wakewise as ww
-    from wakewise.studies.photo_sets import planned_views, write_photos
+    from wakewise_paper.photo_sets import planned_views, write_photos
 
     mission = {"mission.elevations_deg": [45], "mission.views": [12], "mission.standoff_m": 0.4}
     scenario = ww.Scenario.preset("quick", **mission, **{"imaging.width": 320, "imaging.height": 240})

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from wakewise.links.sensors import jy901
+from wakewise_ardusub.sensors import jy901
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tools"))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from wakewise.extras import EXTRAS, how_to_install
+from wakewise.core.optional_dependencies import EXTRAS, how_to_install
 
 ROOT = Path(__file__).parents[1]
 STATED = set(tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"])
@@ -30,7 +30,10 @@ def _fault(said: str) -> str | None:
 
 def _texts() -> list[Path]:
     """Pages, and sources that print hints; scripts that set up the clone itself install by their own means."""
-    folders = [ROOT / name for name in ("docs", "src", "ros2", "extensions")]
+    folders = [
+        ROOT / name
+        for name in ("docs", "src", "packages/wakewise-ardusub/ros2", "packages/wakewise-ardusub/extensions")
+    ]
     found = [path for folder in folders for path in folder.rglob("*") if path.suffix in (".md", ".py", ".yaml", ".xml")]
     return sorted([*ROOT.glob("*.md"), *found])
 

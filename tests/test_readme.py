@@ -9,7 +9,7 @@ import polars as pl
 import pytest
 import typer
 
-from wakewise.cli.main import app
+from wakewise.ui.cli.main import app
 
 ROOT = Path(__file__).parents[1]
 PAGES = ["README.md", "CONTRIBUTING.md"]
@@ -160,7 +160,7 @@ def test_the_cookbook_is_the_module_that_is_tested():
 
 def test_every_kind_of_plugin_is_in_the_docs():
     """docs/extending.md names each group of entry points."""
-    from wakewise.plugins import GROUPS
+    from wakewise.core.plugins import GROUPS
 
     text = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
     assert [group for group in GROUPS.values() if f"`{group}`" not in text] == []
@@ -180,7 +180,7 @@ def table(page, heads):
 
 def test_the_page_of_limits_says_what_the_tank_gets_wrong():
     """Its table is the tank's own, row by row, and nothing that the water has not is left out; misses are called so."""
-    from wakewise.tank.limits import ABSENT, limits_table
+    from wakewise.simulation.tank.limits import ABSENT, limits_table
 
     rows = table("docs/limits.md", "| | law | asked | reached | what it means for a claim |")
     told = limits_table()
@@ -194,7 +194,7 @@ def test_the_page_of_limits_says_what_the_tank_gets_wrong():
 
 def test_the_readme_counts_the_laws_and_leads_to_them():
     """How many laws are measured and how many are missed is the tank's own count; three are told, all are linked."""
-    from wakewise.tank.limits import limits_table
+    from wakewise.simulation.tank.limits import limits_table
 
     laws = limits_table()
     missed = sum(row["met"] == "no" for row in laws)

@@ -12,12 +12,12 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from wakewise.cli.console import Bars
-from wakewise.lattice import CASES, compute_mean_field, compute_run, find_case, save_mean_field
-from wakewise.lattice.crossing import crossing_field, is_crossing, save_crossing
-from wakewise.lattice.laws import convergence
-from wakewise.lattice.meanfield import DATA, SHIPPED
-from wakewise.lattice.past_box import is_past_box, past_field, save_past_box
+from wakewise.simulation.lattice import CASES, compute_mean_field, compute_run, find_case, save_mean_field
+from wakewise.simulation.lattice.crossing import crossing_field, is_crossing, save_crossing
+from wakewise.simulation.lattice.laws import convergence
+from wakewise.simulation.lattice.meanfield import DATA, SHIPPED
+from wakewise.simulation.lattice.past_box import is_past_box, past_field, save_past_box
+from wakewise.ui.cli.console import Bars
 
 
 def main() -> None:

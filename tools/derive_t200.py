@@ -1,6 +1,6 @@
 """Derive the small T200 table that ships with Wakewise from the maker's full one.
 
-    python tools/derive_t200.py t200_all_voltages.csv src/wakewise/thrusters/data/t200.csv
+    python tools/derive_t200.py t200_all_voltages.csv src/wakewise/robot/thrusters/data/t200.csv
 
 Blue Robotics publishes about 200 rows at each of five voltages. Here each direction at each voltage becomes a line
 through `KNOTS` knots, which are the least-squares fit to all its readings, with the first and the last one held.
@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from wakewise.files import write_text
-from wakewise.thrusters.thrust_table import parse_rows
+from wakewise.core.files import write_text
+from wakewise.robot.thrusters.thrust_table import parse_rows
 
 KNOTS = 12
 HEADER = """\

@@ -15,13 +15,13 @@ import time
 from pathlib import Path
 from typing import Any
 
-from wakewise.cli.console import Bars
-from wakewise.errors import WakewiseError
-from wakewise.lattice import CASES, LatticeRun, compute_run, find_case
-from wakewise.lattice.crossing import crossing_figures, is_crossing
-from wakewise.lattice.engines import DEVICES
-from wakewise.lattice.laws import figures
-from wakewise.lattice.meanfield import mean_field
+from wakewise.core.errors import WakewiseError
+from wakewise.simulation.lattice import CASES, LatticeRun, compute_run, find_case
+from wakewise.simulation.lattice.crossing import crossing_figures, is_crossing
+from wakewise.simulation.lattice.engines import DEVICES
+from wakewise.simulation.lattice.laws import figures
+from wakewise.simulation.lattice.meanfield import mean_field
+from wakewise.ui.cli.console import Bars
 
 
 def measured(run: LatticeRun) -> dict[str, Any]:

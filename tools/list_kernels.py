@@ -2,8 +2,8 @@
 
     python tools/list_kernels.py
 
-Run it after a change in how kernels are called; tests/test_warming.py says when the list is out of date. It flies,
-photographs and reconstructs with an empty cache, and notes what Numba is asked to compile by Python.
+Run it after a change in how kernels are called; tests/core/jit/test_warming.py says when the list is out of date. It
+flies, photographs and reconstructs with an empty cache, and notes what Numba is asked to compile by Python.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ def note_all(folder: Path) -> None:
     """Do the jobs in their order and write what each was the first to call."""
     import numba.core.event as events
 
-    from wakewise.numba_kernels import PACKAGE, type_of
-    from wakewise.warming import LIST
+    from wakewise.core.jit.kernels import PACKAGE, type_of
+    from wakewise.core.jit.precompile import LIST
 
     rows: list[dict[str, Any]] = []
     open_calls: list[float] = []
@@ -71,7 +71,7 @@ def _scenario(**changes: Any) -> Any:
 
 
 def _plan(folder: Path) -> None:
-    from wakewise.trials.trial import write_plan
+    from wakewise.experiments.trials.trial import write_plan
 
     parts = _scenario().parts()
     write_plan(parts, folder)

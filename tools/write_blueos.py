@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-FOLDER = Path(__file__).parents[1] / "extensions" / "blueos"
+FOLDER = Path(__file__).parents[1] / "packages/wakewise-ardusub/extensions" / "blueos"
 PLACEHOLDER = "OWNER"
 VEHICLES = ("bluerov2", "bluerov2-heavy")
 SIZE_PX, FINE = 256, 4
@@ -22,9 +22,9 @@ WATER, FOAM, CALM = (11, 111, 130), (255, 255, 255), (247, 200, 89)
 
 def crafts() -> dict[str, str]:
     """Craft files by name, with the wake model that is the meter's own choice."""
-    from wakewise.links.craft import Craft, craft_json
-    from wakewise.vehicles import load_vehicle
+    from wakewise.robot.vehicles import load_vehicle
     from wakewise.wake import wake_model
+    from wakewise_ardusub.vehicle_summary import Craft, craft_json
 
     return {f"{name}.json": craft_json(Craft.of(load_vehicle(name), wake_model("jet"))) for name in VEHICLES}
 

@@ -11,12 +11,12 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from wakewise.cli.console import Bars
-from wakewise.cli.reproduce import seconds
-from wakewise.files import whole_folder, write_json
-from wakewise.reports.reproduce import write_results
-from wakewise.studies.reproduce.claim import TABLES
-from wakewise.studies.reproduce.run import Options, reproduce
+from wakewise.core.files import whole_folder, write_json
+from wakewise.ui.cli.console import Bars
+from wakewise_paper.cli.reproduce import seconds
+from wakewise_paper.reports.reproduction import write_results
+from wakewise_paper.reproduction.claim import TABLES
+from wakewise_paper.reproduction.run import Options, reproduce
 
 OUT = Path(__file__).parents[1] / "docs" / "results"
 MOST_MB = 3.0

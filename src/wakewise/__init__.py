@@ -21,8 +21,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from wakewise import numba_cache as numba_cache  # before Numba is imported anywhere
-from wakewise.doors import lazy_door
+from wakewise.core.jit import cache_folder as cache_folder  # before Numba is imported anywhere
+from wakewise.core.lazy_imports import lazy_door
 
 if TYPE_CHECKING:
     from wakewise.api import (
@@ -36,10 +36,10 @@ if TYPE_CHECKING:
         trial,
         velocity,
     )
-    from wakewise.geometry import Pose
-    from wakewise.importers import any_vehicle as load_vehicle
-    from wakewise.interfaces import BodyState, Command, Goal
+    from wakewise.core.geometry import Pose
+    from wakewise.core.interfaces import BodyState, Command, Goal
     from wakewise.operation import Parts, Scenario, fly
+    from wakewise.robot.importers import any_vehicle as load_vehicle
     from wakewise.wake import wake_model
 
 __all__ = [

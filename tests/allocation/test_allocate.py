@@ -17,8 +17,8 @@ from wakewise.allocation import (
 )
 from wakewise.allocation.search import cost
 from wakewise.control import vehicle_layout
-from wakewise.errors import InputError
-from wakewise.vehicles import load_vehicle
+from wakewise.core.errors import InputError
+from wakewise.robot.vehicles import load_vehicle
 from wakewise.wake import disturbance
 
 PAPER = load_vehicle("paper")

@@ -4,7 +4,7 @@ import numpy as np
 
 from wakewise.allocation import compile_layout
 from wakewise.allocation.coupled import feasible_starts, reach, start_directions, tied_parts
-from wakewise.vehicles import load_vehicle
+from wakewise.robot.vehicles import load_vehicle
 
 PAPER = load_vehicle("paper")
 LAYOUT = compile_layout(PAPER.allocation_matrix, PAPER.thrust_lower_N, PAPER.thrust_upper_N)

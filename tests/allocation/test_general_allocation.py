@@ -11,8 +11,8 @@ from wakewise.allocation.boxes import box_search, coordinates
 from wakewise.allocation.convex import convex_allocation
 from wakewise.allocation.layout import independent_blocks
 from wakewise.allocation.search import cost
-from wakewise.errors import InputError
-from wakewise.vehicles import load_vehicle
+from wakewise.core.errors import InputError
+from wakewise.robot.vehicles import load_vehicle
 
 PAPER = load_vehicle("paper")
 

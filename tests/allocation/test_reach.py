@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from wakewise.allocation import Weights, compile_layout, gentle_allocation, least_thrusts
 from wakewise.allocation.reach import AXES, parse_priority
-from wakewise.errors import InputError
-from wakewise.vehicles import load_vehicle
+from wakewise.core.errors import InputError
+from wakewise.robot.vehicles import load_vehicle
 
 PAPER = load_vehicle("paper")
 

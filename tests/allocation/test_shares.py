@@ -8,7 +8,7 @@ import pytest
 from wakewise.allocation import Weights, compile_layout, disturbance_of, gentle_allocation, least_thrusts
 from wakewise.allocation.layout import axis_scaling
 from wakewise.allocation.reach import _at_limits, _box_scale
-from wakewise.vehicles import load_vehicle
+from wakewise.robot.vehicles import load_vehicle
 
 
 @pytest.mark.parametrize(

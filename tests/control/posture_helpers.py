@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from wakewise.geometry import Pose, look_at
-from wakewise.interfaces import Goal
+from wakewise.core.geometry import Pose, look_at
+from wakewise.core.interfaces import Goal
 from wakewise.planning import Surroundings
-from wakewise.targets import Region
-from wakewise.vehicles import load_vehicle
+from wakewise.robot.vehicles import load_vehicle
+from wakewise.scene.targets import Region
 from wakewise.wake import WakeSettings, wake_model
 
 VEHICLE = load_vehicle("paper-tilting")

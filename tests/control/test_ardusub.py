@@ -6,11 +6,11 @@ import pytest
 from wakewise.control import ControlSettings, make_controller
 from wakewise.control.ardusub import lowered_gains
 from wakewise.control.motor_mix import motor_mix
-from wakewise.geometry import Pose, quat_conjugate, quat_from_euler, quat_multiply, rotvec_from_quat
-from wakewise.interfaces import BodyState, Goal
-from wakewise.targets import Region
-from wakewise.thrusters import thruster_lag
-from wakewise.vehicles import compile_body, load_vehicle, step_rk4
+from wakewise.core.geometry import Pose, quat_conjugate, quat_from_euler, quat_multiply, rotvec_from_quat
+from wakewise.core.interfaces import BodyState, Goal
+from wakewise.robot.thrusters import thruster_lag
+from wakewise.robot.vehicles import compile_body, load_vehicle, step_rk4
+from wakewise.scene.targets import Region
 from wakewise.wake import wake_model
 
 REGION = Region(points_W_m=np.array([[1.0, 0.0, 0.0]]), weights=np.ones(1), distance_m=np.zeros(1))

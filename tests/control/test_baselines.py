@@ -5,12 +5,12 @@ import pytest
 
 from wakewise.control import ControlSettings, make_controller
 from wakewise.control.trim import ballasted
-from wakewise.geometry import Pose
-from wakewise.interfaces import BodyState, Goal
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import BodyState, Goal
 from wakewise.planning import PlanSettings
-from wakewise.targets import Region
-from wakewise.thrusters import thruster_lag
-from wakewise.vehicles import compile_body, load_vehicle, step_rk4
+from wakewise.robot.thrusters import thruster_lag
+from wakewise.robot.vehicles import compile_body, load_vehicle, step_rk4
+from wakewise.scene.targets import Region
 from wakewise.wake import WakeView, disturbance, wake_model
 
 VEHICLE = load_vehicle("paper")

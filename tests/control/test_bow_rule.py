@@ -9,9 +9,9 @@ from wakewise.allocation import least_thrusts
 from wakewise.control import METHODS
 from wakewise.control.bow_rule import bow_layout
 from wakewise.control.loop import vehicle_layout
-from wakewise.errors import InputError
-from wakewise.geometry import Pose, quat_from_euler, quat_multiply
-from wakewise.vehicles import load_vehicle
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose, quat_from_euler, quat_multiply
+from wakewise.robot.vehicles import load_vehicle
 
 
 @pytest.mark.parametrize("name", ["paper", "bluerov2-heavy"])

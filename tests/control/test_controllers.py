@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from wakewise.arrays import Array
 from wakewise.control import METHODS, ControlSettings, make_controller
-from wakewise.errors import InputError
-from wakewise.geometry import Pose, look_at
-from wakewise.interfaces import BodyState, Goal
-from wakewise.targets import Region
-from wakewise.vehicles import load_vehicle
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose, look_at
+from wakewise.core.interfaces import BodyState, Goal
+from wakewise.robot.vehicles import load_vehicle
+from wakewise.scene.targets import Region
 from wakewise.wake import disturbance, wake_model
 
 VEHICLE = load_vehicle("paper")

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from wakewise.control.hover_trim import LIGHT_N, HoverTrim, hover_trim
-from wakewise.errors import InputError
-from wakewise.geometry import Pose, quat_from_euler
-from wakewise.vehicles import compile_body, coriolis_wrench, damping_wrench, load_vehicle, restoring_wrench
-from wakewise.vehicles.ballast import with_blocks
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose, quat_from_euler
+from wakewise.robot.vehicles import compile_body, coriolis_wrench, damping_wrench, load_vehicle, restoring_wrench
+from wakewise.robot.vehicles.ballast import with_blocks
 
 VEHICLE = load_vehicle("paper")
 Z_M = float(VEHICLE.p_BB_m[2])

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from wakewise.control.intent import LEASH_M, Intent, goal_of, moved_on, obeying, shaped, slewed
-from wakewise.errors import InputError
-from wakewise.geometry import Pose, quat_from_euler
-from wakewise.interfaces import BodyState
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose, quat_from_euler
+from wakewise.core.interfaces import BodyState
 from wakewise.planning import PlanSettings
 from wakewise.planning.reference import reference_of
 

@@ -7,10 +7,10 @@ from pydantic import ValidationError
 from wakewise.control import ControlSettings, LeverSettings, make_controller
 from wakewise.control.levers import BED_POINTS, BED_RADIUS_M, BED_WEIGHT, with_bed_points
 from wakewise.control.receding import plan_superposition
-from wakewise.geometry import Pose
-from wakewise.interfaces import BodyState, Goal
-from wakewise.targets import Region
-from wakewise.vehicles import load_vehicle
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import BodyState, Goal
+from wakewise.robot.vehicles import load_vehicle
+from wakewise.scene.targets import Region
 from wakewise.wake import FloorJet, wake_model
 
 

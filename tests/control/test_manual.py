@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from wakewise.control import ControlSettings, make_controller
-from wakewise.geometry import Pose, look_at, quat_from_euler, quat_multiply
-from wakewise.interfaces import BodyState, Goal
+from wakewise.core.geometry import Pose, look_at, quat_from_euler, quat_multiply
+from wakewise.core.interfaces import BodyState, Goal
 from wakewise.operation import Scenario, fly
-from wakewise.targets import Region
-from wakewise.vehicles import load_vehicle
+from wakewise.robot.vehicles import load_vehicle
+from wakewise.scene.targets import Region
 from wakewise.wake import wake_model
 
 VEHICLE = load_vehicle("paper")

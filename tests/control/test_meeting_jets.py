@@ -6,9 +6,9 @@ import pytest
 from wakewise.allocation import Weights, gentle_allocation
 from wakewise.control import vehicle_layout
 from wakewise.control.meeting import joined_jets, meeting_pairs, meeting_view
-from wakewise.geometry import Pose, quat_from_rotvec
-from wakewise.targets import Region
-from wakewise.vehicles import load_vehicle
+from wakewise.core.geometry import Pose, quat_from_rotvec
+from wakewise.robot.vehicles import load_vehicle
+from wakewise.scene.targets import Region
 from wakewise.wake import FloorJet, RoundJet, WakeView, disturbance
 from wakewise.wake.carried import Flow
 from wakewise.wake.disturbance import carried_velocity

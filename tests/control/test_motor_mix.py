@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from wakewise.control.motor_mix import motor_mix
-from wakewise.errors import InputError
-from wakewise.vehicles import ARDUSUB_VECTORED_6DOF, load_vehicle
+from wakewise.core.errors import InputError
+from wakewise.robot.vehicles import ARDUSUB_VECTORED_6DOF, load_vehicle
 
 
 @pytest.mark.parametrize("name", ["paper", "bluerov2-heavy", "bluerov2-heavy-wu", "bluerov2-heavy-gazebo"])

@@ -11,15 +11,15 @@ from posture_helpers import CENTRE, HEAVY, OPEN, VEHICLE, believed, gap_m, looki
 from wakewise.control import ControlSettings, make_controller
 from wakewise.control.poised import Poised
 from wakewise.control.posture import RATE_RAD_S
-from wakewise.errors import InputError
-from wakewise.geometry import Pose, quat_from_euler
-from wakewise.interfaces import BodyState, Command, Goal
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose, quat_from_euler
+from wakewise.core.interfaces import BodyState, Command, Goal
 from wakewise.operation import Scenario, fly
 from wakewise.planning import Surroundings
 from wakewise.planning.problem import CLEARANCE_M
-from wakewise.studies.gentle.courses import gentle_route
-from wakewise.studies.gentle.flight import camera_errors
-from wakewise.vehicles import load_vehicle
+from wakewise.robot.vehicles import load_vehicle
+from wakewise_paper.wash_reduction.courses import gentle_route
+from wakewise_paper.wash_reduction.flight import camera_errors
 
 DT = 0.02
 

@@ -24,12 +24,12 @@ from wakewise.control.posture import (
     given_back,
 )
 from wakewise.control.thrift import STANDING_W
-from wakewise.geometry import Pose, matrix_from_quat, quat_from_euler, quat_from_rotvec
-from wakewise.interfaces import BodyState, Goal
+from wakewise.core.geometry import Pose, matrix_from_quat, quat_from_euler, quat_from_rotvec
+from wakewise.core.interfaces import BodyState, Goal
 from wakewise.planning import Surroundings
 from wakewise.planning.problem import CLEARANCE_M
 from wakewise.planning.reference import reference_of
-from wakewise.vehicles import TiltJoint
+from wakewise.robot.vehicles import TiltJoint
 from wakewise.wake import WakeView
 
 

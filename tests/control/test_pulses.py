@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from wakewise.control import in_pulses
 from wakewise.control.pulses import PulseState, pulsed
-from wakewise.geometry import Pose
-from wakewise.interfaces import BodyState, Command, Goal
-from wakewise.thrusters import ThrustSteps, library_curve
-from wakewise.vehicles import load_vehicle
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import BodyState, Command, Goal
+from wakewise.robot.thrusters import ThrustSteps, library_curve
+from wakewise.robot.vehicles import load_vehicle
 
 T200 = ThrustSteps.of_curve(library_curve("t200"), 16.0)
 PLAIN = ThrustSteps(least_forward_N=0.4, least_reverse_N=0.3)

@@ -5,12 +5,12 @@ import pytest
 from plan_cases import AROUND, CONE, REGION, VEHICLE
 
 from wakewise.control import ControlSettings, make_controller, planning_controller
-from wakewise.evaluation.flight import sign_flips
-from wakewise.geometry import Pose, quat_from_euler, quat_from_rotvec, quat_multiply
-from wakewise.interfaces import BodyState, Goal
+from wakewise.core.geometry import Pose, quat_from_euler, quat_from_rotvec, quat_multiply
+from wakewise.core.interfaces import BodyState, Goal
 from wakewise.planning import PlanSettings
-from wakewise.thrusters import thruster_lag
-from wakewise.vehicles import compile_body, step_rk4
+from wakewise.robot.thrusters import thruster_lag
+from wakewise.robot.vehicles import compile_body, step_rk4
+from wakewise.vision.evaluation.flight import sign_flips
 
 PLACE = Pose(np.array([0.45, 0.0, 1.05]), quat_from_euler(0.0, 0.0, np.pi))
 OFF = {"spare": False, "meet": False, "drift": False}

@@ -7,9 +7,9 @@ import pytest
 
 from wakewise.control import ControlSettings, safeguarded
 from wakewise.control.safeguard import AFRESH_S
-from wakewise.geometry import Pose
-from wakewise.interfaces import BodyState, Command, Goal
-from wakewise.vehicles import load_vehicle
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import BodyState, Command, Goal
+from wakewise.robot.vehicles import load_vehicle
 
 pytestmark = pytest.mark.usefixtures("fallbacks_fly")
 

@@ -10,9 +10,9 @@ import pytest
 
 from wakewise.control import ControlSettings, safeguarded
 from wakewise.control.safeguard import AFRESH_S, Safeguard
-from wakewise.geometry import Pose
-from wakewise.interfaces import BodyState, Command, Goal
-from wakewise.vehicles import load_vehicle
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import BodyState, Command, Goal
+from wakewise.robot.vehicles import load_vehicle
 
 VEHICLE = load_vehicle("paper")
 HERE = BodyState(X_WB=Pose(np.zeros(3)))

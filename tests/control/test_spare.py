@@ -10,10 +10,10 @@ from wakewise.control.meeting import meeting_view
 from wakewise.control.spare import Respared, SpareState
 from wakewise.control.thrift import Sharer
 from wakewise.control.watch import Watch
-from wakewise.geometry import Pose
-from wakewise.interfaces import BodyState, Command, Goal
-from wakewise.targets import Region
-from wakewise.vehicles import load_vehicle
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import BodyState, Command, Goal
+from wakewise.robot.vehicles import load_vehicle
+from wakewise.scene.targets import Region
 from wakewise.wake import RoundJet, WakeView
 
 VEHICLE = load_vehicle("paper")

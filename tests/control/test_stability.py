@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from wakewise.control.stability import Axis, Gains, margins, open_loop, stable_gain_scale, vehicle_axes, wished_gains
-from wakewise.errors import InputError
-from wakewise.vehicles import load_vehicle
+from wakewise.core.errors import InputError
+from wakewise.robot.vehicles import load_vehicle
 
 PAPER_GAINS = Gains(kp=150.0, kd=80.0, ki=20.0)
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from wakewise.control import ControlSettings, safeguarded
-from wakewise.errors import STRICT, InputError, is_strict
-from wakewise.geometry import Pose
-from wakewise.interfaces import BodyState, Command, Goal
+from wakewise.core.errors import STRICT, InputError, is_strict
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import BodyState, Command, Goal
 from wakewise.operation.foreign import Guarded
 from wakewise.planning.guard import Guard
-from wakewise.vehicles import load_vehicle
+from wakewise.robot.vehicles import load_vehicle
 
 VEHICLE = load_vehicle("paper")
 HERE = BodyState(X_WB=Pose(np.zeros(3)))

@@ -9,10 +9,10 @@ from wakewise.allocation import compile_layout
 from wakewise.control import make_controller, vehicle_layout
 from wakewise.control.carried import HandsOver
 from wakewise.control.switching import FADE_S, Switched
-from wakewise.geometry import Pose, look_at
-from wakewise.interfaces import BodyState, Command, Goal
-from wakewise.targets import find_target, sample_region
-from wakewise.vehicles import load_vehicle
+from wakewise.core.geometry import Pose, look_at
+from wakewise.core.interfaces import BodyState, Command, Goal
+from wakewise.robot.vehicles import load_vehicle
+from wakewise.scene.targets import find_target, sample_region
 from wakewise.wake import wake_model
 
 LAYOUT = compile_layout(np.eye(6, 6), np.full(6, -50.0), np.full(6, 50.0))

@@ -20,9 +20,9 @@ from wakewise.control.thrift import (
     allowed,
     power_law,
 )
-from wakewise.geometry import Pose
-from wakewise.thrusters import electrical_power_W
-from wakewise.vehicles import load_vehicle
+from wakewise.core.geometry import Pose
+from wakewise.robot.thrusters import electrical_power_W
+from wakewise.robot.vehicles import load_vehicle
 from wakewise.wake import RoundJet, WakeView
 from wakewise.wake.view import Seen
 

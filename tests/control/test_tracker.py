@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from wakewise.control import ControlSettings, make_tracker
-from wakewise.geometry import Pose, matrix_from_quat, quat_from_euler, quat_multiply, rotvec_from_quat
-from wakewise.interfaces import BodyState, Goal
-from wakewise.vehicles import acceleration, coriolis_wrench, damping_wrench, load_vehicle, restoring_wrench
+from wakewise.core.geometry import Pose, matrix_from_quat, quat_from_euler, quat_multiply, rotvec_from_quat
+from wakewise.core.interfaces import BodyState, Goal
+from wakewise.robot.vehicles import acceleration, coriolis_wrench, damping_wrench, load_vehicle, restoring_wrench
 
 VEHICLE = load_vehicle("paper")
 TRACKER = make_tracker(VEHICLE, ControlSettings())

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from wakewise.control.trim import ballasted, net_buoyancy_N, trim_advice
-from wakewise.errors import InputError
-from wakewise.geometry import Pose, quat_from_euler
-from wakewise.targets import Region
-from wakewise.vehicles import compile_body, load_vehicle, restoring_wrench
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose, quat_from_euler
+from wakewise.robot.vehicles import compile_body, load_vehicle, restoring_wrench
+from wakewise.scene.targets import Region
 from wakewise.wake import wake_model
 
 VEHICLE = load_vehicle("paper")

@@ -7,12 +7,12 @@ from wakewise.allocation import least_thrusts
 from wakewise.control import ControlSettings, LeverSettings, make_controller
 from wakewise.control.spare import watching
 from wakewise.control.watch import DOUBT, UNSURE, WORTH
-from wakewise.geometry import Pose
-from wakewise.interfaces import BodyState, Goal
-from wakewise.targets import Region
-from wakewise.vehicles import load_vehicle
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import BodyState, Goal
+from wakewise.robot.vehicles import load_vehicle
+from wakewise.scene.targets import Region
+from wakewise.simulation.water.water import Water
 from wakewise.wake import FloorJet, RoundJet
-from wakewise.water.water import Water
 
 VEHICLE = load_vehicle("paper")
 AHEAD = Region(

@@ -9,12 +9,12 @@ import numpy as np
 
 import wakewise as ww
 from wakewise.allocation import Layout, least_thrusts
-from wakewise.arrays import Array
 from wakewise.control import ControlTask, Tracker, TrackerState, make_tracker, vehicle_layout
+from wakewise.core.arrays import Array
 from wakewise.operation.worlds.makers import tank_world
-from wakewise.tank import TankWorld
-from wakewise.targets import Mesh
-from wakewise.vehicles import VehicleDraft, load_draft
+from wakewise.robot.vehicles import VehicleDraft, load_draft
+from wakewise.scene.targets import Mesh
+from wakewise.simulation.tank import TankWorld
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import wakewise as ww
-from wakewise import plugins
-from wakewise.cli.main import run
-from wakewise.errors import InputError
+from wakewise.core import plugins
+from wakewise.core.errors import InputError
+from wakewise.ui.cli.main import run
 
 ENTRY_POINTS = """
 [wakewise.controllers]

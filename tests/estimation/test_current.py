@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from wakewise.core.geometry import matrix_from_quat, quat_from_euler
 from wakewise.estimation.current import KNOWN_M_S, current_of_force, level_drag, told_current
-from wakewise.geometry import matrix_from_quat, quat_from_euler
-from wakewise.vehicles import acceleration, compile_body, load_vehicle, with_each_drag
+from wakewise.robot.vehicles import acceleration, compile_body, load_vehicle, with_each_drag
 
 TIGHT = 1e-4 * np.eye(3)
 

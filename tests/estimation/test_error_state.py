@@ -6,16 +6,23 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from wakewise.core.geometry import (
+    Pose,
+    matrix_from_quat,
+    quat_conjugate,
+    quat_from_rotvec,
+    quat_multiply,
+    rotvec_from_quat,
+)
+from wakewise.core.interfaces import BodyState, Measurement
 from wakewise.estimation import ErrorStateFilter
 from wakewise.estimation.kernels import unexplained
 from wakewise.estimation.settings import FilterSettings, Priors
-from wakewise.geometry import Pose, matrix_from_quat, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
-from wakewise.interfaces import BodyState, Measurement
-from wakewise.tank.lasting import Lasting
-from wakewise.tank.sensors import FORCE_WALK_M_S2, GYRO_WALK_RAD_S
-from wakewise.tank.settings import MismatchSettings, SensorSettings
-from wakewise.thrusters import thruster_lag
-from wakewise.vehicles import compile_body, load_vehicle, step_rk4
+from wakewise.robot.thrusters import thruster_lag
+from wakewise.robot.vehicles import compile_body, load_vehicle, step_rk4
+from wakewise.simulation.tank.lasting import Lasting
+from wakewise.simulation.tank.sensors import FORCE_WALK_M_S2, GYRO_WALK_RAD_S
+from wakewise.simulation.tank.settings import MismatchSettings, SensorSettings
 
 VEHICLE = load_vehicle("paper")
 STEADY = Priors(pose_slow_std_m=0.0, pose_slow_std_rad=0.0, tracking_slow_std_m=0.0, depth_bias_std_m=0.0)

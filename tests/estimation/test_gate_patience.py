@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import BodyState, Measurement
 from wakewise.estimation import ErrorStateFilter, error_state
 from wakewise.estimation.settings import FilterSettings, Priors
-from wakewise.geometry import Pose
-from wakewise.interfaces import BodyState, Measurement
-from wakewise.vehicles import load_vehicle
+from wakewise.robot.vehicles import load_vehicle
 
 VEHICLE = load_vehicle("paper")
 HERE, THERE = np.array([0.0, 0.0, 1.0]), np.array([0.1, 0.0, 1.0])

@@ -14,11 +14,11 @@ from estimation_helpers import (
     unit_quaternion,
 )
 
+from wakewise.core.geometry import matrix_from_quat, quat_from_rotvec, quat_multiply
 from wakewise.estimation.kernels import felt, turn_between, turned_by, unexplained
 from wakewise.estimation.prediction import predict
 from wakewise.estimation.resting import DRAG, at_rest, turn
-from wakewise.geometry import matrix_from_quat, quat_from_rotvec, quat_multiply
-from wakewise.vehicles import acceleration
+from wakewise.robot.vehicles import acceleration
 
 GRAVITY = np.array([0.0, 0.0, 9.80665])
 

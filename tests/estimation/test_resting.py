@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from wakewise.core.geometry import matrix_from_quat
 from wakewise.estimation.kernels import CURRENT, GAINS, INERTIA, believed, moved
 from wakewise.estimation.resting import DRAG, at_rest, rest_effects
-from wakewise.geometry import matrix_from_quat
-from wakewise.vehicles import acceleration, compile_body, load_vehicle
+from wakewise.robot.vehicles import acceleration, compile_body, load_vehicle
 
 VEHICLE = load_vehicle("paper")
 BODY = compile_body(VEHICLE)

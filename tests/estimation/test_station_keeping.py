@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from wakewise.control import ControlSettings, Gains, make_controller, make_tracker, vehicle_axes, wished_gains
+from wakewise.core.geometry import Pose, quat_from_euler, quat_from_rotvec, quat_multiply
+from wakewise.core.interfaces import BodyState, Goal, Measurement
 from wakewise.estimation import ErrorStateFilter
-from wakewise.geometry import Pose, quat_from_euler, quat_from_rotvec, quat_multiply
-from wakewise.interfaces import BodyState, Goal, Measurement
-from wakewise.targets import Region
-from wakewise.thrusters import saturate, thruster_lag
-from wakewise.vehicles import compile_body, load_vehicle, perturbed, step_rk4
+from wakewise.robot.thrusters import saturate, thruster_lag
+from wakewise.robot.vehicles import compile_body, load_vehicle, perturbed, step_rk4
+from wakewise.scene.targets import Region
 from wakewise.wake import wake_model
 
 REGION = Region(points_W_m=np.array([[0.0, 0.0, 1.4], [0.05, 0.0, 1.35]]), weights=np.ones(2), distance_m=np.zeros(2))

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wakewise.errors import InputError
-from wakewise.geometry import Pose
-from wakewise.interfaces import BodyState
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import BodyState
 from wakewise.operation import load_scenario, preflight
 from wakewise.operation.preflight import check_current
-from wakewise.vehicles import load_vehicle
+from wakewise.robot.vehicles import load_vehicle
 
 
 def _check(vehicle="bluerov2-heavy", **tank):

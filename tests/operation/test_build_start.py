@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wakewise.cli.main import run
-from wakewise.errors import InputError
-from wakewise.geometry import quat_conjugate, quat_multiply, rotvec_from_quat
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import quat_conjugate, quat_multiply, rotvec_from_quat
 from wakewise.operation import fly, load_scenario
 from wakewise.operation.surroundings import surroundings_of
 from wakewise.operation.worlds.makers import true_start
 from wakewise.planning import Surroundings, check_start
+from wakewise.ui.cli.main import run
 
 
 def refused(capsys, *arguments):
@@ -52,7 +52,7 @@ def test_limits_with_min_above_max_are_refused(capsys, tmp_path, monkeypatch):
     from importlib import resources
 
     monkeypatch.chdir(tmp_path)
-    text = (resources.files("wakewise.vehicles") / "library_data" / "paper.yaml").read_text()
+    text = (resources.files("wakewise.robot.vehicles") / "library_data" / "paper.yaml").read_text()
     assert "max_reverse_N" in text
     lines = [line.split(":")[0] + ": -5.0" if "max_reverse_N" in line else line for line in text.splitlines()]
     Path("odd.yaml").write_text("\n".join(lines))

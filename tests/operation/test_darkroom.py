@@ -9,14 +9,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wakewise.geometry import Pose, quat_from_rotvec
-from wakewise.interfaces import ScalarGrid
+from wakewise.core.geometry import Pose, quat_from_rotvec
+from wakewise.core.interfaces import ScalarGrid
 from wakewise.operation import Darkroom, load_scenario, photograph_flight
 from wakewise.operation.darkroom import MOST_WAITING, packed, unpacked
 from wakewise.operation.exposures import ExposureRecord, read_exposures, write_exposures
 from wakewise.operation.photography import fingerprint, take_photograph
-from wakewise.tank.flakes import Flakes
-from wakewise.water import SteadyCurrent
+from wakewise.simulation.tank.flakes import Flakes
+from wakewise.simulation.water import SteadyCurrent
 
 SMALL = {
     "mission.elevations_deg": [40],

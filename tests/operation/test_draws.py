@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.operation import Scenario, load_scenario
 from wakewise.operation.draws import Draw, values_of
 

@@ -7,10 +7,10 @@ import polars as pl
 import pytest
 
 import wakewise as ww
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.operation.flight_trim import flight_trim, folder_trim, hovering, proposal
-from wakewise.vehicles import compile_body, load_vehicle, restoring_wrench
-from wakewise.vehicles.ballast import Block, net_buoyancy_N, with_blocks
+from wakewise.robot.vehicles import compile_body, load_vehicle, restoring_wrench
+from wakewise.robot.vehicles.ballast import Block, net_buoyancy_N, with_blocks
 
 TWIST = ("u_m_s", "v_m_s", "w_m_s", "p_rad_s", "q_rad_s", "r_rad_s")
 WATER = {"target.points": 60, "tank.mismatch.trim_N": 0.0}

@@ -9,7 +9,7 @@ import pytest
 
 import wakewise as ww
 from wakewise.control import make_controller
-from wakewise.errors import StageError
+from wakewise.core.errors import StageError
 from wakewise.operation.foreign import Guarded, described
 
 pytestmark = pytest.mark.usefixtures("fallbacks_fly")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import wakewise as ww
-from wakewise.errors import InputError
-from wakewise.operation.lattice_water import LatticeWater, solid_cells
+from wakewise.core.errors import InputError
+from wakewise.operation.worlds.lattice_world import LatticeWater, solid_cells
 
 STILL = {"world": "still-tank", "flow": "lattice", "method": "dp", "tank.mismatch.trim_N": -4.0}
 

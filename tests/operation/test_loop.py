@@ -7,14 +7,14 @@ import numpy as np
 import polars as pl
 import pytest
 
-from wakewise.errors import StageError
-from wakewise.geometry import Pose, quat_from_matrix
-from wakewise.interfaces import BodyState, Command, Goal, Measurement, ScalarGrid, Truth, WaterTruth
-from wakewise.missions import MissionSettings, RoutePilot, plan_route
-from wakewise.missions.orbit import R_FC
+from wakewise.core.errors import StageError
+from wakewise.core.geometry import Pose, quat_from_matrix
+from wakewise.core.interfaces import BodyState, Command, Goal, Measurement, ScalarGrid, Truth, WaterTruth
 from wakewise.operation import FlightRecorder, read_exposures, step_columns
 from wakewise.operation.flight_log import TAGS, FlightLog
 from wakewise.operation.loop import run_loop
+from wakewise.scene.missions import MissionSettings, RoutePilot, plan_route
+from wakewise.scene.missions.orbit import R_FC
 
 ROUTE = plan_route(
     np.array([0.0, 0.0, 1.4]), MissionSettings(elevations_deg=(30,), views=(4,), speed_m_s=0.5, settle_s=1)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import wakewise as ww
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.operation import PARTS, read_scenario, write_scenario
 from wakewise.operation import parts as module
 from wakewise.operation.trial_folder import as_flown
@@ -29,7 +29,7 @@ def test_what_depends_on_a_replaced_part_is_made_anew():
     assert other.controller is not ours and parts.controller is ours
     assert other.world.vehicle.name == "bluerov2-heavy" and parts.vehicle.name == "paper"
     assert other.target is not parts.target and np.array_equal(other.target.mesh.faces, parts.target.mesh.faces)
-    assert other.replaced == {"vehicle": "bluerov2-heavy (wakewise.vehicles.vehicle.Vehicle)"}
+    assert other.replaced == {"vehicle": "bluerov2-heavy (wakewise.robot.vehicles.vehicle.Vehicle)"}
 
 
 def test_fields_of_the_scenario_can_be_replaced_beside_parts():
@@ -102,8 +102,8 @@ def test_other_worlds_fly_the_same_mission(world):
 
 def test_the_lattices_water_is_the_lattices_jet():
     """One thruster of the true vehicle at the true pose: the speed on its axis is that of the mean field."""
-    from wakewise.lattice import LatticeFlow
-    from wakewise.operation.instant_water import free_jet_field
+    from wakewise.operation.worlds.wake_world import free_jet_field
+    from wakewise.simulation.lattice import LatticeFlow
 
     plant, witness = QUICK.replace(method="dp", world="lattice-jets").parts().world.begin()
     for _ in range(40):

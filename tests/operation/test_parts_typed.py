@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wakewise as ww
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.operation import PARTS, Parts, flying
 from wakewise.operation.flying import FlightFigures
 

@@ -3,9 +3,9 @@
 import cv2
 import numpy as np
 
-from wakewise.imaging import ImagingSettings
 from wakewise.operation import load_scenario, photo_name
 from wakewise.operation.photography import write_image
+from wakewise.vision.imaging import ImagingSettings
 
 
 def test_png_is_exact_and_jpeg_close(tmp_path):

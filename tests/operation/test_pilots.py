@@ -2,9 +2,9 @@
 
 import pytest
 
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.operation import Scenario
-from wakewise.studies.gentle.flight import Trial, fly_trial
+from wakewise_paper.wash_reduction.flight import Trial, fly_trial
 
 
 @pytest.mark.parametrize("stray", [0.02, 0.1, None])

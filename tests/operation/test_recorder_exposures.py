@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from wakewise.geometry import Pose
-from wakewise.imaging.settings import LONGEST_S
-from wakewise.interfaces import ScalarGrid
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import ScalarGrid
 from wakewise.operation import Scenario, fly, load_scenario
 from wakewise.operation.exposures import ExposureRecord, exposure_arrays, read_exposures, write_exposures
 from wakewise.operation.photography import fingerprint, take_photograph
+from wakewise.vision.imaging.settings import LONGEST_S
 
 SILT = ScalarGrid(origin_W_m=np.zeros(3), spacing_m=0.1, values=np.zeros((2, 2, 2)))
 

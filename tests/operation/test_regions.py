@@ -6,7 +6,7 @@ import pytest
 from wakewise.operation import regions
 from wakewise.operation.regions import MOST_KEPT, region_of
 from wakewise.operation.seeds import Seeds
-from wakewise.targets import Mesh, place_on_bed, sample_region
+from wakewise.scene.targets import Mesh, place_on_bed, sample_region
 
 POINTS = 6
 

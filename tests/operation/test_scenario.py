@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import BaseModel
 
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.operation import PRESETS, Scenario, differences, load_scenario, parse_overrides, read_scenario
 from wakewise.operation.renamed import GONE, METHODS_GONE, RENAMED, became
 from wakewise.operation.scenario import dump_scenario

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from wakewise.imaging import calibrate
 from wakewise.operation import Scenario
 from wakewise.operation.survey import CURRENT_DEG, SurveySettings, found_target, known_calibration, surveyed_current
-from wakewise.water import AiryWave, AmbientSum, SteadyCurrent
+from wakewise.simulation.water import AiryWave, AmbientSum, SteadyCurrent
+from wakewise.vision.imaging import calibrate
 
 ORDERS = ("plain", "current")
 EXACT = {"survey.place_m": 0.0, "survey.focal_pct": 0.0, "survey.centre_pct": 0.0, "survey.distortion": 0.0}

@@ -4,7 +4,7 @@ import pytest
 
 import wakewise as ww
 from wakewise.control import METHODS
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.operation.switches import LEVERED, PLANNING, idle_switches
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import wakewise as ww
-from wakewise.errors import InputError
-from wakewise.geometry import Pose
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose
 from wakewise.operation import Flight
 
 TILTING = {

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 import wakewise as ww
-from wakewise.errors import InputError
-from wakewise.geometry import Pose
-from wakewise.interfaces import Posture, ScalarGrid
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import Posture, ScalarGrid
 from wakewise.operation.darkroom import packed, unpacked
 from wakewise.operation.exposures import ExposureRecord, exposure_arrays, read_exposures
 from wakewise.operation.photography import fingerprint, moved_m, scenes_of
 from wakewise.operation.preflight import check_target
 from wakewise.operation.recorder import step_columns
-from wakewise.targets import TISSUES
+from wakewise.scene.targets import TISSUES
 
 SILT = ScalarGrid(origin_W_m=np.zeros(3), spacing_m=1.0, values=np.zeros((1, 1, 1)))
 AT = Pose(np.array([-0.5, 0.0, 1.2]), np.array([0.5, 0.5, 0.5, 0.5]))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 GENERATED = {"commands.md", "scenario.md"}
-"""Pages that the program writes from its own help and settings; tests/cli/test_commands.py compares them."""
+"""Pages that the program writes from its own help and settings; tests/ui/cli/test_commands.py compares them."""
 PROGRAMS = {"python", "toml", "yaml", "json", "text"}
 """Languages of blocks that are no command lines; Python blocks have tests of their own (tests/test_readme.py)."""
 
@@ -26,7 +26,12 @@ class Line:
 def pages() -> list[Path]:
     """README, CONTRIBUTING, docs/*.md and the pages of what lies beside the package."""
     found = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
-    found += sorted([*(ROOT / "ros2").rglob("*.md"), *(ROOT / "extensions").rglob("*.md")])
+    found += sorted(
+        [
+            *(ROOT / "packages/wakewise-ardusub/ros2").rglob("*.md"),
+            *(ROOT / "packages/wakewise-ardusub/extensions").rglob("*.md"),
+        ]
+    )
     return [page for page in found if page.name not in GENERATED]
 
 

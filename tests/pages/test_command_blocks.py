@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from command_blocks import ROOT, Line, command_lines
 
-from wakewise.cli.main import run
+from wakewise.ui.cli.main import run
 
 SHORT = [
     "mission.elevations_deg=[40]",
@@ -90,23 +90,23 @@ RULES: list[Run | Start | Elsewhere | Never] = [
     Run(r"wakewise compare( .*--methods dp,wake-aware)?", also=(*BRIEF, "--out", "runs/compared"), slow=True),
     Run(r"wakewise film runs/\w+", slow=True),
     Run(r"wakewise export runs/colony --to nerfstudio", slow=True),
-    Elsewhere(r"wakewise export .*--to dataset.*", "tests/trials/dataset/test_dataset.py", '"dataset"'),
+    Elsewhere(r"wakewise export .*--to dataset.*", "tests/experiments/trials/dataset/test_dataset.py", '"dataset"'),
     Run(r"wakewise reconstruct PHOTOS .*", slow=True, shows="verdict"),
-    Elsewhere(r"wakewise reconstruct photos/ .*--bar .*", "tests/reconstruction/test_scale_stage.py", "bars"),
-    Elsewhere(r"wakewise reconstruct \w+/ .*--fixes .*", "tests/reconstruction/test_scale_by_fixes.py", "fixes"),
+    Elsewhere(r"wakewise reconstruct photos/ .*--bar .*", "tests/vision/reconstruction/test_scale_stage.py", "bars"),
+    Elsewhere(r"wakewise reconstruct \w+/ .*--fixes .*", "tests/vision/reconstruction/test_scale_by_fixes.py", "fixes"),
     Never(r"wakewise reconstruct runs/sea-.*", "needs the photographs of a real dive; PHOTOS stand for them above"),
     Run(r"wakewise evaluate .*", slow=True, shows="rmse_mm"),
     Run(r"wakewise calibrate BOARD_PHOTOS .*", shows="focal"),
     Run(r"wakewise colour PHOTOS"),
     Run(r"wakewise degrade", also=("--levels", "silt=0", "--out", "runs/degraded", *BRIEF), slow=True),
-    Elsewhere(r"wakewise nerf .*", "tests/reconstruction/test_nerf_pipeline.py", '"nerf"'),
+    Elsewhere(r"wakewise nerf .*", "packages/wakewise-nerf/tests/test_nerf_pipeline.py", '"nerf"'),
     # Vehicles, wakes, water, worlds.
     Run(r"wakewise vehicle check bluerov2-heavy", shows="rank"),
     Run(r"wakewise vehicle show bluerov2-heavy --out rov\.html"),
     Run(r"wakewise vehicle import my_rov\.urdf --out my_rov\.yaml --like bluerov2-heavy"),
     Elsewhere(
         r"wakewise (vehicle|scan) .*my_(whole_)?rov\.(urdf|yaml).*",
-        "tests/cli/test_vehicle_newcomer.py",
+        "tests/ui/cli/test_vehicle_newcomer.py",
         "vehicle-file.md",
     ),
     Run(r"wakewise vehicle trim bluerov2-heavy", slow=True),
@@ -119,10 +119,14 @@ RULES: list[Run | Start | Elsewhere | Never] = [
     Run(r"wakewise world (list|show reef( --seed 3)?)", shows="reef"),
     # Studies: minutes to hours; tests run each with a few seconds of flight.
     Run(r"wakewise bench allocator", slow=True),
-    Elsewhere(r"wakewise bench operator.*", "tests/studies/operator/test_operator_bench.py", "operator"),
-    Elsewhere(r"wakewise bench worlds.*", "tests/studies/worlds/test_worlds_bench.py", "worlds"),
-    Elsewhere(r"wakewise bench gentle.*", "tests/studies/gentle/test_gentle_bench.py", "gentle"),
-    Elsewhere(r"wakewise reproduce .*", "tests/cli/test_reproduce_command.py", '"reproduce"'),
+    Elsewhere(
+        r"wakewise bench operator.*", "packages/wakewise-paper/tests/operator_study/test_operator_bench.py", "operator"
+    ),
+    Elsewhere(r"wakewise bench worlds.*", "packages/wakewise-paper/tests/world_study/test_worlds_bench.py", "worlds"),
+    Elsewhere(
+        r"wakewise bench gentle.*", "packages/wakewise-paper/tests/wash_reduction/test_gentle_bench.py", "gentle"
+    ),
+    Elsewhere(r"wakewise reproduce .*", "packages/wakewise-paper/tests/cli/test_reproduce_command.py", '"reproduce"'),
     # Campaigns.
     Run(r"wakewise campaign (run first\.yaml|(status|table|page) runs/first-comparison.*)", slow=True),
     Never(r"#SBATCH .*", "read by Slurm, which is not here"),
@@ -130,18 +134,32 @@ RULES: list[Run | Start | Elsewhere | Never] = [
         r"wakewise campaign run .*/shared/.*",
         "the folder /shared of a cluster is not here; the same command runs above",
     ),
-    Never(r"export DASK_.*", "a setting of Dask's; tests/campaigns/test_cluster.py starts a scheduler with it"),
-    Elsewhere(r"dask (scheduler|worker) .*", "tests/campaigns/test_cluster.py", "scheduler"),
+    Never(
+        r"export DASK_.*", "a setting of Dask's; tests/experiments/campaigns/test_cluster.py starts a scheduler with it"
+    ),
+    Elsewhere(r"dask (scheduler|worker) .*", "tests/experiments/campaigns/test_cluster.py", "scheduler"),
     # Programs that run until they are stopped, and real vehicles: tests run them against stand-ins on loopback.
-    Never(r"wakewise cockpit .*--gamepad", "needs a gamepad; tests/pilot flies with SDL's virtual one"),
+    Never(r"wakewise cockpit .*--gamepad", "needs a gamepad; tests/operation/input flies with SDL's virtual one"),
     Start(r"wakewise cockpit", "http://127.0.0.1:", also=("--no-browser", "--port", "0")),
     Run(r"wakewise link log dive\.tlog", slow=True),
     Start(r"wakewise link meter .*", "http://127.0.0.1:", also=("--port", "0")),
-    Never(r"wakewise link sensors .*", "needs a companion's buses; tests/links/sensors imitates them"),
+    Never(
+        r"wakewise link sensors .*", "needs a companion's buses; packages/wakewise-ardusub/tests/sensors imitates them"
+    ),
     Run(r"wakewise link script --out scripts.*"),
-    Elsewhere(r"wakewise link script --upload .*", "tests/cli/test_link_wire_commands.py", "--upload"),
-    Elsewhere(r"wakewise link ardusub --check .*", "tests/cli/test_link_wire_commands.py", "--check"),
-    Elsewhere(r"wakewise link ardusub --motor-test .*", "tests/cli/test_link_wire_commands.py", "--motor-test"),
+    Elsewhere(
+        r"wakewise link script --upload .*",
+        "packages/wakewise-ardusub/tests/cli/test_link_wire_commands.py",
+        "--upload",
+    ),
+    Elsewhere(
+        r"wakewise link ardusub --check .*", "packages/wakewise-ardusub/tests/cli/test_link_wire_commands.py", "--check"
+    ),
+    Elsewhere(
+        r"wakewise link ardusub --motor-test .*",
+        "packages/wakewise-ardusub/tests/cli/test_link_wire_commands.py",
+        "--motor-test",
+    ),
     Start(r"wakewise link ardusub .*", "heartbeat"),
     Start(r"wakewise link sitl .*", "now start the firmware"),
     Start(r"wakewise link share", "shares udpin"),
@@ -152,16 +170,16 @@ RULES: list[Run | Start | Elsewhere | Never] = [
     ),
     Never(
         r"echo .*\| nc .*",
-        "netcat is no part of every machine; tests/links/sensors/test_line_poses.py sends the same line",
+        "netcat is no part of every machine; the tests of sensors (test_line_poses.py) send the same line",
     ),
     # Other systems.
     Never(
         r"(OWNER=|docker |git tag |python tools/write_blueos\.py ).*",
-        "needs Docker and an owner; tests/extensions checks what is built",
+        "needs Docker and an owner; packages/wakewise-ardusub/tests/blueos checks what is built",
     ),
     Never(
         r"(ln -s|ros2|python3 -m venv --system-site-packages) .*",
-        "needs ROS 2; tests/links/ros runs the node with imitated ROS",
+        "needs ROS 2; packages/wakewise-ardusub/tests/ros runs the node with imitated ROS",
     ),
 ]
 """The first whose pattern matches a whole line is the line's."""
@@ -180,8 +198,8 @@ LINES = command_lines()
 
 def _photographs(folder: Path) -> None:
     import wakewise as ww
-    from wakewise.studies.photo_sets import planned_views, write_photos
-    from wakewise.targets import write_mesh
+    from wakewise.scene.targets import write_mesh
+    from wakewise_paper.photo_sets import planned_views, write_photos
 
     mission = {"mission.elevations_deg": [45], "mission.views": [12], "mission.standoff_m": 0.4}
     scenario = ww.Scenario.preset("quick", **mission, **{"imaging.width": 320, "imaging.height": 240})

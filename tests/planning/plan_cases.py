@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from wakewise.geometry import Pose, quat_from_euler
-from wakewise.interfaces import Goal
+from wakewise.core.geometry import Pose, quat_from_euler
+from wakewise.core.interfaces import Goal
 from wakewise.planning.planner import compile_plan
 from wakewise.planning.problem import PlanProblem, PlanSettings, PlanTerms
 from wakewise.planning.reference import reference_of
 from wakewise.planning.surroundings import Surroundings
-from wakewise.targets import Region
-from wakewise.vehicles import load_vehicle
+from wakewise.robot.vehicles import load_vehicle
+from wakewise.scene.targets import Region
 from wakewise.wake import WakeSettings, wake_model
 
 VEHICLE = load_vehicle("paper")

@@ -7,15 +7,15 @@ import pytest
 from plan_cases import AROUND, CONE, REGION, VEHICLE, model, problem
 
 from wakewise.control import ControlSettings, make_controller, planning_controller
-from wakewise.errors import InputError
-from wakewise.geometry import Pose, quat_from_euler
-from wakewise.interfaces import BodyState, Goal
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose, quat_from_euler
+from wakewise.core.interfaces import BodyState, Goal
 from wakewise.planning import PlanSettings
 from wakewise.planning.guard import SPIN_RAD_S, Guard
 from wakewise.planning.planner import Planner
 from wakewise.planning.reference import reference_of
-from wakewise.thrusters import thruster_lag
-from wakewise.vehicles import compile_body, perturbed, step_rk4
+from wakewise.robot.thrusters import thruster_lag
+from wakewise.robot.vehicles import compile_body, perturbed, step_rk4
 
 PLACE = Pose(np.array([0.45, 0.0, 1.05]), quat_from_euler(0.0, 0.0, np.pi))
 GOAL = Goal(X_WB=PLACE)

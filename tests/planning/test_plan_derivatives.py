@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from plan_cases import CONE, REGION, SHARES, VEHICLE, model, problem
 
-from wakewise.geometry import Pose, quat_from_euler, quat_from_rotvec, quat_multiply
+from wakewise.core.geometry import Pose, quat_from_euler, quat_from_rotvec, quat_multiply
 from wakewise.planning.barrier import barrier_value, plane_gap, sphere_gap
 from wakewise.planning.condensing import condense
 from wakewise.planning.kernels import rotation
 from wakewise.planning.planner import Planner
 from wakewise.planning.qp import BoxQP
-from wakewise.vehicles import step_rk4
+from wakewise.robot.vehicles import step_rk4
 from wakewise.wake import gauss_newton, wake_model
 from wakewise.wake.plan_disturbance import stage_disturbance, wake_scratch
 from wakewise.wake.table import wake_table
@@ -135,7 +135,7 @@ def test_the_prediction_is_the_vehicle_s_own_motion():
         wrench = VEHICLE.allocation_matrix @ means[k]
         wrench[:3] += Pose(X[k, :3], X[k, 3:7]).R.T @ case.force_W_N
         wrench[3:] += case.moment_B_Nm
-        from wakewise.vehicles import compile_body
+        from wakewise.robot.vehicles import compile_body
 
         p, q, nu = step_rk4(compile_body(VEHICLE), X[k, :3], X[k, 3:7], X[k, 7:], wrench, case.current_W_m_s, 0.1)
         np.testing.assert_allclose(X[k + 1], np.concatenate([p, q, nu]), atol=1e-12)

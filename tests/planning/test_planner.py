@@ -8,15 +8,15 @@ from plan_cases import AROUND, CENTRE, CONE, REGION, VEHICLE, model, problem
 from pydantic import ValidationError
 
 from wakewise.control.intent import obeying
-from wakewise.errors import InputError
-from wakewise.geometry import Pose, matrix_from_quat, quat_from_euler
-from wakewise.interfaces import Goal
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose, matrix_from_quat, quat_from_euler
+from wakewise.core.interfaces import Goal
 from wakewise.planning.guard import check_start
 from wakewise.planning.planner import Planner, compile_plan
 from wakewise.planning.problem import PlanSettings, shifted
 from wakewise.planning.reference import reference_of
 from wakewise.planning.surroundings import Surroundings
-from wakewise.targets import Region
+from wakewise.scene.targets import Region
 
 START = np.zeros((20, 8))
 

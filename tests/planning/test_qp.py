@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from plan_cases import REGION, VEHICLE, model, problem
 
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.planning import qp as qp_module
 from wakewise.planning.guard import Guard, check_start
 from wakewise.planning.planner import Planner

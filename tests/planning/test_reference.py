@@ -3,8 +3,15 @@
 import numpy as np
 import pytest
 
-from wakewise.geometry import Pose, quat_conjugate, quat_from_euler, quat_from_rotvec, quat_multiply, rotvec_from_quat
-from wakewise.interfaces import Goal
+from wakewise.core.geometry import (
+    Pose,
+    quat_conjugate,
+    quat_from_euler,
+    quat_from_rotvec,
+    quat_multiply,
+    rotvec_from_quat,
+)
+from wakewise.core.interfaces import Goal
 from wakewise.planning.reference import RAMP_S, between, reference_of
 
 GOAL = Goal(

@@ -5,9 +5,9 @@ import pytest
 
 from wakewise.allocation import Weights, compile_layout, gentle_allocation
 from wakewise.control.bow_rule import bow_layout
-from wakewise.geometry import Pose
-from wakewise.targets import Region
-from wakewise.vehicles import load_vehicle
+from wakewise.core.geometry import Pose
+from wakewise.robot.vehicles import load_vehicle
+from wakewise.scene.targets import Region
 from wakewise.wake import RoundJet, WakeView, wake_model
 from wakewise.wake.disturbance import SCATTER_RAD, astray
 

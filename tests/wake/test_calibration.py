@@ -12,7 +12,7 @@ import math
 import numpy as np
 import pytest
 
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.wake.calibration import calibrate, split_samples
 from wakewise.wake.families import FAMILIES, family
 from wakewise.wake.fit_file import fit_figures, read_wake_settings, write_fit

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.wake import GaussianJet, PaperJet, RoundJet, gram, wake_model
 from wakewise.wake.carried import OPPOSED, PUFF, SECTIONS, Flow, plumes
 from wakewise.wake.disturbance import carried_velocity

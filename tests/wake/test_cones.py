@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.wake import PaperJet, PowerJet
 
 AREA = np.pi * 0.03**2

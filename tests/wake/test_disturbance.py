@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wakewise.errors import InputError
-from wakewise.interfaces import WakeModel
+from wakewise.core.errors import InputError
+from wakewise.core.interfaces import WakeModel
 from wakewise.wake import disturbance, gram, incoherent, point_disturbance, wake_model
 from wakewise.wake.models import OWN_MODELS
 

@@ -8,7 +8,7 @@ anywhere          along the bed, radial from the strike point, level with the ar
 import numpy as np
 import pytest
 
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.wake import FloorJet, RoundJet, WakeSettings, gram, point_disturbance, wake_model
 
 AREA = np.array([np.pi * 0.03**2])

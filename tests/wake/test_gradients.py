@@ -8,8 +8,8 @@ Gauss-Newton 2 J'J with J stacked from differences of weighted velocities
 import numpy as np
 import pytest
 
-from wakewise.errors import InputError
-from wakewise.geometry import Pose, look_at, quat_from_matrix
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose, look_at, quat_from_matrix
 from wakewise.wake import (
     FloorJet,
     PaperJet,

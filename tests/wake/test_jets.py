@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.wake import GaussianJet, PaperJet, RoundJet, wake_model
 
 AREA = np.pi * 0.03**2

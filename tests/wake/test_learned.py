@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.wake import WakeSettings, bed_of, free_jet, gram, point_disturbance, wake_model
 from wakewise.wake.floor import WALL_SPEED, wall_velocity
 from wakewise.wake.learned import LearnedWake, load_network, save_network, shape, shipped

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.wake import FloorJet, GaussianJet, PaperJet, PowerJet, RoundJet, WakeSettings, model_names, wake_model
 from wakewise.wake.learned import LearnedWake
 from wakewise.wake.models import OWN_MODELS

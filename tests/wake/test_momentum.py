@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.wake.families import family
 from wakewise.wake.jets import GaussianJet, RoundJet
 from wakewise.wake.momentum import flux_over_thrust, momentum_law

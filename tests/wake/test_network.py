@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.wake.network import EDGES, INPUTS, JetPoints, Network, history_bins, remembered
 
 BINS = len(EDGES) - 1

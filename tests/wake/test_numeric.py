@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from wakewise.errors import InputError
-from wakewise.geometry import Pose, quat_from_euler
-from wakewise.vehicles import load_vehicle
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose, quat_from_euler
+from wakewise.robot.vehicles import load_vehicle
 from wakewise.wake import gauss_newton, gram_with_derivatives, wake_model
 from wakewise.wake.numeric import thinned
 

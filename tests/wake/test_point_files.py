@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.wake.samples import read_samples
 
 PIVLAB = (

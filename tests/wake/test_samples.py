@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.wake.samples import CORE, FAR, WAKE, JetSamples, joined, read_samples
 
 HEAD = "x_m,r_m,thrust_N,u_m_s,disk_diameter_m\n"

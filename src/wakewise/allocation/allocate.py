@@ -20,9 +20,9 @@ from wakewise.allocation.coupled import feasible_starts, start_directions, start
 from wakewise.allocation.layout import Layout, compile_layout
 from wakewise.allocation.reach import AXES, by_priority, is_all, parse_priority, within_limits
 from wakewise.allocation.search import cost, disjoint_search, split_allocation
-from wakewise.arrays import Array, freeze, frozen
-from wakewise.checks import finite_number, instance_of, whole_number
-from wakewise.defaults import BUDGET, CHANGE_WEIGHT, EFFORT_WEIGHT
+from wakewise.core.arrays import Array, freeze, frozen
+from wakewise.core.checks import finite_number, instance_of, whole_number
+from wakewise.core.defaults import BUDGET, CHANGE_WEIGHT, EFFORT_WEIGHT
 
 __all__ = [
     "Allocation",

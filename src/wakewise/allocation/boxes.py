@@ -13,8 +13,8 @@ import numpy as np
 
 from wakewise.allocation.cells import CLOSED, examine
 from wakewise.allocation.coupled import descend, explore
-from wakewise.arrays import Array, IntArray
-from wakewise.compiled import assign, njit
+from wakewise.core.arrays import Array, IntArray
+from wakewise.core.jit.compiled import assign, njit
 
 
 @njit(apart=True)

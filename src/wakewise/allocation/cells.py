@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from wakewise.allocation.search import cost
-from wakewise.arrays import Array
-from wakewise.compiled import assign, njit
+from wakewise.core.arrays import Array
+from wakewise.core.jit.compiled import assign, njit
 
 CLOSED = 1e-5
 """Relative gap at which a search ends: a tenth of what the thrusters could show."""

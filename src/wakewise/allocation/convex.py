@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wakewise.arrays import Array
+from wakewise.core.arrays import Array
 
 
 def convex_allocation(

@@ -11,8 +11,8 @@ from functools import cache
 import numpy as np
 
 from wakewise.allocation.search import TOLERANCE, box_range, cost, line_minimum
-from wakewise.arrays import Array, BoolArray
-from wakewise.compiled import assign, njit
+from wakewise.core.arrays import Array, BoolArray
+from wakewise.core.jit.compiled import assign, njit
 
 _STARTS = (0, 0, 6, 12, 24, 32)
 _RESTS, _RESTS_KEPT = 400, 8

@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from wakewise.arrays import Array, BoolArray, freeze, frozen
-from wakewise.errors import InputError
+from wakewise.core.arrays import Array, BoolArray, freeze, frozen
+from wakewise.core.errors import InputError
 
 MOST_SPARE = 8
 """Largest dimension of a null space that is taken: boxes have 2^k corners."""

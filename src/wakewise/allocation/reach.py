@@ -11,9 +11,9 @@ import numpy as np
 
 from wakewise.allocation.layout import Layout, axis_scaling
 from wakewise.allocation.search import box_range
-from wakewise.arrays import Array
-from wakewise.checks import quoted
-from wakewise.errors import InputError
+from wakewise.core.arrays import Array
+from wakewise.core.checks import quoted
+from wakewise.core.errors import InputError
 
 AXES = "XYZKMN"
 """Surge, sway and heave force, roll, pitch and yaw moment."""

@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.compiled import assign, njit
+from wakewise.core.arrays import Array
+from wakewise.core.jit.compiled import assign, njit
 
 TOLERANCE = 1e-7
 """Relative gap at which a line search stops: far below what a thruster can reproduce."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from wakewise.doors import lazy_door
+from wakewise.core.lazy_imports import lazy_door
 
 if TYPE_CHECKING:
     from wakewise.api.models import evaluate, load_target, methods, reconstruct

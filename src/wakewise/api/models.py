@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
-from wakewise.arrays import frozen
-from wakewise.checks import finite_number, instance_of, path_of, quoted, truth
 from wakewise.control import MAKERS
-from wakewise.errors import InputError
-from wakewise.extras import need
-from wakewise.plugins import names
-from wakewise.settings import seed_number
-from wakewise.targets import find_target, is_mesh_file
+from wakewise.core.arrays import frozen
+from wakewise.core.checks import finite_number, instance_of, path_of, quoted, truth
+from wakewise.core.errors import InputError
+from wakewise.core.optional_dependencies import need
+from wakewise.core.plugins import names
+from wakewise.core.settings import seed_number
+from wakewise.scene.targets import find_target, is_mesh_file
 
 if TYPE_CHECKING:
-    from wakewise.evaluation import SurfaceScore
-    from wakewise.reconstruction import Model, ReconstructionSettings
-    from wakewise.targets import Mesh, Target
+    from wakewise.scene.targets import Mesh, Target
+    from wakewise.vision.evaluation import SurfaceScore
+    from wakewise.vision.reconstruction import Model, ReconstructionSettings
 
 
 def reconstruct(
@@ -65,8 +65,8 @@ def reconstruct(
     >>> ww.reconstruct("photos", "runs/photos").summary()["registered_images"]  # doctest: +SKIP
     """
     need("ww.reconstruct", "photos")
-    from wakewise.reconstruction import ReconstructionSettings, read_lens, read_reference_cameras
-    from wakewise.reconstruction import reconstruct as build
+    from wakewise.vision.reconstruction import ReconstructionSettings, read_lens, read_reference_cameras
+    from wakewise.vision.reconstruction import reconstruct as build
 
     if region is not None and (not isinstance(region, (tuple, list)) or len(region) != 2):
         raise InputError(f"region: {quoted(region)}, must be a centre and a radius, ((x, y, z), r) in m")
@@ -123,9 +123,9 @@ def evaluate(
     True
     """
     need("ww.evaluate", "photos", only=("embreex", "small_gicp"))
-    from wakewise.evaluation import Crop, evaluate_surface
-    from wakewise.reconstruction import read_cloud
-    from wakewise.targets import Mesh, read_mesh
+    from wakewise.scene.targets import Mesh, read_mesh
+    from wakewise.vision.evaluation import Crop, evaluate_surface
+    from wakewise.vision.reconstruction import read_cloud
 
     icp = truth(icp, "icp")
     if isinstance(cloud, (str, os.PathLike)):

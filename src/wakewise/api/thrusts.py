@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike
 
 from wakewise import wake as wakes
 from wakewise.allocation import Allocation, Layout, Weights, compile_layout, gentle_allocation, least_thrusts
-from wakewise.arrays import Array, frozen
-from wakewise.checks import able, finite_number, instance_of, quoted, whole_number
-from wakewise.defaults import BUDGET, CHANGE_WEIGHT, DISTURBANCE_WEIGHT, EFFORT_WEIGHT
-from wakewise.errors import InputError
-from wakewise.geometry import Pose, quat_from_euler
-from wakewise.interfaces import WakeModel
-from wakewise.targets import Region
-from wakewise.vehicles import Vehicle
+from wakewise.core.arrays import Array, frozen
+from wakewise.core.checks import able, finite_number, instance_of, quoted, whole_number
+from wakewise.core.defaults import BUDGET, CHANGE_WEIGHT, DISTURBANCE_WEIGHT, EFFORT_WEIGHT
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose, quat_from_euler
+from wakewise.core.interfaces import WakeModel
+from wakewise.robot.vehicles import Vehicle
+from wakewise.scene.targets import Region
 from wakewise.wake import Superposition, WakeView, wake_model
 
 LARGEST = 1e9

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wakewise.checks import able, callable_of, path_of, quoted
-from wakewise.errors import InputError
-from wakewise.extras import need
-from wakewise.files import named
+from wakewise.core.checks import able, callable_of, path_of, quoted
+from wakewise.core.errors import InputError
+from wakewise.core.files import named
+from wakewise.core.optional_dependencies import need
 
 if TYPE_CHECKING:
+    from wakewise.experiments.trials import Watch
     from wakewise.operation import Parts, Scenario
-    from wakewise.trials import Watch
 
 
 _EXTRAS = ("photos", "reports", "logs")
@@ -67,9 +67,9 @@ def trial(
     >>> ww.trial(scenario, "runs/few")  # doctest: +SKIP
     """
     need("ww.trial", *_EXTRAS)
-    from wakewise.reports import Draft, begin_report, write_report
-    from wakewise.trials import Quiet, run_trial
-    from wakewise.trials.reporting import report_attempt
+    from wakewise.experiments.trials import Quiet, run_trial
+    from wakewise.experiments.trials.reporting import report_attempt
+    from wakewise.ui.reports import Draft, begin_report, write_report
 
     place, draft = path_of(folder, "folder"), Draft()
     watch = Quiet() if watch is None else able(watch, ("stage",), "watch", "watch")
@@ -107,9 +107,9 @@ def compare(flights: Mapping[str, Parts | Scenario], folder: str | Path, watch: 
     >>> ww.compare(flights, "runs/both").figures["ratios"]["ours"]  # doctest: +SKIP
     """
     need("ww.compare", *_EXTRAS)
-    from wakewise.reports import Draft, begin_report, write_comparison, write_report
-    from wakewise.trials import Quiet, compare_methods
-    from wakewise.trials.reporting import report_attempt
+    from wakewise.experiments.trials import Quiet, compare_methods
+    from wakewise.experiments.trials.reporting import report_attempt
+    from wakewise.ui.reports import Draft, begin_report, write_comparison, write_report
 
     if not isinstance(flights, Mapping):
         raise InputError(f"flights: {quoted(flights)}, must be names with parts or scenarios")
@@ -135,7 +135,7 @@ def compare(flights: Mapping[str, Parts | Scenario], folder: str | Path, watch: 
 
 def _early(begin: Callable[..., None]) -> Callable[..., None]:
     """What makes parts of a report while the trial still runs, which it must not end: `write_report` tells of it."""
-    from wakewise.trials.reporting import report_attempt
+    from wakewise.experiments.trials.reporting import report_attempt
 
     def parts(*given: str) -> None:
         with report_attempt():

@@ -28,14 +28,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wakewise.arrays import Array, freeze
 from wakewise.control.loop import HOLD_S
 from wakewise.control.motor_mix import MotorMix, motor_mix
 from wakewise.control.settings import ControlSettings
 from wakewise.control.stability import Gains, axis_scale, vehicle_axes
 from wakewise.control.tracker import ESTIMATOR_LAG_S, GYRO_LAG_S
-from wakewise.errors import InputError
-from wakewise.geometry import (
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import (
     euler_from_quat,
     matrix_from_quat,
     quat_conjugate,
@@ -43,11 +43,11 @@ from wakewise.geometry import (
     quat_multiply,
     rotvec_from_quat,
 )
-from wakewise.interfaces import BodyState, Command, Goal, WakeModel
-from wakewise.physics import GRAVITY_M_S2
+from wakewise.core.interfaces import BodyState, Command, Goal, WakeModel
+from wakewise.core.physics import GRAVITY_M_S2
 from wakewise.planning import Surroundings
-from wakewise.targets import Region
-from wakewise.vehicles import Vehicle
+from wakewise.robot.vehicles import Vehicle
+from wakewise.scene.targets import Region
 from wakewise.wake import WakeView
 from wakewise.wake.disturbance import disturbance
 
@@ -93,7 +93,7 @@ class ArduSubState:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ArduSubController:
-    """Implements `wakewise.interfaces.Controller`; make one with `ardusub`.
+    """Implements `wakewise.core.interfaces.Controller`; make one with `ardusub`.
 
     `lowered`, shape (6,), is what the margins left of the gains: roll, pitch, yaw, north, east, down.
     """

@@ -16,15 +16,15 @@ import numpy as np
 from scipy.optimize import linprog
 
 from wakewise.allocation import Layout, compile_layout
-from wakewise.arrays import Array
 from wakewise.control.dynamic_positioning import with_least_thrusts
 from wakewise.control.loop import TrackingController
 from wakewise.control.settings import ControlSettings
-from wakewise.errors import InputError
-from wakewise.interfaces import WakeModel
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.core.interfaces import WakeModel
 from wakewise.planning import Surroundings
-from wakewise.targets import Region
-from wakewise.vehicles import Vehicle
+from wakewise.robot.vehicles import Vehicle
+from wakewise.scene.targets import Region
 
 _LEVEL = 0.5
 """A thruster counts as level if its axis is less than 30 deg off level, and as blowing ahead if its jet has more than

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
-from wakewise.arrays import Array, freeze
 from wakewise.control.tracker import TrackerState
+from wakewise.core.arrays import Array, freeze
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

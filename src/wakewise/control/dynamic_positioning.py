@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from wakewise.allocation import Allocation, Layout, least_thrusts
-from wakewise.arrays import Array
 from wakewise.control.loop import TrackingController, vehicle_layout
 from wakewise.control.settings import ControlSettings
 from wakewise.control.tracker import make_tracker
-from wakewise.interfaces import WakeModel
+from wakewise.core.arrays import Array
+from wakewise.core.interfaces import WakeModel
 from wakewise.planning import Surroundings
-from wakewise.targets import Region
-from wakewise.vehicles import Vehicle
+from wakewise.robot.vehicles import Vehicle
+from wakewise.scene.targets import Region
 from wakewise.wake import WakeView
 
 

@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from wakewise.arrays import Array
 from wakewise.control.intent import PAPER_W_TRACK
+from wakewise.core.arrays import Array
 
 PROMISED = 0.12
 """Share of the way asked for that a plan may leave undone at the paper's w_track: of the 15 % that it promises, what is

@@ -19,13 +19,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wakewise.arrays import Array, freeze, frozen
-from wakewise.errors import InputError
+from wakewise.core.arrays import Array, freeze, frozen
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import matrix_from_quat
 from wakewise.estimation.current import current_of_force
 from wakewise.estimation.settings import Priors
-from wakewise.geometry import matrix_from_quat
-from wakewise.vehicles import Vehicle, compile_body, coriolis_wrench, damping_wrench, restoring_wrench
-from wakewise.vehicles.ballast import Block, net_buoyancy_N
+from wakewise.robot.vehicles import Vehicle, compile_body, coriolis_wrench, damping_wrench, restoring_wrench
+from wakewise.robot.vehicles.ballast import Block, net_buoyancy_N
 
 STEP_N, STEP_M = 0.5, 0.05
 """What a person can do: blocks of half a newton (50 g of lead, 60 ml of foam), places to five centimetres."""

@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Any
 
 from wakewise.allocation import Allocation, least_thrusts
-from wakewise.arrays import Array
 from wakewise.control.levers import with_bed_points
 from wakewise.control.loop import TrackingController
 from wakewise.control.poised import poised
@@ -14,11 +13,12 @@ from wakewise.control.settings import ControlSettings
 from wakewise.control.spare import watching
 from wakewise.control.thrift import sharer_of, weights_of
 from wakewise.control.tracker import make_tracker
-from wakewise.interfaces import Controller, WakeModel
+from wakewise.core.arrays import Array
+from wakewise.core.interfaces import Controller, WakeModel
 from wakewise.planning import Surroundings
 from wakewise.planning.surroundings import around_target
-from wakewise.targets import Region
-from wakewise.vehicles import Vehicle
+from wakewise.robot.vehicles import Vehicle
+from wakewise.scene.targets import Region
 from wakewise.wake import bed_of
 from wakewise.wake.view import Seen, WakeView
 

@@ -19,10 +19,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wakewise.arrays import Array, freeze
-from wakewise.errors import InputError
-from wakewise.geometry import Pose, look_at, quat_from_euler, quat_from_matrix
-from wakewise.interfaces import BodyState, Goal
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose, look_at, quat_from_euler, quat_from_matrix
+from wakewise.core.interfaces import BodyState, Goal
 from wakewise.planning.problem import PlanSettings
 
 LEASH_M = 0.10

@@ -13,9 +13,9 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
-from wakewise.arrays import Array, IntArray
-from wakewise.settings import Settings
-from wakewise.targets import Region
+from wakewise.core.arrays import Array, IntArray
+from wakewise.core.settings import Settings
+from wakewise.scene.targets import Region
 
 BED_POINTS, BED_RADIUS_M, BED_WEIGHT = 80, 0.3, 0.5
 """How many bed points there are: enough for one in a square of 6 cm; how far from the target's foot they reach: three

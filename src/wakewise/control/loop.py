@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wakewise.allocation import Allocation, Layout, compile_layout
-from wakewise.arrays import Array, freeze
 from wakewise.control.carried import Carried
 from wakewise.control.tracker import Tracker, TrackerState
 from wakewise.control.watch import APART_S, EVERY_S, FULL, JUMP_EVERY_S, Watch
-from wakewise.interfaces import BodyState, Command, Goal
-from wakewise.vehicles import Vehicle
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.interfaces import BodyState, Command, Goal
+from wakewise.robot.vehicles import Vehicle
 from wakewise.wake.view import Seen, WakeView
 
 Allocate = Callable[[Array, Array | None, Array], Allocation]
@@ -51,7 +51,7 @@ class ControllerState:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TrackingController:
-    """A tracker and a way to allocate; implements `wakewise.interfaces.Controller`.
+    """A tracker and a way to allocate; implements `wakewise.core.interfaces.Controller`.
 
     An estimate or goal that is not finite gives the last thrusts, fading with `HOLD_S`, and says so in `fallback`.
     Where there is a `watch`, the estimate's current carries the jets; where that takes them is looked up `EVERY_S`.

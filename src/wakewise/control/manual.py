@@ -4,7 +4,8 @@ Flown as BlueROV2 and its kin are flown, in ArduSub's ALT_HOLD: sticks for forwa
 the pilot's gain; the stick for down asks for a rate of climb and holds the depth where it is let go, that for turn
 asks for a rate and holds the heading; roll and pitch are held level, or at the angle that is set. The wrench is
 shared out by the pseudo-inverse, which for ArduSub's vectored_6dof frame is its motor factors up to a scale per axis.
-The person sees what the estimator says, late (`wakewise.pilot`), and knows neither jets nor target's water.
+The person sees what the estimator says, late (`wakewise.operation.teleop.input`), and knows neither jets nor target's
+water.
 
 Assumed, in favour of the person: the autopilot holds depth, heading and attitude with the gains of `dp` and knows the
 righting moment; full stick makes the least thrust that any mix of thrusters reaches along its axis; the angle of
@@ -20,17 +21,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wakewise.allocation import Layout, least_thrusts
-from wakewise.arrays import Array, freeze
 from wakewise.control.loop import HOLD_S, vehicle_layout
+from wakewise.control.operator_model import Person, PersonState, Sticks, View, begin, draw_person, steer
 from wakewise.control.settings import ControlSettings
 from wakewise.control.tracker import Tracker, TrackerState, make_tracker
 from wakewise.control.watch import FULL
-from wakewise.geometry import Pose, euler_from_quat, quat_from_euler
-from wakewise.interfaces import BodyState, Command, Goal, WakeModel
-from wakewise.pilot import Person, PersonState, Sticks, View, begin, draw_person, steer
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.geometry import Pose, euler_from_quat, quat_from_euler
+from wakewise.core.interfaces import BodyState, Command, Goal, WakeModel
 from wakewise.planning import Surroundings
-from wakewise.targets import Region
-from wakewise.vehicles import Vehicle, restoring_wrench
+from wakewise.robot.vehicles import Vehicle, restoring_wrench
+from wakewise.scene.targets import Region
 from wakewise.wake import WakeView
 
 CLIMB_M_S, TURN_RAD_S = 5.0, math.radians(3.375 * 45.0)
@@ -58,7 +59,7 @@ class ManualState:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ManualController:
-    """Flown by hand; implements `wakewise.interfaces.Controller`. Make one with `manual`."""
+    """Flown by hand; implements `wakewise.core.interfaces.Controller`. Make one with `manual`."""
 
     name: str
     person: Person

@@ -25,9 +25,9 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from wakewise.allocation import Layout
-from wakewise.arrays import Array, IntArray
-from wakewise.compiled import assign, njit
-from wakewise.geometry import Pose
+from wakewise.core.arrays import Array, IntArray
+from wakewise.core.geometry import Pose
+from wakewise.core.jit.compiled import assign, njit
 from wakewise.wake import AxialJet, free_jet
 from wakewise.wake.carried import Flow
 from wakewise.wake.disturbance import carried_velocity, incoherent, velocity_gram

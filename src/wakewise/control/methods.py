@@ -1,7 +1,7 @@
 """Methods by name: what each cares for, and how one is made, ours or one from outside.
 
 - `dp`: dynamic positioning, a PID with the least thrusts.
-- `manual`: a person at two sticks, with the autopilot that such vehicles have (see `wakewise.pilot`).
+- `manual`: a person at two sticks, with the autopilot that such vehicles have (see `wakewise.operation.teleop.input`).
 - `ardusub`: the loops and the mixer that such vehicles are shipped with, holding the mission's pose.
 - `bow-rule`: `dp` whose bow thrusters never blow ahead.
 - `pseudo-inverse`: the motion of `wake-aware`, wrench for wrench, made with the least thrusts (an ablation).
@@ -27,11 +27,11 @@ from wakewise.control.pseudo_inverse import planned_pseudo_inverse
 from wakewise.control.settings import ControlSettings
 from wakewise.control.unaware import smooth, unaware
 from wakewise.control.wake_aware import linear, planned
-from wakewise.interfaces import Controller, WakeModel
+from wakewise.core.interfaces import Controller, WakeModel
+from wakewise.core.plugins import find
 from wakewise.planning import Surroundings
-from wakewise.plugins import find
-from wakewise.targets import Region
-from wakewise.vehicles import Vehicle
+from wakewise.robot.vehicles import Vehicle
+from wakewise.scene.targets import Region
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -17,11 +17,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wakewise.arrays import Array, freeze
-from wakewise.errors import InputError
-from wakewise.thrusters.curve_library import library_curve
-from wakewise.thrusters.thrust_curve import ThrustCurve
-from wakewise.vehicles import Vehicle
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.errors import InputError
+from wakewise.robot.thrusters.curve_library import library_curve
+from wakewise.robot.thrusters.thrust_curve import ThrustCurve
+from wakewise.robot.vehicles import Vehicle
 
 FULL_US, MIDDLE_US = 400.0, 1500.0
 """Pulse of full output from the middle one, and the middle one."""

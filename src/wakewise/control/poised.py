@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.arrays import Array, freeze
 from wakewise.control.posture import LOOK_S, Hold, Price, Scale, chosen, eased
 from wakewise.control.settings import ControlSettings
 from wakewise.control.watch import Watch
-from wakewise.errors import InputError
-from wakewise.interfaces import BodyState, Command, Controller, Goal
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.errors import InputError
+from wakewise.core.interfaces import BodyState, Command, Controller, Goal
 from wakewise.planning import Surroundings
-from wakewise.vehicles import Vehicle
+from wakewise.robot.vehicles import Vehicle
 
 LOAD_S = 2.0
 """Time constant over which the load is averaged: a round. A posture is for what stays."""
@@ -60,7 +60,7 @@ class PoisedState:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Poised:
-    """Any controller, under a body attitude of this one's choice; implements `wakewise.interfaces.Controller`.
+    """Any controller, under a body attitude of this one's choice; implements `wakewise.core.interfaces.Controller`.
 
     `watch` is the water that counts. What the camera's joint must do for it is told in `Command.goal`.
     """

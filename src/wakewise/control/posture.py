@@ -25,18 +25,18 @@ from functools import lru_cache
 import numpy as np
 
 from wakewise.allocation import Layout, PowerLaw, Weights, compile_layout, gentle_allocation
-from wakewise.arrays import Array, freeze
 from wakewise.control import easing
 from wakewise.control.thrift import STANDING_W, power_law
 from wakewise.control.watch import FULL
-from wakewise.geometry import Pose, matrix_from_quat, quat_from_rotvec
-from wakewise.interfaces import Goal
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.geometry import Pose, matrix_from_quat, quat_from_rotvec
+from wakewise.core.interfaces import Goal
 from wakewise.planning import Surroundings
 from wakewise.planning.barrier import least_gap
 from wakewise.planning.problem import CLEARANCE_M
 from wakewise.planning.reference import reference_of
-from wakewise.vehicles import RigidBody, TiltJoint, Vehicle, compile_body, restoring_wrench
-from wakewise.vehicles.dynamics import coriolis_wrench, damping_wrench
+from wakewise.robot.vehicles import RigidBody, TiltJoint, Vehicle, compile_body, restoring_wrench
+from wakewise.robot.vehicles.dynamics import coriolis_wrench, damping_wrench
 
 STEP_RAD = float(np.radians(5.0))
 """Distance between the leans that are compared: half a metre on, a jet moves by 4 cm, less than its own width there."""

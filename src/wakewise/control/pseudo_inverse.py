@@ -9,16 +9,18 @@ from wakewise.allocation import Layout, least_thrusts
 from wakewise.control.loop import vehicle_layout
 from wakewise.control.settings import ControlSettings
 from wakewise.control.wake_aware import planned
-from wakewise.interfaces import BodyState, Command, Controller, Goal, WakeModel
+from wakewise.core.interfaces import BodyState, Command, Controller, Goal, WakeModel
 from wakewise.planning import Surroundings
-from wakewise.targets import Region
-from wakewise.vehicles import Vehicle
+from wakewise.robot.vehicles import Vehicle
+from wakewise.scene.targets import Region
 from wakewise.wake import WakeView
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LeastThrusts:
-    """The wrench of another controller, made with the least thrusts; implements `wakewise.interfaces.Controller`."""
+    """The wrench of another controller, made with the least thrusts; implements
+    `wakewise.core.interfaces.Controller`.
+    """
 
     name: str
     inner: Controller[Any]

@@ -19,12 +19,12 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.arrays import Array, freeze
-from wakewise.compiled import njit
-from wakewise.interfaces import BodyState, Command, Controller, Goal
-from wakewise.thrusters import ThrustSteps
-from wakewise.thrusters.thrust_steps import nearest
-from wakewise.vehicles import Vehicle
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.interfaces import BodyState, Command, Controller, Goal
+from wakewise.core.jit.compiled import njit
+from wakewise.robot.thrusters import ThrustSteps
+from wakewise.robot.thrusters.thrust_steps import nearest
+from wakewise.robot.vehicles import Vehicle
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -25,22 +25,22 @@ from functools import cached_property
 
 import numpy as np
 
-from wakewise.arrays import Array, freeze
 from wakewise.control.carried import Carried
 from wakewise.control.firmness import firmer, stray_of
 from wakewise.control.instant import instant_allocator
 from wakewise.control.loop import HOLD_S, ControllerState, TrackingController
 from wakewise.control.settings import ControlSettings
 from wakewise.control.tracker import Tracker, TrackerState, make_tracker
-from wakewise.geometry import Pose, matrix_from_quat, quat_conjugate, quat_multiply, rotvec_from_quat
-from wakewise.interfaces import BodyState, Command, Goal, WakeModel
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.geometry import Pose, matrix_from_quat, quat_conjugate, quat_multiply, rotvec_from_quat
+from wakewise.core.interfaces import BodyState, Command, Goal, WakeModel
 from wakewise.planning.guard import Guard
 from wakewise.planning.planner import PlanModel, Planner, compile_plan
 from wakewise.planning.problem import PLAN_EVERY_S, Horizon, PlanProblem, PlanTerms, state_of
 from wakewise.planning.reference import between, reference_of
 from wakewise.planning.surroundings import Surroundings, around_target
-from wakewise.targets import Region
-from wakewise.vehicles import Vehicle
+from wakewise.robot.vehicles import Vehicle
+from wakewise.scene.targets import Region
 from wakewise.wake import FloorJet
 from wakewise.wake.gradients import Superposition
 
@@ -87,7 +87,7 @@ class PlanState:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlanningController:
-    """Plans, flies the plan, and falls back; implements `wakewise.interfaces.Controller`.
+    """Plans, flies the plan, and falls back; implements `wakewise.core.interfaces.Controller`.
 
     `guard.counts` tells how often it fell back, by kind.
     """

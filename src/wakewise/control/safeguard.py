@@ -28,14 +28,14 @@ from typing import Any
 import numpy as np
 
 from wakewise.allocation import Layout, least_thrusts
-from wakewise.arrays import Array
 from wakewise.control.loop import HOLD_S, vehicle_layout
 from wakewise.control.settings import ControlSettings
 from wakewise.control.tracker import Tracker, TrackerState, make_tracker
 from wakewise.control.watch import FULL
-from wakewise.errors import WakewiseError, is_strict
-from wakewise.interfaces import BodyState, Command, Controller, Goal
-from wakewise.vehicles import Vehicle
+from wakewise.core.arrays import Array
+from wakewise.core.errors import WakewiseError, is_strict
+from wakewise.core.interfaces import BodyState, Command, Controller, Goal
+from wakewise.robot.vehicles import Vehicle
 
 log = logging.getLogger(__name__)
 
@@ -64,7 +64,7 @@ class SafeState:
 
 @dataclass(kw_only=True, eq=False)
 class Safeguard:
-    """A method with a guard round each step; implements `wakewise.interfaces.Controller`.
+    """A method with a guard round each step; implements `wakewise.core.interfaces.Controller`.
 
     Parameters
     ----------
@@ -80,8 +80,8 @@ class Safeguard:
         How often each kind of trouble was met: "failed", "not finite", "limits", "late", "held", "afresh".
     strict : bool, optional
         Whether an exception that is no `WakewiseError`, or an answer of the wrong kind, is raised instead of counted:
-        both are mistakes of the program. By default as `wakewise.errors.is_strict` says, and never where `enforce` is
-        on: a vehicle in the water keeps its thrusts.
+        both are mistakes of the program. By default as `wakewise.core.errors.is_strict` says, and never where `enforce`
+        is on: a vehicle in the water keeps its thrusts.
     """
 
     inner: Controller[Any]

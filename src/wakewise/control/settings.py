@@ -7,9 +7,9 @@ from typing import Annotated
 from pydantic import Field
 
 from wakewise.control.levers import LeverSettings
-from wakewise.defaults import DISTURBANCE_WEIGHT, EFFORT_WEIGHT
+from wakewise.core.defaults import DISTURBANCE_WEIGHT, EFFORT_WEIGHT
+from wakewise.core.settings import Settings
 from wakewise.planning.problem import PlanSettings
-from wakewise.settings import Settings
 from wakewise.wake import WakeSettings
 from wakewise.wake.gradients import Superposition
 

@@ -9,15 +9,15 @@ from typing import Any, cast
 import numpy as np
 
 from wakewise.allocation import Layout
-from wakewise.arrays import Array
 from wakewise.control.carried import Carried, HandsOver
 from wakewise.control.meeting import meeting_view
 from wakewise.control.settings import ControlSettings
 from wakewise.control.thrift import sharer_of, weights_of
 from wakewise.control.watch import APART_S, EVERY_S, JUMP_EVERY_S, Watch
-from wakewise.interfaces import BodyState, Command, Controller, Goal, WakeModel
-from wakewise.targets import Region
-from wakewise.vehicles import Vehicle
+from wakewise.core.arrays import Array
+from wakewise.core.interfaces import BodyState, Command, Controller, Goal, WakeModel
+from wakewise.robot.vehicles import Vehicle
+from wakewise.scene.targets import Region
 from wakewise.wake.view import Seen, WakeView
 
 
@@ -38,7 +38,8 @@ class SpareState:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Respared:
-    """The wrench of another controller, made with the gentlest thrusts; implements `wakewise.interfaces.Controller`.
+    """The wrench of another controller, made with the gentlest thrusts; implements
+    `wakewise.core.interfaces.Controller`.
 
     The motion is the other's; what its plan does not know (jets that meet, the bed) only moves spare thrusts, by the
     exact allocator, so it can neither slow the plan nor make it swing. Where jets go is looked up `EVERY_S`, as often

@@ -14,9 +14,9 @@ from functools import lru_cache
 import numpy as np
 from scipy.linalg import expm
 
-from wakewise.arrays import Array
-from wakewise.errors import InputError
-from wakewise.vehicles import Vehicle, compile_body, restoring_wrench
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.robot.vehicles import Vehicle, compile_body, restoring_wrench
 
 GAIN_MARGIN = 2.0
 """Least factor (6 dB) by which the loop's gain may be wrong, up or down, before it is unstable."""

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from wakewise.allocation import Layout
-from wakewise.arrays import Array, freeze
 from wakewise.control.carried import HandsOver
-from wakewise.interfaces import BodyState, Command, Controller, Goal
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.interfaces import BodyState, Command, Controller, Goal
 
 FADE_S = 0.5
 """Time constant of the fading: a thruster's lag five times over, a quarter of the planner's horizon."""
@@ -41,7 +41,7 @@ class SwitchState:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Switched:
-    """One of several methods, as `wanted` says at each step; implements `wakewise.interfaces.Controller`.
+    """One of several methods, as `wanted` says at each step; implements `wakewise.core.interfaces.Controller`.
 
     Parameters
     ----------

@@ -33,10 +33,10 @@ from wakewise.allocation import (
     worthiest,
 )
 from wakewise.allocation.reach import within_limits
-from wakewise.arrays import Array
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
-from wakewise.thrusters import electrical_power_W
-from wakewise.vehicles import Vehicle
+from wakewise.core.arrays import Array
+from wakewise.robot.thrusters import electrical_power_W
+from wakewise.robot.vehicles import Vehicle
 from wakewise.wake.view import Seen
 
 KEPT = 0.95

@@ -21,17 +21,17 @@ from itertools import product
 import numpy as np
 
 from wakewise.allocation.allocate import Weights, gentle_allocation
-from wakewise.arrays import Array
 from wakewise.control.levers import with_bed_points
 from wakewise.control.loop import vehicle_layout
 from wakewise.control.settings import ControlSettings
-from wakewise.errors import InputError
-from wakewise.geometry import Pose
-from wakewise.interfaces import WakeModel
-from wakewise.physics import GRAVITY_M_S2, TRIM_WATER_KG_M3
-from wakewise.targets import Region
-from wakewise.vehicles import Vehicle, compile_body, restoring_wrench
-from wakewise.vehicles.ballast import ballasted, net_buoyancy_N
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import WakeModel
+from wakewise.core.physics import GRAVITY_M_S2, TRIM_WATER_KG_M3
+from wakewise.robot.vehicles import Vehicle, compile_body, restoring_wrench
+from wakewise.robot.vehicles.ballast import ballasted, net_buoyancy_N
+from wakewise.scene.targets import Region
 from wakewise.wake.view import WakeView
 
 __all__ = ["TrimAdvice", "TrimRow", "ballasted", "net_buoyancy_N", "trim_advice"]

@@ -6,10 +6,10 @@ from typing import Any
 
 from wakewise.control.receding import planning_controller
 from wakewise.control.settings import ControlSettings
-from wakewise.interfaces import Controller, WakeModel
+from wakewise.core.interfaces import Controller, WakeModel
 from wakewise.planning import Surroundings
-from wakewise.targets import Region
-from wakewise.vehicles import Vehicle
+from wakewise.robot.vehicles import Vehicle
+from wakewise.scene.targets import Region
 from wakewise.wake import free_jet
 
 FILTER_S = 0.77

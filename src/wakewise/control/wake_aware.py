@@ -15,11 +15,11 @@ from wakewise.control.poised import poised
 from wakewise.control.receding import planning_controller
 from wakewise.control.settings import ControlSettings
 from wakewise.control.spare import respared, watching
-from wakewise.interfaces import Controller, WakeModel
+from wakewise.core.interfaces import Controller, WakeModel
 from wakewise.planning import Surroundings
 from wakewise.planning.surroundings import around_target
-from wakewise.targets import Region
-from wakewise.vehicles import Vehicle
+from wakewise.robot.vehicles import Vehicle
+from wakewise.scene.targets import Region
 from wakewise.wake import bed_of, free_jet, wake_model
 
 

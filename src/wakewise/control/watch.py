@@ -19,10 +19,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wakewise.allocation import Allocation, Layout, Weights, disturbance_of, least_thrusts
-from wakewise.arrays import Array
 from wakewise.control.levers import LeverSettings
 from wakewise.control.thrift import Sharer
-from wakewise.interfaces import BodyState
+from wakewise.core.arrays import Array
+from wakewise.core.interfaces import BodyState
 from wakewise.wake.carried import Flow
 from wakewise.wake.view import Seen, WakeView
 

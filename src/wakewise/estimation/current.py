@@ -18,9 +18,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.compiled import njit
-from wakewise.vehicles.kernels import damping, rotate
+from wakewise.core.arrays import Array
+from wakewise.core.jit.compiled import njit
+from wakewise.robot.vehicles.kernels import damping, rotate
 
 KNOWN_M_S = 0.02
 """A current is told once it is known to this, one sigma per axis: half of what runs in a still tank or a calm bay."""
@@ -48,7 +48,7 @@ def current_of_force(packed: Array, q: Array, north_N: float, east_N: float) -> 
     Parameters
     ----------
     packed : ndarray
-        The vehicle's numbers (see `wakewise.vehicles.kernels`).
+        The vehicle's numbers (see `wakewise.robot.vehicles.kernels`).
     q : ndarray, shape (4,)
         Attitude q_WB at rest.
     north_N, east_N : float

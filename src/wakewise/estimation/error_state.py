@@ -38,15 +38,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import chdtri
 
-from wakewise.arrays import Array, freeze
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import BodyState, Measurement
 from wakewise.estimation.corrections import NOTHING, take_force, take_pose, take_sum
 from wakewise.estimation.current import told_current
 from wakewise.estimation.kernels import CURRENT, FORCE, GYRO, TURNING, unexplained
 from wakewise.estimation.prediction import TICK_S, advance
 from wakewise.estimation.settings import FilterSettings, Priors
-from wakewise.geometry import Pose
-from wakewise.interfaces import BodyState, Measurement
-from wakewise.vehicles import Vehicle, compile_body, with_each_drag
+from wakewise.robot.vehicles import Vehicle, compile_body, with_each_drag
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -95,7 +95,7 @@ class FilterState:
 
 
 class ErrorStateFilter:
-    """Error-state Kalman filter on a nominal vehicle; implements `wakewise.interfaces.Estimator`.
+    """Error-state Kalman filter on a nominal vehicle; implements `wakewise.core.interfaces.Estimator`.
 
     Its clock starts at `start_s` with `init` and must be that of the measurements' time stamps. While poses are
     missing the estimate runs on by the model and the inertial unit, held in depth by the pressure sensor, and its

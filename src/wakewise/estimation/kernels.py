@@ -13,11 +13,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.compiled import assign, njit
+from wakewise.core.arrays import Array
+from wakewise.core.jit.compiled import assign, njit
 from wakewise.estimation.resting import DRAG, at_rest, rest_effects
-from wakewise.vehicles.kernels import INVERSE, LINEAR, QUADRATIC, Three, damping, rate_kernel, rotate
-from wakewise.vehicles.runge_kutta import rk4_jacobian_kernel
+from wakewise.robot.vehicles.kernels import INVERSE, LINEAR, QUADRATIC, Three, damping, rate_kernel, rotate
+from wakewise.robot.vehicles.runge_kutta import rk4_jacobian_kernel
 
 _INSTANT_S = 1e-7
 TURNING, MOVING, FORCE, MOMENT, GYRO, FELT, CURRENT, INERTIA, GAINS = 9, 12, 12, 15, 18, 21, 24, 33, 39

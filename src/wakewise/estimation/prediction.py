@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.compiled import njit
+from wakewise.core.arrays import Array
+from wakewise.core.jit.compiled import njit
 from wakewise.estimation.kernels import CURRENT, FORCE, MOVING, moved
-from wakewise.vehicles.kernels import rotate
+from wakewise.robot.vehicles.kernels import rotate
 
 TICK_S = 1e-9
 """Times closer than this are one."""
@@ -40,7 +40,7 @@ def advance(
     Parameters
     ----------
     packed, allocation : ndarray, shape (20, 6) and (6, n)
-        The vehicle (see `wakewise.vehicles.kernels`).
+        The vehicle (see `wakewise.robot.vehicles.kernels`).
     lag_s : ndarray, shape (n,)
         Time constants of the thrusters, whose thrusts are `thrusts_N`, shape (n,).
     rest_q : ndarray, shape (4,)

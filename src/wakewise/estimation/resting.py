@@ -8,16 +8,16 @@ equations of motion comes only by how much either differs once the vehicle moves
 model, in variables in which hovering says nothing of the current.
 
 The current is `mean[25:28]`, `own` the vehicle's packed numbers with drag and inertia as believed (see
-`wakewise.vehicles.kernels`), `rest_q` the attitude.
+`wakewise.robot.vehicles.kernels`), `rest_q` the attitude.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.compiled import assign, njit
-from wakewise.vehicles.kernels import LINEAR, QUADRATIC, Three, coriolis, damping, rotate
+from wakewise.core.arrays import Array
+from wakewise.core.jit.compiled import assign, njit
+from wakewise.robot.vehicles.kernels import LINEAR, QUADRATIC, Three, coriolis, damping, rotate
 
 DRAG = 27
 """Where the error's drag begins; inertia comes six places later."""

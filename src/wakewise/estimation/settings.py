@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from pydantic import Field
 
-from wakewise.settings import Settings
+from wakewise.core.settings import Settings
 
 
 class FilterSettings(Settings):

@@ -21,8 +21,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING
 
+from wakewise.core.run_lock import sweep
 from wakewise.operation.exposures import ExposureRecord, packed, unpacked
-from wakewise.processes import sweep
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts

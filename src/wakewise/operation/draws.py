@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field, model_validator
 
-from wakewise.settings import Settings
+from wakewise.core.settings import Settings
 
 _STREAM = 23
 _SIGNIFICANT = 6  # digits that a drawn number keeps, so that a file holds what was flown

@@ -9,10 +9,10 @@ from typing import IO, Any
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.files import whole_file
-from wakewise.geometry import Pose
-from wakewise.interfaces import FlakeCloud, ScalarGrid
+from wakewise.core.arrays import Array
+from wakewise.core.files import whole_file
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import FlakeCloud, ScalarGrid
 
 STANCE = ("tips_m", "tip_speeds_m_s", "shift_m")
 """Fields of an exposure that tell of a target that yields."""
@@ -25,7 +25,7 @@ class ExposureRecord:
     `X_WC_before` are true poses of the camera before, oldest first, which automatic exposure goes by; else none.
     `flakes` are those that drift before the camera; None where nobody knows, so that they are drawn for each
     photograph.
-    Of a target that yields also, as in `wakewise.interfaces.Posture`, how it stood at its opening: `tips_m` and
+    Of a target that yields also, as in `wakewise.core.interfaces.Posture`, how it stood at its opening: `tips_m` and
     `tip_speeds_m_s` (k, 2), `shift_m` (2,).
     """
 

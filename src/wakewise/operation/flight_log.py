@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from wakewise.arrays import Array
-from wakewise.files import whole_file
+from wakewise.core.arrays import Array
+from wakewise.core.files import whole_file
 from wakewise.operation.exposures import ExposureRecord, packed, unpacked
 
 PARTS = ".flight"

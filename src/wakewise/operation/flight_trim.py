@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from wakewise.arrays import Array, BoolArray
 from wakewise.control.hover_trim import HoverTrim, hover_trim
-from wakewise.errors import InputError
+from wakewise.core.arrays import Array, BoolArray
+from wakewise.core.errors import InputError
 from wakewise.operation.parts import Parts
 from wakewise.operation.recorder import LOAD
 from wakewise.operation.scenario import read_scenario
-from wakewise.vehicles import Vehicle
+from wakewise.robot.vehicles import Vehicle
 
 LEARNING_S = 4.0
 """The estimator knows a vehicle's load that long after the start: from 1 N unknown to some hundredths."""

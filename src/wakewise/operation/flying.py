@@ -14,23 +14,23 @@ from typing import Any, TypedDict, cast
 
 import polars as pl
 
-from wakewise.checks import callable_of, finite_number, quoted, truth
-from wakewise.errors import InputError, StageError, WakewiseError
-from wakewise.evaluation import flight_figures
-from wakewise.extras import has
-from wakewise.imaging.settings import METERED
-from wakewise.interfaces import Plant, Witness, no_progress
-from wakewise.missions import SETTLING
+from wakewise.core.checks import callable_of, finite_number, quoted, truth
+from wakewise.core.errors import InputError, StageError, WakewiseError
+from wakewise.core.interfaces import Plant, Witness, no_progress
+from wakewise.core.jit.precompile import warm
+from wakewise.core.optional_dependencies import has
 from wakewise.operation.exposures import ExposureRecord
 from wakewise.operation.loop import Step, run_loop
 from wakewise.operation.parts import Parts
 from wakewise.operation.preflight import check_begin
 from wakewise.operation.recorder import FlightRecorder, Timetable
 from wakewise.operation.scenario import Scenario
-from wakewise.warming import warm
+from wakewise.scene.missions import SETTLING
+from wakewise.vision.evaluation import flight_figures
+from wakewise.vision.imaging.settings import METERED
 
 FLIGHT_JOBS = ("plan", "fly")
-"""What is compiled before a flight, if it is not yet (see `wakewise.warming`)."""
+"""What is compiled before a flight, if it is not yet (see `wakewise.core.jit.precompile`)."""
 
 WATER_EVERY_S = 0.1
 """How often the water is asked about; in between the last answer stands."""
@@ -44,7 +44,8 @@ _IN_WORDS = (
 
 
 class FlightFigures(TypedDict):
-    """What a flight is judged by; the unit is in the name, each is defined at `wakewise.evaluation.flight_figures`.
+    """What a flight is judged by; the unit is in the name, each is defined at
+    `wakewise.vision.evaluation.flight_figures`.
 
     None where it is not known: with no witness (at sea), before the first exposure, of a target that nothing moves.
     """

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wakewise.control import MAKERS, make_controller, safeguarded
-from wakewise.errors import WakewiseError, is_strict
-from wakewise.interfaces import BodyState, Command, Controller, Goal
-from wakewise.operation.pilots import PILOTS
+from wakewise.core.errors import WakewiseError, is_strict
+from wakewise.core.interfaces import BodyState, Command, Controller, Goal
+from wakewise.core.plugins import find, offered
+from wakewise.operation.pilot_makers import PILOTS
 from wakewise.operation.worlds.makers import WORLDS, flow_name
-from wakewise.plugins import find, offered
-from wakewise.targets import coral_kinds
+from wakewise.scene.targets import coral_kinds
 from wakewise.wake.models import OWN_MODELS, RIVALS
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ class GuardedState:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Guarded:
-    """A controller from outside, with `dp` at hand; implements `wakewise.interfaces.Controller`.
+    """A controller from outside, with `dp` at hand; implements `wakewise.core.interfaces.Controller`.
 
     A step that raises, or whose thrusts are not finite or not one per thruster, is flown by the backup instead and
     counted as a fallback with its reason. One that takes longer than its period is flown, since a simulated world

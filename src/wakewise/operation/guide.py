@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from wakewise.missions import Coverage, patches_of, reachable_views
+from wakewise.scene.missions import Coverage, patches_of, reachable_views
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts

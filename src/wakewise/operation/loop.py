@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.arrays import Array, NotFinite
-from wakewise.errors import StageError
-from wakewise.interfaces import (
+from wakewise.core.arrays import Array, NotFinite
+from wakewise.core.errors import StageError
+from wakewise.core.interfaces import (
     BodyState,
     Command,
     Controller,

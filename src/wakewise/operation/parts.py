@@ -11,17 +11,15 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self, TypeVar, overload
 
-from wakewise.arrays import Array
-from wakewise.checks import able, instance_of, quoted
 from wakewise.control import ControlSettings, in_pulses, make_controller
 from wakewise.control.settings import flown_by
-from wakewise.errors import InputError
+from wakewise.core.arrays import Array
+from wakewise.core.checks import able, instance_of, quoted
+from wakewise.core.errors import InputError
+from wakewise.core.interfaces import BodyState, Controller, Estimator, Pilot, WakeModel, World
 from wakewise.estimation import ErrorStateFilter
-from wakewise.importers import any_vehicle
-from wakewise.interfaces import BodyState, Controller, Estimator, Pilot, WakeModel, World
-from wakewise.missions import CameraAim, Route, TankBounds, aim_of, plan_route
 from wakewise.operation.foreign import described, from_outside, guarded
-from wakewise.operation.pilots import make_pilot
+from wakewise.operation.pilot_makers import make_pilot
 from wakewise.operation.preflight import Preflight, preflight
 from wakewise.operation.regions import region_of
 from wakewise.operation.seeds import Seeds
@@ -29,16 +27,18 @@ from wakewise.operation.surroundings import surroundings_of, tank_bounds
 from wakewise.operation.survey import found_target, surveyed_current
 from wakewise.operation.worlds.makers import make_world
 from wakewise.planning import Surroundings
-from wakewise.tank import build_ambient
-from wakewise.tank.swaying import DRAG, Loose, Yielding
-from wakewise.targets import Region, Sway, Target, find_target
-from wakewise.vehicles import Vehicle
-from wakewise.vehicles.ballast import with_blocks
+from wakewise.robot.importers import any_vehicle
+from wakewise.robot.vehicles import Vehicle
+from wakewise.robot.vehicles.ballast import with_blocks
+from wakewise.scene.missions import CameraAim, Route, TankBounds, aim_of, plan_route
+from wakewise.scene.targets import Region, Sway, Target, find_target
+from wakewise.simulation.tank import build_ambient
+from wakewise.simulation.tank.swaying import DRAG, Loose, Yielding
 from wakewise.wake import wake_model
 
 if TYPE_CHECKING:
-    from wakewise.imaging import LensCamera, PinholeCamera, Scene
     from wakewise.operation.scenario import Scenario
+    from wakewise.vision.imaging import LensCamera, PinholeCamera, Scene
 
 T = TypeVar("T")
 
@@ -323,7 +323,7 @@ class Parts:
     @cached_property
     def scene(self) -> Scene:
         """The target on its bed, textured, as the camera finds it."""
-        from wakewise.imaging import Panels, Scene
+        from wakewise.vision.imaging import Panels, Scene
 
         length, width, _ = self.scenario.tank.size_m
         return Scene.build(self.target, self.scenario.target.seed, panels=Panels.over_tank(length, width))
@@ -350,7 +350,7 @@ _METHODS: dict[str, tuple[str, ...]] = {
     "estimator": ("init", "step"),
     "world": ("begin",),
 }
-"""What a part of a kind that is a Protocol must have at least (see `wakewise.interfaces`)."""
+"""What a part of a kind that is a Protocol must have at least (see `wakewise.core.interfaces`)."""
 
 
 def fits(name: str, given: object) -> None:

@@ -15,16 +15,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from wakewise.arrays import Array
-from wakewise.files import whole_file, write_text
-from wakewise.geometry import Pose
-from wakewise.imaging import Scene, SiltOptics, calibrate, photograph
-from wakewise.interfaces import no_progress
+from wakewise.core.arrays import Array
+from wakewise.core.files import whole_file, write_text
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import no_progress
 from wakewise.operation.exposures import ExposureRecord, read_exposures
 from wakewise.operation.parts import Parts
 from wakewise.operation.scenario import Scenario
 from wakewise.operation.survey import known_calibration
-from wakewise.targets import turned_normals
+from wakewise.scene.targets import turned_normals
+from wakewise.vision.imaging import Scene, SiltOptics, calibrate, photograph
 
 SMEAR_PX = 0.5
 """Way of the fastest tip across the picture from one scene of an exposure to the next."""

@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wakewise.errors import InputError
-from wakewise.missions import check_clearance, check_tilt
+from wakewise.core.errors import InputError
 from wakewise.operation.surroundings import surroundings_of
 from wakewise.operation.switches import idle_switches
 from wakewise.planning import check_start, state_of
-from wakewise.tank import Holding, holding, tank_ambient
-from wakewise.tank.preflight import check_fit
-from wakewise.tank.swaying import check_loose, check_sway
-from wakewise.vehicles import possible_drags, with_drag
+from wakewise.robot.vehicles import possible_drags, with_drag
+from wakewise.scene.missions import check_clearance, check_tilt
+from wakewise.simulation.tank import Holding, holding, tank_ambient
+from wakewise.simulation.tank.preflight import check_fit
+from wakewise.simulation.tank.swaying import check_loose, check_sway
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
-    from wakewise.vehicles import Vehicle
+    from wakewise.robot.vehicles import Vehicle
 
 log = logging.getLogger(__name__)
 
@@ -83,7 +83,7 @@ def check_target(parts: Parts, looks: int = 200) -> None:
     Raises
     ------
     InputError
-        See `wakewise.tank.swaying.check_sway` and `check_loose`.
+        See `wakewise.simulation.tank.swaying.check_sway` and `check_loose`.
     """
     yielding, tank, target = parts.yielding, parts.scenario.tank, parts.target
     if yielding is None:
@@ -101,7 +101,8 @@ def check_target(parts: Parts, looks: int = 200) -> None:
 def check_way(parts: Parts) -> None:
     """Refuse a start from which no plan can be good, and a route through a stated obstacle.
 
-    How near the route comes to the target itself is for `wakewise.missions.check_clearance`, which knows its mesh.
+    How near the route comes to the target itself is for `wakewise.scene.missions.check_clearance`, which knows its
+    mesh.
 
     Raises
     ------

@@ -16,20 +16,20 @@ from typing import Protocol
 import numpy as np
 import polars as pl
 
-from wakewise.arrays import Array
-from wakewise.files import whole_file
-from wakewise.geometry import Pose, quat_integrate
-from wakewise.imaging.settings import METERED_EVERY_S
-from wakewise.interfaces import BodyState, FlakeCloud, Posture, WaterTruth, Witness
+from wakewise.core.arrays import Array
+from wakewise.core.files import whole_file
+from wakewise.core.geometry import Pose, quat_integrate
+from wakewise.core.interfaces import BodyState, FlakeCloud, Posture, WaterTruth, Witness
 from wakewise.operation.exposures import STANCE, ExposureRecord, write_exposures
 from wakewise.operation.flight_log import FlightLog, steps_of, timings_of
 from wakewise.operation.loop import Step
-from wakewise.vehicles.tilt import TiltJoint
+from wakewise.robot.vehicles.tilt import TiltJoint
+from wakewise.vision.imaging.settings import METERED_EVERY_S
 
 _STATE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "u_m_s", "v_m_s", "w_m_s", "p_rad_s", "q_rad_s", "r_rad_s")
 _WRENCH = ("wrench_X_N", "wrench_Y_N", "wrench_Z_N", "wrench_K_Nm", "wrench_M_Nm", "wrench_N_Nm")
 LOAD = ("load_X_N", "load_Y_N", "load_Z_N", "load_K_Nm", "load_M_Nm", "load_N_Nm")
-"""What the estimator says that pulls at the vehicle, in B (see `wakewise.interfaces.BodyState`)."""
+"""What the estimator says that pulls at the vehicle, in B (see `wakewise.core.interfaces.BodyState`)."""
 _WATER = tuple(figure.name for figure in fields(WaterTruth))
 _POSTURE = (
     "sway_m", "sway_peak_m", "sway_x_m", "sway_y_m", "sway_z_m", "target_stress_Pa", "shifted_m", "sway_wash_m",
@@ -39,7 +39,7 @@ _POSTURE = (
 def step_columns(thrusters: int, yields: bool = False) -> list[str]:
     """Names of the numeric columns of steps.parquet, in order, for a vehicle with this many thrusters.
 
-    Those of a target that `yields` (see `wakewise.interfaces.Posture`) come last.
+    Those of a target that `yields` (see `wakewise.core.interfaces.Posture`) come last.
     """
     return [
         "time_s",

@@ -8,7 +8,7 @@ from threading import Lock
 import numpy as np
 
 from wakewise.operation.seeds import Seeds
-from wakewise.targets import Region, Target, delicacy, sample_region
+from wakewise.scene.targets import Region, Target, delicacy, sample_region
 
 MOST_KEPT = 16
 """Regions that are kept, the last ones asked for: 300 points are 12 kB."""

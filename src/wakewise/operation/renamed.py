@@ -107,7 +107,7 @@ RENAMED: Mapping[str, str] = {
 """Dotted names of older scenarios, and the fields that say the same now."""
 
 GONE: Mapping[str, str] = {
-    "tank.background_length_m": f"{_CONSTANT} (wakewise.tank.settings)",
+    "tank.background_length_m": f"{_CONSTANT} (wakewise.simulation.tank.settings)",
     **dict.fromkeys((f"control.levers.{name}" for name in ("quiet", "quiet_gain", "quiet_lead_s")), _EVIDENCE),
     **dict.fromkeys((f"control.plan.{name}" for name in ("quiet_gain", "travel", "persistence")), _EVIDENCE),
     "control.levers.level_deg": "gone, 4 % for a camera 30 mm off its place (docs/decisions/0014)",
@@ -152,7 +152,7 @@ GONE: Mapping[str, str] = {
     ),
     **dict.fromkeys(
         (f"tank.{name}" for name in ("plant_step_s", "max_parcels", "max_silt_particles")),
-        f"{_CONSTANT} (wakewise.tank.settings)",
+        f"{_CONSTANT} (wakewise.simulation.tank.settings)",
     ),
     **dict.fromkeys(
         (
@@ -166,7 +166,7 @@ GONE: Mapping[str, str] = {
                 "read_noise_e",
             ]
         ),
-        f"{_CONSTANT} (wakewise.imaging.settings)",
+        f"{_CONSTANT} (wakewise.vision.imaging.settings)",
     ),
     **dict.fromkeys(
         (
@@ -182,7 +182,7 @@ GONE: Mapping[str, str] = {
                 "random_seed",
             ]
         ),
-        f"{_CONSTANT} (wakewise.reconstruction)",
+        f"{_CONSTANT} (wakewise.vision.reconstruction)",
     ),
 }
 """Dotted names of older scenarios that nothing says any more, and why."""

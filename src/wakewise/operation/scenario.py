@@ -10,28 +10,28 @@ from typing import TYPE_CHECKING, Any
 import yaml
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
 
-from wakewise.checks import path_of, quoted
 from wakewise.control import MAKERS, ControlSettings
-from wakewise.errors import InputError
+from wakewise.core.checks import path_of, quoted
+from wakewise.core.errors import InputError
+from wakewise.core.files import not_a_name, write_text
+from wakewise.core.plugins import names
+from wakewise.core.safe_yaml import YamlError, read_yaml, text_of
+from wakewise.core.settings import Seed, Settings, describe_faults, guess
 from wakewise.estimation import FilterSettings
-from wakewise.files import not_a_name, write_text
-from wakewise.imaging import ImagingSettings
-from wakewise.imaging.settings import CAMERAS
-from wakewise.missions import MissionSettings
 from wakewise.operation.draws import Draw, values_of
-from wakewise.operation.pilots import PILOTS
+from wakewise.operation.pilot_makers import PILOTS
 from wakewise.operation.renamed import became
 from wakewise.operation.survey import SurveySettings
 from wakewise.operation.target_settings import TargetSettings
 from wakewise.operation.worlds.library import load_world, own_file, world_names
 from wakewise.operation.worlds.makers import WORLDS
-from wakewise.plugins import names
-from wakewise.reconstruction import ReconstructionSettings
-from wakewise.settings import Seed, Settings, describe_faults, guess
-from wakewise.tank import TankSettings
-from wakewise.tank.beds import SILTS
-from wakewise.vehicles.ballast import Block
-from wakewise.yaml_text import YamlError, read_yaml, text_of
+from wakewise.robot.vehicles.ballast import Block
+from wakewise.scene.missions import MissionSettings
+from wakewise.simulation.tank import TankSettings
+from wakewise.simulation.tank.beds import SILTS
+from wakewise.vision.imaging import ImagingSettings
+from wakewise.vision.imaging.settings import CAMERAS
+from wakewise.vision.reconstruction import ReconstructionSettings
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wakewise.missions import TankBounds
 from wakewise.planning import Surroundings, covering_spheres
-from wakewise.targets import Target
+from wakewise.scene.missions import TankBounds
+from wakewise.scene.targets import Target
 
 if TYPE_CHECKING:
     from wakewise.operation.scenario import Scenario

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import Field
 
-from wakewise.arrays import Array
-from wakewise.interfaces import Current
-from wakewise.settings import Settings
-from wakewise.targets import Target
+from wakewise.core.arrays import Array
+from wakewise.core.interfaces import Current
+from wakewise.core.settings import Settings
+from wakewise.scene.targets import Target
 
 if TYPE_CHECKING:
-    from wakewise.imaging import Calibration
+    from wakewise.vision.imaging import Calibration
 
 CURRENT_DEG = 15.0
 """Error of the surveyed current's direction, one sigma: what a streamer's swing and a compass beside thrusters leave

@@ -14,7 +14,7 @@ from wakewise.planning import PlanSettings
 
 if TYPE_CHECKING:
     from wakewise.operation.scenario import Scenario
-    from wakewise.vehicles import Vehicle
+    from wakewise.robot.vehicles import Vehicle
 
 PLANNING = frozenset({"pseudo-inverse", "unaware", "smooth", "linear", "wake-aware"})
 """Our methods that plan."""

@@ -7,8 +7,8 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from wakewise.settings import Seed, Settings
-from wakewise.targets import TISSUES, Tissue, coral_kinds, is_mesh_file
+from wakewise.core.settings import Seed, Settings
+from wakewise.scene.targets import TISSUES, Tissue, coral_kinds, is_mesh_file
 
 
 class LooseSettings(Settings):

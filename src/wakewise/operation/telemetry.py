@@ -9,7 +9,7 @@ import polars as pl
 from foxglove.channels import PoseInFrameChannel
 from foxglove.messages import Pose, PoseInFrame, Quaternion, Timestamp, Vector3
 
-from wakewise.files import whole_file
+from wakewise.core.files import whole_file
 
 _NS = 1_000_000_000
 

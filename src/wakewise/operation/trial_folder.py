@@ -10,13 +10,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wakewise.errors import EnvironmentFailure, InputError
-from wakewise.files import write_text
-from wakewise.geometry import Pose
+from wakewise.core.errors import EnvironmentFailure, InputError
+from wakewise.core.files import write_text
+from wakewise.core.geometry import Pose
 from wakewise.operation.foreign import is_ours
 from wakewise.operation.photography import photo_name
 from wakewise.operation.scenario import Scenario, differences, read_scenario, write_scenario
-from wakewise.targets import write_mesh
+from wakewise.scene.targets import write_mesh
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts

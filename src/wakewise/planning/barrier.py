@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.compiled import njit
+from wakewise.core.arrays import Array
+from wakewise.core.jit.compiled import njit
 
 ROUNDED = 0.05
 """Sine of the tilt within which the corner nearest to a plane changes: |c| is rounded to sqrt(c^2 + 0.05^2), which

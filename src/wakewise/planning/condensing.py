@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.compiled import assign, njit
+from wakewise.core.arrays import Array
+from wakewise.core.jit.compiled import assign, njit
 from wakewise.planning.kernels import RATE_N, RHO, W_CHANGE, W_EFFORT, W_TWIST
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}

@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.errors import InputError, WakewiseError, is_strict
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError, WakewiseError, is_strict
 from wakewise.planning.planner import Planner
 from wakewise.planning.problem import CLEARANCE_M, Horizon, PlanProblem, shifted
 from wakewise.planning.surroundings import Surroundings
-from wakewise.targets import Region
-from wakewise.vehicles import Vehicle
+from wakewise.robot.vehicles import Vehicle
+from wakewise.scene.targets import Region
 
 log = logging.getLogger(__name__)
 
@@ -59,7 +59,7 @@ class Guard:
         flown, so that the same seed gives the same flight whether or not the machine was busy or had to compile.
     strict : bool, optional
         Whether an exception that is no `WakewiseError`, a mistake of the program, is raised instead of counted. By
-        default as `wakewise.errors.is_strict` says, and never where `enforce` is on.
+        default as `wakewise.core.errors.is_strict` says, and never where `enforce` is on.
     """
 
     planner: Planner

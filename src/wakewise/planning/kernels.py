@@ -2,7 +2,7 @@
 
 Commands are the only unknowns (single shooting), so every set of commands within limits is a plan that the vehicle's
 model can fly. Errors of state are (position in W, rotation vector in B, twist in B), as in
-`wakewise.vehicles.jacobians`.
+`wakewise.robot.vehicles.jacobians`.
 
 Thruster lag, tau T' = u - T, is exact per stage: with a = exp(-h / tau) and b = (1 - a) tau / h,
 
@@ -17,10 +17,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.compiled import assign, njit
+from wakewise.core.arrays import Array
+from wakewise.core.jit.compiled import assign, njit
 from wakewise.planning.barrier import add_barrier, least_gap
-from wakewise.vehicles.runge_kutta import rk4_jacobian_kernel, rk4_kernel
+from wakewise.robot.vehicles.runge_kutta import rk4_jacobian_kernel, rk4_kernel
 from wakewise.wake.plan_disturbance import stage_disturbance
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from wakewise.geometry import Pose
-from wakewise.interfaces import WakeModel
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import WakeModel
 from wakewise.planning.kernels import PlanWork
 from wakewise.planning.problem import SMOOTH_N, PlanTerms
-from wakewise.targets import Region
-from wakewise.vehicles import Vehicle
+from wakewise.robot.vehicles import Vehicle
+from wakewise.scene.targets import Region
 from wakewise.wake.numeric import NumericWake, thinned
 
 

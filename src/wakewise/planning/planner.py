@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from wakewise.allocation.allocate import Layout, Weights, compile_layout, gentle_allocation
-from wakewise.arrays import Array
-from wakewise.errors import InputError
-from wakewise.geometry import Pose
-from wakewise.interfaces import WakeModel
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import WakeModel
 from wakewise.planning import kernels
 from wakewise.planning.condensing import add_commands, add_rate_gradient, condense, condensed_room, motion_gradient
 from wakewise.planning.kernels import CLOSEST, RATE_N, W_DISTURBANCE, PlanCase, PlanTable, horizon, plan_work, set_reach
@@ -37,8 +37,8 @@ from wakewise.planning.problem import (
 )
 from wakewise.planning.qp import BoxQP
 from wakewise.planning.surroundings import Surroundings
-from wakewise.targets import Region
-from wakewise.vehicles import Vehicle, compile_body
+from wakewise.robot.vehicles import Vehicle, compile_body
+from wakewise.scene.targets import Region
 from wakewise.wake import PaperJet, gram
 from wakewise.wake.numeric import NumericWake
 from wakewise.wake.plan_disturbance import wake_scratch

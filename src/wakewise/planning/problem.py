@@ -18,12 +18,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from pydantic import Field
 
-from wakewise.arrays import Array, freeze
-from wakewise.checks import one_of
-from wakewise.defaults import DISTURBANCE_WEIGHT, EFFORT_WEIGHT
-from wakewise.errors import InputError
-from wakewise.interfaces import BodyState
-from wakewise.settings import Settings
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.checks import one_of
+from wakewise.core.defaults import DISTURBANCE_WEIGHT, EFFORT_WEIGHT
+from wakewise.core.errors import InputError
+from wakewise.core.interfaces import BodyState
+from wakewise.core.settings import Settings
 from wakewise.wake.gradients import SUPERPOSITIONS, Superposition
 
 PLAN_EVERY_S = 0.1

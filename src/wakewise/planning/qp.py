@@ -20,8 +20,8 @@ import daqp
 import numpy as np
 import piqp
 
-from wakewise.arrays import Array
-from wakewise.compiled import njit
+from wakewise.core.arrays import Array
+from wakewise.core.jit.compiled import njit
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}
 MANY_ACTIVE = 60

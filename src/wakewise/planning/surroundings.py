@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wakewise.arrays import Array, freeze
-from wakewise.errors import InputError
-from wakewise.targets import Region
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.errors import InputError
+from wakewise.scene.targets import Region
 
 TANK_FACES = ("the south wall", "the west wall", "the water surface", "the north wall", "the east wall", "the floor")
 """Names of the planes of `Surroundings.tank`, in their order."""

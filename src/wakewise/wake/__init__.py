@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from wakewise.doors import lazy_door
+from wakewise.core.lazy_imports import lazy_door
 
 if TYPE_CHECKING:
     from wakewise.wake.beds import bed_of, free_jet

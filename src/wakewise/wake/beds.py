@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wakewise.interfaces import WakeModel
+from wakewise.core.interfaces import WakeModel
 from wakewise.wake.floor import FloorJet
 from wakewise.wake.learned import LearnedWake
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from wakewise.arrays import Array, BoolArray, IntArray
-from wakewise.errors import InputError
+from wakewise.core.arrays import Array, BoolArray, IntArray
+from wakewise.core.errors import InputError
 from wakewise.wake.families import Family
 from wakewise.wake.samples import JetRegion, JetSamples
 from wakewise.wake.scores import Scores, score

@@ -37,8 +37,8 @@ from typing import cast
 
 import numpy as np
 
-from wakewise.arrays import Array, freeze
-from wakewise.compiled import njit
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.jit.compiled import njit
 from wakewise.wake.kernels import ROUND_JET, as_tuple, own_constants, section_of, speed_and_slope
 
 FOLLOWED_S = 40.0

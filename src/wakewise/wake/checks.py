@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.errors import InputError
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
 
 
 def same_sizes(points: Array, weights: Array, origins: Array, axes: Array, areas: Array) -> None:

@@ -26,11 +26,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wakewise.arrays import Array, frozen
-from wakewise.checks import one_of, quoted
-from wakewise.compiled import njit
-from wakewise.errors import InputError
-from wakewise.interfaces import WakeModel
+from wakewise.core.arrays import Array, frozen
+from wakewise.core.checks import one_of, quoted
+from wakewise.core.errors import InputError
+from wakewise.core.interfaces import WakeModel
+from wakewise.core.jit.compiled import njit
 from wakewise.wake.beds import free_jet
 from wakewise.wake.carried import Flow, plumes
 from wakewise.wake.checks import explain, same_sizes

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.errors import InputError
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
 from wakewise.wake.jets import AxialJet
 from wakewise.wake.models import ModelName, WakeSettings, wake_model
 

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from wakewise.errors import InputError
-from wakewise.files import write_text
-from wakewise.settings import describe_faults
+from wakewise.core.errors import InputError
+from wakewise.core.files import write_text
+from wakewise.core.safe_yaml import YamlError, read_yaml
+from wakewise.core.settings import describe_faults
 from wakewise.wake.calibration import Calibration
 from wakewise.wake.models import WakeSettings
 from wakewise.wake.momentum import MomentumLaw
-from wakewise.yaml_text import YamlError, read_yaml
 
 
 def fit_yaml(fit: Calibration, source: str, disk_diameter_m: float, law: MomentumLaw | None = None) -> str:

@@ -26,10 +26,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.compiled import njit
-from wakewise.errors import InputError
-from wakewise.physics import FRESH_WATER_KG_M3
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.core.jit.compiled import njit
+from wakewise.core.physics import FRESH_WATER_KG_M3
 from wakewise.wake.jets import AxialJet, RoundJet
 from wakewise.wake.sums import FAST, fill_rows, pose_slopes
 
@@ -44,7 +44,7 @@ ROUND_DECAY = RoundJet().decay
 
 @dataclass(frozen=True, kw_only=True)
 class FloorJet:
-    """A free jet and the wall jet that it becomes on the bed; implements `wakewise.interfaces.WakeModel`.
+    """A free jet and the wall jet that it becomes on the bed; implements `wakewise.core.interfaces.WakeModel`.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class FloorJet:
         return np.array([self.bed_z_m, WALL_SPEED / np.sqrt(self.water_density_kg_m3)])
 
     def unit_velocity(self, points_W_m: Array, origins_W_m: Array, directions_W: Array, area_m2: Array) -> Array:
-        """Velocity per square root of newton, shape (m, n, 3): see `wakewise.interfaces.WakeModel`."""
+        """Velocity per square root of newton, shape (m, n, 3): see `wakewise.core.interfaces.WakeModel`."""
         velocity = self.jet.unit_velocity(points_W_m, origins_W_m, directions_W, area_m2)
         directions = np.ascontiguousarray(directions_W, dtype=np.float64)
         return np.asarray(velocity + wall_velocity(points_W_m, origins_W_m, directions, area_m2, self.numbers))

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wakewise.compiled import njit
+from wakewise.core.jit.compiled import njit
 from wakewise.wake.carried import FOLLOWED_S, OPPOSED, SECTIONS, excess_speed
 from wakewise.wake.floor import HALF_THICKNESS, LEAST_SINE, ROUND_DECAY, WALL_SPEED
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wakewise.compiled import assign, njit
+from wakewise.core.jit.compiled import assign, njit
 from wakewise.wake.floor import fill_velocities
 from wakewise.wake.kernels import as_tuple, own_constants
 from wakewise.wake.stage import thrust_roots, turn_gradient, turn_hessian

@@ -27,11 +27,11 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wakewise.arrays import Array
-from wakewise.checks import one_of
-from wakewise.errors import InputError
-from wakewise.geometry import Pose
-from wakewise.interfaces import WakeModel
+from wakewise.core.arrays import Array
+from wakewise.core.checks import one_of
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import WakeModel
 from wakewise.wake.checks import explain, same_sizes
 from wakewise.wake.floor import FloorJet
 from wakewise.wake.floor_sums import floor_gram_sum, floor_stage_sum

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wakewise.arrays import Array
-from wakewise.errors import InputError
-from wakewise.physics import FRESH_WATER_KG_M3
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.core.physics import FRESH_WATER_KG_M3
 from wakewise.wake import kernels
 
 
@@ -91,7 +91,7 @@ class AxialJet(ABC):
         return speed
 
     def unit_velocity(self, points_W_m: Array, origins_W_m: Array, directions_W: Array, area_m2: Array) -> Array:
-        """Velocity per square root of newton, shape (m, n, 3): see `wakewise.interfaces.WakeModel`."""
+        """Velocity per square root of newton, shape (m, n, 3): see `wakewise.core.interfaces.WakeModel`."""
         directions = np.asarray(directions_W, dtype=np.float64)
         speed = self.split_speed(points_W_m, origins_W_m, -directions, area_m2)[:, : len(directions)]
         return np.asarray(speed.T[:, :, None] * directions[:, None, :])

@@ -1,6 +1,6 @@
 """`learned`: a wake model that was trained on the tank's parcels and the lattice, as a rival of the laws of jets.
 
-It knows of the tank what its training draws say (see `wakewise.studies.learned_wake`), so in the tank it is *circular
+It knows of the tank what its training draws say (see `wakewise_paper.learned_wake`), so in the tank it is *circular
 to that degree*; none of our own models is. It gives the radial part and the slow inflow towards a jet's sides, which
 they leave out. As a `WakeModel` a thruster has always pushed as it does now; `LearnedWake.velocity` takes a history.
 """
@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.errors import InputError
-from wakewise.files import whole_file
-from wakewise.physics import FRESH_WATER_KG_M3
-from wakewise.sizes import check_arrays
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.core.files import whole_file
+from wakewise.core.physics import FRESH_WATER_KG_M3
+from wakewise.core.sizes import check_arrays
 from wakewise.wake.floor import WALL_SPEED, wall_velocity
 from wakewise.wake.network import (
     EDGES,
@@ -72,7 +72,7 @@ class LearnedWake:
         return LearnedWake(network=self.network, water_density_kg_m3=self.water_density_kg_m3)
 
     def unit_velocity(self, points_W_m: Array, origins_W_m: Array, directions_W: Array, area_m2: Array) -> Array:
-        """Velocity per square root of newton, shape (m, n, 3): see `wakewise.interfaces.WakeModel`.
+        """Velocity per square root of newton, shape (m, n, 3): see `wakewise.core.interfaces.WakeModel`.
 
         f at an even push is a function of place alone: it is looked up in a table, bilinear.
         """

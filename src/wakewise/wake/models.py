@@ -25,11 +25,11 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from wakewise.checks import quoted
-from wakewise.errors import InputError
-from wakewise.interfaces import WakeModel
-from wakewise.plugins import find, names, offered
-from wakewise.settings import Settings
+from wakewise.core.checks import quoted
+from wakewise.core.errors import InputError
+from wakewise.core.interfaces import WakeModel
+from wakewise.core.plugins import find, names, offered
+from wakewise.core.settings import Settings
 from wakewise.wake.cones import PaperJet, PowerJet
 from wakewise.wake.floor import FloorJet
 from wakewise.wake.jets import AxialJet, GaussianJet, RoundJet

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.errors import InputError
-from wakewise.physics import FRESH_WATER_KG_M3
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.core.physics import FRESH_WATER_KG_M3
 from wakewise.wake.calibration import calibrated_values
 from wakewise.wake.families import family
 from wakewise.wake.jets import AxialJet

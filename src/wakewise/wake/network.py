@@ -23,8 +23,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from wakewise.arrays import Array, freeze
-from wakewise.errors import InputError
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.errors import InputError
 
 EDGES = np.array([0.0, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0, 1.3, 1.7, 2.4, 3.5, 6.0])
 """Delays in t* between which the thrust is averaged: finer than a tenth of t* a jet's own front is blurred."""

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.errors import InputError
-from wakewise.geometry import Pose, quat_from_rotvec, quat_multiply
-from wakewise.interfaces import WakeModel
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose, quat_from_rotvec, quat_multiply
+from wakewise.core.interfaces import WakeModel
 from wakewise.wake.stage import smooth_root
 
 STEP_M, STEP_RAD = 1e-4, 1e-4

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wakewise.arrays import Array
-from wakewise.compiled import assign, njit
+from wakewise.core.arrays import Array
+from wakewise.core.jit.compiled import assign, njit
 from wakewise.wake.floor_sums import floor_stage_sum
 from wakewise.wake.kernels import FAST, ROUND_JET, as_tuple, fill_cored_jet, speed_and_slope
 from wakewise.wake.stage import smooth_root

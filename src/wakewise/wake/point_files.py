@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from wakewise.arrays import Array, BoolArray, IntArray
-from wakewise.errors import InputError
-from wakewise.physics import GRAVITY_M_S2
-from wakewise.yaml_text import YamlError, text_of
+from wakewise.core.arrays import Array, BoolArray, IntArray
+from wakewise.core.errors import InputError
+from wakewise.core.physics import GRAVITY_M_S2
+from wakewise.core.safe_yaml import YamlError, text_of
 
 COLUMNS: dict[str, str] = {
     "x_m": "along the jet from the disk's middle",

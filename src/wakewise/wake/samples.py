@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from wakewise.arrays import Array, BoolArray, freeze
-from wakewise.errors import InputError
+from wakewise.core.arrays import Array, BoolArray, freeze
+from wakewise.core.errors import InputError
 from wakewise.wake.point_files import COLUMNS, PointTable, read_point_table
 
 __all__ = ["COLUMNS", "CORE", "FAR", "WAKE", "JetRegion", "JetSamples", "joined", "read_samples"]

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.arrays import Array, BoolArray
-from wakewise.interfaces import WakeModel
+from wakewise.core.arrays import Array, BoolArray
+from wakewise.core.interfaces import WakeModel
 from wakewise.wake.disturbance import unit_velocity
 from wakewise.wake.jets import AxialJet
 from wakewise.wake.samples import CORE, FAR, WAKE, JetSamples

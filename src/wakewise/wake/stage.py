@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wakewise.compiled import njit
+from wakewise.core.jit.compiled import njit
 from wakewise.wake.kernels import as_tuple, own_constants
 from wakewise.wake.sums import BLOCK, FAST, check_jets, dot, fill_rows, load_block, place, pose_slopes
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wakewise.compiled import njit
+from wakewise.core.jit.compiled import njit
 from wakewise.wake.kernels import as_tuple, own_constants, speed_and_slope
 
 BLOCK = 256

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wakewise.arrays import Array, frozen
-from wakewise.errors import InputError
-from wakewise.interfaces import WakeModel
+from wakewise.core.arrays import Array, frozen
+from wakewise.core.errors import InputError
+from wakewise.core.interfaces import WakeModel
 from wakewise.wake.cones import PaperJet, PowerJet
 from wakewise.wake.floor import FloorJet
 from wakewise.wake.jets import AxialJet

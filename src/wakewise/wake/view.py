@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
-from wakewise.arrays import Array, freeze
-from wakewise.checks import one_of
-from wakewise.compiled import njit
-from wakewise.errors import InputError
-from wakewise.geometry import Pose
-from wakewise.interfaces import WakeModel
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.checks import one_of
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import WakeModel
+from wakewise.core.jit.compiled import njit
 from wakewise.wake.beds import free_jet
 from wakewise.wake.carried import Flow
 from wakewise.wake.disturbance import astray, gram
@@ -21,8 +21,8 @@ from wakewise.wake.gradients import SUPERPOSITIONS, Superposition
 from wakewise.wake.jets import AxialJet, Law
 
 if TYPE_CHECKING:
-    from wakewise.targets import Region
-    from wakewise.vehicles import Vehicle
+    from wakewise.robot.vehicles import Vehicle
+    from wakewise.scene.targets import Region
 
 
 class Seen(NamedTuple):

@@ -4,12 +4,12 @@ import json
 
 import pytest
 
-from wakewise.cli.main import run
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
 from wakewise.operation import Scenario, load_scenario, read_scenario
 from wakewise.operation.scenario import dump_scenario
 from wakewise.operation.worlds.library import load_world, parse_world, world_names
 from wakewise.operation.worlds.makers import flow_name
+from wakewise.ui.cli.main import run
 
 
 @pytest.mark.parametrize("name", world_names())

@@ -14,10 +14,10 @@ from typing import Any
 
 from pydantic import Field, ValidationError, model_validator
 
-from wakewise.errors import InputError
+from wakewise.core.errors import InputError
+from wakewise.core.safe_yaml import read_yaml
+from wakewise.core.settings import Settings, describe_faults, guess
 from wakewise.operation.draws import Draw
-from wakewise.settings import Settings, describe_faults, guess
-from wakewise.yaml_text import read_yaml
 
 
 class WorldField(Settings):

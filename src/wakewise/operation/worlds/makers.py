@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wakewise.errors import InputError
-from wakewise.geometry import Pose, quat_from_rotvec, quat_multiply
-from wakewise.interfaces import BodyState, World
-from wakewise.operation.instant_water import InstantWorld, Jets, free_jet_field, lattice_jets, paper_jets
-from wakewise.operation.lattice_water import LatticeWorld, box_half_size_m
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose, quat_from_rotvec, quat_multiply
+from wakewise.core.interfaces import BodyState, World
+from wakewise.core.plugins import find
+from wakewise.operation.worlds.lattice_world import LatticeWorld, box_half_size_m
 from wakewise.operation.worlds.library import load_world, world_names
-from wakewise.plugins import find
-from wakewise.tank import TankWorld
-from wakewise.vehicles import Vehicle, perturbed, with_drag
+from wakewise.operation.worlds.wake_world import InstantWorld, Jets, free_jet_field, lattice_jets, paper_jets
+from wakewise.robot.vehicles import Vehicle, perturbed, with_drag
+from wakewise.simulation.tank import TankWorld
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts

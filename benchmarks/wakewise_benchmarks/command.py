@@ -1,0 +1,236 @@
+"""`wakewise bench`: speed and quality of one part, side by side with a peer."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from wakewise.ui.cli.commands import STUDIES, Command
+from wakewise.ui.cli.console import Bars, print_json, shown, write_page
+from wakewise.ui.cli.options import Json
+from wakewise_benchmarks.show_traps import show_traps
+from wakewise_paper.cli.bench_operator import show_operator
+from wakewise_paper.cli.bench_wash_reduction import show_gentle
+from wakewise_paper.cli.bench_worlds import show_worlds
+
+Name = Annotated[str, typer.Argument(help="Which bench, or all; without a name they are listed.", show_default=False)]
+Data = Annotated[
+    Path, typer.Option(help="Folder of reference data that some figures are held against.", envvar="WAKEWISE_DATA")
+]
+Seeds = Annotated[
+    int | None,
+    typer.Option(
+        help="gentle, operator, worlds: flights per method, seeds 1 to this; 3, 3 and 10 if not given.",
+        min=1,
+        max=1000,
+        show_default=False,
+    ),
+]
+Methods = Annotated[
+    str, typer.Option(help="gentle, worlds: methods, with commas between; all if not given.", show_default=False)
+]
+Worlds = Annotated[
+    str,
+    typer.Option(
+        help="operator, worlds: which, with commas between; operator flies those with trouble and a calm one, worlds "
+        "all of them, if not given.",
+        show_default=False,
+    ),
+]
+WTracks = Annotated[
+    str,
+    typer.Option(help="operator: weights, with commas between; 1,2,5,10,20 if not given.", show_default=False),
+]
+Models = Annotated[
+    int, typer.Option(help="worlds: seeds for which a whole scan is made and its model judged.", min=0, max=1000)
+]
+Scenarios = Annotated[
+    str,
+    typer.Option(
+        help="gentle: which, with commas between: orbit (both vehicles), orbit/paper, worlds, world/mud, paper (the "
+        "paper's own world); traps: by name; all if not given.",
+        show_default=False,
+    ),
+]
+Levers = Annotated[
+    str,
+    typer.Option(help="gentle: levers to switch, with commas between, or all; none if not given.", show_default=False),
+]
+Judge = Annotated[
+    int,
+    typer.Option(help="worlds: seeds flown in the lattice as well, minutes of a core each.", min=0, max=1000),
+]
+Bound = Annotated[
+    int,
+    typer.Option(
+        help="gentle: seeds for which the most is worked out that sharing thrusts out could gain, two minutes of a "
+        "core each; the whole is --methods dp,bow-rule,wake-aware --bound 3.",
+        min=0,
+        max=1000,
+    ),
+]
+Fresh = Annotated[
+    bool, typer.Option("--fresh", help="gentle, operator, worlds: fly anew what an earlier run has flown.")
+]
+Workers = Annotated[int, typer.Option(help="gentle, operator, worlds: processes that fly side by side.", min=1, max=64)]
+Store = Annotated[
+    Path | None,
+    typer.Option(
+        help="gentle, operator, worlds: folder that keeps flights; the cache if not given.", show_default=False
+    ),
+]
+Plot = Annotated[
+    Path | None,
+    typer.Option(help="gentle, operator: draw the figures into this file (.png, .svg).", show_default=False),
+]
+
+_SEEDS = {"gentle": 3, "operator": 3}
+"""Seeds of a bench that flies, if not given; 10 of the others."""
+
+
+_LASTS = {"gentle": "hours", "operator": "hours", "worlds": "hours"}
+"""About how long a bench runs on two free cores, where it is not minutes at most."""
+
+
+def bench(
+    name: Name = "",
+    data: Data = Path("../shared/data"),
+    seeds: Seeds = None,
+    methods: Methods = "",
+    scenarios: Scenarios = "",
+    levers: Levers = "",
+    worlds: Worlds = "",
+    w_tracks: WTracks = "",
+    models: Models = 1,
+    judge: Judge = 0,
+    bound: Bound = 0,
+    fresh: Fresh = False,
+    workers: Workers = 2,
+    store: Store = None,
+    plot: Plot = None,
+    json: Json = False,
+) -> None:
+    """Measure speed and quality of one part: thread CPU, median and p99 after warm-up.
+
+    A figure that needs reference data which is not there is null, with the reason in `why`. `gentle` flies all of its
+    scenarios and worlds for more than an hour on two free cores, some minutes with `--scenarios orbit/paper`; a run
+    that was stopped goes on where it was.
+    """
+    from wakewise.core.errors import STRICT, InputError
+    from wakewise.core.optional_dependencies import need
+    from wakewise.experiments.trials import BenchOptions
+    from wakewise_benchmarks import BENCHES, run_bench
+
+    if plot is not None and name not in ("gentle", "operator"):
+        raise InputError("--plot: only `wakewise bench gentle` and `wakewise bench operator` draw")
+    if plot is not None:
+        need("--plot", "reports")
+        if plot.suffix.lower() not in (".png", ".svg", ".pdf"):
+            raise InputError(f"--plot {plot}: ending '{plot.suffix}', allowed .png, .svg, .pdf")
+    os.environ.setdefault(STRICT, "1")  # a mistake of the program ends a measurement; a fallback is not measured
+    if not name:
+        _list(BENCHES, json)
+        return
+    names = sorted(BENCHES) if name == "all" else [name]
+    results: dict[str, Any] = {}
+    bars = Bars()
+    for each in names:
+        with bars.stage(f"bench {each}") as progress:
+            options = BenchOptions(
+                data=data if data.is_dir() else None,
+                progress=progress,
+                seeds=seeds or _SEEDS.get(each, 10),
+                methods=_listed(methods),
+                scenarios=_listed(scenarios),
+                levers=_listed(levers),
+                worlds=_listed(worlds),
+                w_tracks=_numbers("--w-tracks", w_tracks),
+                models=models,
+                judge=judge,
+                bound=bound,
+                fresh=fresh,
+                workers=workers,
+                store=store,
+            )
+            results[each] = run_bench(each, options)
+            if each == "operator":
+                from wakewise_paper.cli.bench_cockpit import add_cockpit
+
+                add_cockpit(results[each], options)
+    if plot is not None:
+        from wakewise_paper.reports.operator_study import draw_operator
+        from wakewise_paper.reports.wash_reduction import draw_gentle
+
+        draw = {"gentle": draw_gentle, "operator": draw_operator}[name]
+        write_page("plot", lambda: draw(results[name], plot))
+    if json:
+        print_json(results if name == "all" else results[name])
+        return
+    for each, result in results.items():
+        typer.echo(f"\n{each}: {BENCHES[each]}")
+        if each == "gentle":
+            show_gentle(result)
+        elif each == "operator":
+            show_operator(result)
+        elif each == "worlds":
+            show_worlds(result)
+        elif each == "traps":
+            show_traps(result)
+        else:
+            _show(result, "  ")
+
+
+def _list(benches: Mapping[str, str], json: bool) -> None:
+    """Say which benches there are and how long they take, and run none."""
+    lasts = {name: _LASTS.get(name, "minutes") for name in benches}
+    if json:
+        print_json({"benches": {name: {"what": what, "lasts": lasts[name]} for name, what in benches.items()}})
+        return
+    width = max(map(len, benches))
+    for name, what in sorted(benches.items()):
+        typer.echo(f"{name:<{width}}  {lasts[name]:<7}  {what}")
+    typer.echo("\nwakewise bench NAME runs one, wakewise bench all runs all of them, one after another: many hours")
+
+
+def _listed(text: str) -> tuple[str, ...] | None:
+    """Names between commas; None for none given."""
+    names = tuple(part.strip() for part in text.split(",") if part.strip())
+    return names or None
+
+
+def _numbers(option: str, text: str) -> tuple[float, ...] | None:
+    """Numbers between commas; None for none given.
+
+    Raises
+    ------
+    InputError
+        If one is not a number.
+    """
+    from wakewise.core.errors import InputError
+
+    found = []
+    for part in _listed(text) or ():
+        try:
+            found.append(float(part))
+        except ValueError:
+            raise InputError(f"{option}: '{part}' is not a number, such as 5 or 1,5,20") from None
+    return tuple(found) or None
+
+
+def _show(result: dict[str, Any], indent: str) -> None:
+    for key, value in result.items():
+        if isinstance(value, dict) and set(value) == {"median_us", "p99_us"}:
+            typer.echo(f"{indent}{key:<34}{value['median_us']:>10.1f} us   p99 {value['p99_us']:.1f} us")
+        elif isinstance(value, dict):
+            typer.echo(f"{indent}{key}")
+            _show(value, indent + "  ")
+        else:
+            typer.echo(f"{indent}{key:<34}{shown(value):>10}")
+
+
+COMMANDS = (Command(STUDIES, "bench", bench),)
+"""What this package adds to `wakewise`."""

@@ -1,0 +1,6 @@
+"""Commands that this package adds to `wakewise`: `wakewise link ...`, one module per command."""
+
+from wakewise.ui.cli.commands import REAL_VEHICLE, Command
+from wakewise_ardusub.cli import link
+
+COMMANDS = (Command(REAL_VEHICLE, "link", link.app),)

@@ -1,0 +1,176 @@
+"""`wakewise link meter`: beside a vehicle that dives, what its thrusters do and what gentler ones would have spared."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from wakewise.ui.cli.console import print_json
+from wakewise.ui.cli.options import Json
+from wakewise_ardusub.cli.link_points import Ahead, Points, WakeModelName, region_ahead, region_words
+
+if TYPE_CHECKING:
+    from wakewise_ardusub.vehicle_summary import Craft
+    from wakewise_ardusub.wash_meter.run import Work
+
+Connection = Annotated[
+    str | None,
+    typer.Option(
+        "--connection",
+        metavar="ENDS",
+        help="udpin:HOST:PORT, where the vehicle's router sends to; or udpout:HOST:PORT of a server that answers.",
+        show_default=False,
+    ),
+]
+Vehicle = Annotated[
+    str,
+    typer.Option("--vehicle", help="Library name or vehicle YAML file."),
+]
+Params = Annotated[
+    Path | None,
+    typer.Option(
+        "--params",
+        metavar="FILE",
+        help="The autopilot's parameters, as QGroundControl or `link log` writes them: channels and MOT_n_DIRECTION.",
+        show_default=False,
+    ),
+]
+Host = Annotated[
+    str,
+    typer.Option(
+        "--host", help="Address of the page. Any but this computer's own asks others for the token that is printed."
+    ),
+]
+NoToken = Annotated[
+    bool, typer.Option("--no-token", help="Let everybody look who reaches the page, as on a vehicle's own network.")
+]
+Port = Annotated[int, typer.Option("--port", help="Port of the page; 0 takes any that is free.", min=0, max=65535)]
+System = Annotated[
+    int | None,
+    typer.Option(
+        "--system",
+        min=1,
+        max=255,
+        help="MAVLink system id of the vehicle; the first with servo outputs if not given.",
+        show_default=False,
+    ),
+]
+Publish = Annotated[
+    bool,
+    typer.Option("--publish", help="Send WW_D and WW_SAVED as NAMED_VALUE_FLOAT, so that ground stations show them."),
+]
+Ask = Annotated[
+    bool, typer.Option("--ask", help="Ask the autopilot for SERVOn_FUNCTION and MOT_n_DIRECTION: it is read, not set.")
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", help="Folder for meter.csv and meter.json of the dive; none if not given.", show_default=False
+    ),
+]
+Write = Annotated[
+    Path | None,
+    typer.Option(
+        "--write",
+        metavar="FILE",
+        help="Write the vehicle as a craft file for the meter on a small computer, and end.",
+        show_default=False,
+    ),
+]
+
+
+def meter(
+    connection: Connection = None,
+    vehicle: Vehicle = "bluerov2-heavy",
+    ahead: Ahead = 0.4,
+    points: Points = None,
+    wake_model: WakeModelName = "jet",
+    params: Params = None,
+    port: Port = 8765,
+    host: Host = "127.0.0.1",
+    no_token: NoToken = False,
+    system: System = None,
+    publish: Publish = False,
+    ask: Ask = False,
+    out: Out = None,
+    write: Write = None,
+    json: Json = False,
+) -> None:
+    """Show live, in a page, what a vehicle's thrusters do to its target, and what gentler thrusts would have spared.
+
+    It listens and never commands the vehicle; without --publish and --ask it sends nothing at all (with udpout: a
+    heartbeat). Ctrl-C ends it.
+    """
+    from wakewise import wake
+    from wakewise.core.errors import InputError
+    from wakewise.core.optional_dependencies import need
+    from wakewise.robot.vehicles import load_vehicle
+    from wakewise_ardusub.link.parameters import read_parameter_file
+    from wakewise_ardusub.vehicle_summary import Craft
+    from wakewise_ardusub.wash_meter.settings import MeterSettings
+
+    chosen = load_vehicle(vehicle)
+    craft = Craft.of(chosen, wake.wake_model(wake_model))
+    if write is not None:
+        _write(write, craft)
+        return
+    need("wakewise link meter", "links", only=("pymavlink",))
+    if connection is None:
+        raise InputError("--connection: missing, udpin:HOST:PORT or udpout:HOST:PORT is needed")
+    settings = MeterSettings(
+        connection=connection,
+        host=host,
+        port=port,
+        token=not no_token,
+        system=system,
+        publish=publish,
+        ask=ask,
+        out=out,
+    )
+    from wakewise.core.jit.precompile import is_warm
+    from wakewise_ardusub.wash_meter.run import Work
+
+    region = region_ahead(chosen, ahead, points)
+    known = {} if params is None else read_parameter_file(params)
+    if not is_warm(("fly",)):
+        _say("kernels are compiled first, this time only: some seconds")
+    work = Work(settings, craft, region.points_W_m, region.weights, region_words(ahead, points), known, _say)
+    state = _run(work)
+    if json:
+        print_json(state)
+
+
+def _run(work: Work) -> dict[str, Any]:
+    """Work until Ctrl-C, which ends it as it should end."""
+    import signal
+
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    for number in before:
+        signal.signal(number, lambda *_: work.over.set())
+    try:
+        return work.run()
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _write(path: Path, craft: Craft) -> None:
+    from wakewise.core.errors import InputError
+    from wakewise.core.files import write_text
+    from wakewise_ardusub.vehicle_summary import craft_json
+    from wakewise_ardusub.wash_savings import Sparing
+
+    text = craft_json(craft)
+    if not Sparing.is_small(craft):
+        raise InputError(
+            f"--write {path}: vehicle {craft.name} has spare thrusters that cannot be looked at one by one; its meter "
+            "needs a 64-bit computer, which reads the vehicle file itself"
+        )
+    write_text(path, text)
+    _say(f"written to    {path}")
+
+
+def _say(line: str) -> None:
+    typer.echo(line, err=True)

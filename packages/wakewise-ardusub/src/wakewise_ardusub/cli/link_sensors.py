@@ -1,0 +1,142 @@
+"""`wakewise link sensors`: what the sensors of a companion computer say."""
+
+from __future__ import annotations
+
+import math
+from contextlib import ExitStack, closing
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from wakewise.ui.cli.console import print_json, shown
+from wakewise.ui.cli.options import Json
+
+if TYPE_CHECKING:
+    from wakewise_ardusub.sensors.watching import Source
+
+Depth = Annotated[
+    Path | None, typer.Option("--depth", metavar="BUS", help="I2C bus of an MS5837, /dev/i2c-1.", show_default=False)
+]
+DepthModel = Annotated[str, typer.Option("--depth-model", help="30BA (Bar30) or 02BA (Bar02).")]
+Imu = Annotated[
+    Path | None,
+    typer.Option("--imu", metavar="PORT", help="Serial port of a WitMotion JY901, /dev/ttyUSB0.", show_default=False),
+]
+Baud = Annotated[int, typer.Option("--baud", help="Of the inertial unit.")]
+Axes = Annotated[
+    str, typer.Option("--imu-axes", help="Where the unit's x, y and z point: forward, back, right, left, down, up.")
+]
+Poses = Annotated[
+    str | None,
+    typer.Option(
+        "--poses", metavar="PORT", help="UDP port, or ADDRESS:PORT, to which lines with poses come.", show_default=False
+    ),
+]
+Forward = Annotated[
+    str | None,
+    typer.Option(
+        "--forward",
+        metavar="HOST:PORT",
+        help="Hand poses on as MAVLink's VISION_POSITION_ESTIMATE, over UDP.",
+        show_default=False,
+    ),
+]
+Density = Annotated[float, typer.Option("--density", help="Of the water, kg/m3: 1000 fresh, 1025 salt.")]
+Zero = Annotated[bool, typer.Option("--zero", help="The vehicle is at the surface now: take its pressure for depth 0.")]
+Seconds = Annotated[
+    float | None, typer.Option("--seconds", help="End after so long; else on Ctrl-C.", show_default=False, min=0.1)
+]
+
+
+def sensors(
+    depth: Depth = None,
+    depth_model: DepthModel = "30BA",
+    imu: Imu = None,
+    baud: Baud = 9600,
+    imu_axes: Axes = "right,forward,up",
+    poses: Poses = None,
+    forward: Forward = None,
+    density: Density = 1000.0,
+    zero: Zero = False,
+    seconds: Seconds = None,
+    json: Json = False,
+) -> None:
+    """Show what depth sensor, inertial unit and senders of poses say, live: values, rates, and what goes wrong.
+
+    A pose is a line of JSON, {"t": s, "p": [north, east, down], "q": [w, x, y, z]}, or of the same numbers parted by
+    commas (docs/sensors.md). With --json the figures at the end are printed; give --seconds.
+    """
+    from wakewise.core.errors import InputError
+    from wakewise_ardusub.sensors import PoseForwarder
+    from wakewise_ardusub.sensors.watching import watch
+
+    if json and seconds is None:
+        raise InputError("--json: prints the figures at the end; give --seconds")
+    told: list[dict[str, Any]] = []
+    with ExitStack() as stack:
+        if forward is not None and poses is None:
+            raise InputError("--forward: goes with --poses")
+        forwarder = None if forward is None else stack.enter_context(closing(PoseForwarder(forward)))
+        sources = _sources(stack, depth, depth_model, imu, baud, imu_axes, poses, density, zero)
+        try:
+            for told in watch(sources, math.inf if seconds is None else seconds, every_s=1.0, passed=forwarder):
+                if not json:
+                    for line in told:
+                        typer.echo(_line(line))
+        except KeyboardInterrupt:
+            pass
+    passed = None if forwarder is None else {"to": forward, "sent": forwarder.sent, "not_sent": forwarder.lost}
+    if json:
+        print_json({"sensors": told, "forwarded": passed})
+    elif passed is not None:
+        typer.echo(f"handed on  {passed['sent']} poses to {forward}, {passed['not_sent']} could not be")
+
+
+def _sources(
+    stack: ExitStack,
+    depth: Path | None,
+    depth_model: str,
+    imu: Path | None,
+    baud: int,
+    imu_axes: str,
+    poses: str | None,
+    density: float,
+    zero: bool,
+) -> list[Source]:
+    from wakewise.core.errors import InputError
+    from wakewise_ardusub.sensors import DepthSensor, InertialUnit, LinePoses, LinuxI2C, SerialPort, UdpSocket, mounting
+    from wakewise_ardusub.sensors.watching import DepthSource, InertialSource, PoseSource
+
+    sources: list[Source] = []
+    if zero and depth is None:
+        raise InputError("--zero: goes with --depth")
+    if depth is not None:
+        bus = stack.enter_context(closing(LinuxI2C(depth)))
+        sensor = DepthSensor(bus, depth_model, density=density)
+        if zero:
+            typer.echo(f"surface pressure {sensor.zero() / 100.0:.1f} mbar", err=True)
+        sources.append(DepthSource(sensor, str(depth)))
+    if imu is not None:
+        unit = InertialUnit(mounting([axis.strip() for axis in imu_axes.split(",")]))
+        sources.append(InertialSource(unit, stack.enter_context(closing(SerialPort(imu, baud))), str(imu)))
+    if poses is not None:
+        port = stack.enter_context(UdpSocket(poses))
+        typer.echo(f"poses are listened for on UDP port {port.port}", err=True)
+        sources.append(PoseSource(LinePoses(), port, poses))
+    if not sources:
+        raise InputError("link sensors: none named; give --depth, --imu or --poses")
+    return sources
+
+
+def _line(told: dict[str, Any]) -> str:
+    """A source in one line."""
+    values = ", ".join(f"{name} {_value(value)}" for name, value in told["last"].items()) or "nothing yet"
+    amiss = f"; {told['bad']} bad" + (f" ({told['complaint']})" if told["complaint"] else "") if told["bad"] else ""
+    return f"{told['sensor']:<6} {told['rate_hz']:6.1f} Hz  {values}{amiss}"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, list):
+        return " ".join(f"{x:.3f}" for x in value)
+    return f"{value:.3f}" if isinstance(value, float) else shown(value)

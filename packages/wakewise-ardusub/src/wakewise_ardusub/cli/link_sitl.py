@@ -1,0 +1,311 @@
+"""`wakewise link sitl` and `wakewise link stand-in`: vehicles behind a firmware, and a stand-in for it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from wakewise.ui.cli.console import Bars, print_json, shown, status_line
+from wakewise.ui.cli.options import Json, Preset, ScenarioFile, Sets, Vehicle, World, overrides
+
+if TYPE_CHECKING:
+    from wakewise.robot.vehicles import Vehicle as AnyVehicle
+    from wakewise_ardusub.physics import PhysicsFigures
+    from wakewise_ardusub.physics.depth_watch import DepthWatch
+    from wakewise_ardusub.sitl.rim import Behind
+    from wakewise_ardusub.sitl.stand_in import StandIn
+
+DEFAULT_VEHICLE = "bluerov2-heavy"
+_STATION, _COMPANION, _WATCH = "127.0.0.1:14550", "127.0.0.1:14560", "127.0.0.1:14570"
+
+Port = Annotated[int, typer.Option("--port", help="UDP port that physics listens on; 0 lets the system choose.")]
+Host = Annotated[str, typer.Option("--host", help="Address it listens on; 0.0.0.0 lets other computers in.")]
+Rate = Annotated[
+    int | None,
+    typer.Option("--rate", metavar="HZ", help="Steps a second; as the firmware asks if not given.", show_default=False),
+]
+Params = Annotated[
+    Path | None,
+    typer.Option(
+        "--params",
+        help="The autopilot's .params: which output is which motor (SERVOn_FUNCTION), which turns the other way round "
+        "(MOT_n_DIRECTION). Motors are on outputs 1, 2, ... if not given.",
+        show_default=False,
+    ),
+]
+OwnClock = Annotated[
+    bool, typer.Option("--fast", help="Let the firmware run as fast as both can, not by the clock on the wall.")
+]
+Held = Annotated[
+    float,
+    typer.Option(
+        "--held",
+        metavar="S",
+        min=0.0,
+        help="How long the vehicle is held at the surface, so that ArduSub calibrates its depth sensor there, before "
+        "it is let down to its start; 0: it begins under water.",
+    ),
+]
+Watch = Annotated[
+    str,
+    typer.Option(
+        "--watch",
+        metavar="HOST:PORT",
+        help="Where a copy of the autopilot's MAVLink comes, whose depth is held against the truth; none: it is not.",
+    ),
+]
+Seconds = Annotated[
+    float | None, typer.Option("--seconds", min=0.1, help="End by itself after so long.", show_default=False)
+]
+Out = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--out",
+        metavar="HOST:PORT",
+        help=f"Where MAVLink goes; may be repeated. {_STATION} (ground station), {_COMPANION} (companion) and {_WATCH} "
+        "(`wakewise link sitl`, which compares depths) if not given.",
+        show_default=False,
+    ),
+]
+Behind_ = Annotated[
+    str | None,
+    typer.Option(
+        "--physics",
+        metavar="HOST:PORT",
+        help="Physics to fly in, such as `wakewise link sitl` at 127.0.0.1:9002; still water of its own if not given.",
+        show_default=False,
+    ),
+]
+StandInVehicle = Annotated[str, typer.Option("--vehicle", help="Library name or vehicle YAML file; 6 or 8 thrusters.")]
+StandInParams = Annotated[
+    Path | None,
+    typer.Option("--params", help="Parameters in place of its own, .params or .parm.", show_default=False),
+]
+ScriptFile = Annotated[
+    Path | None,
+    typer.Option("--script", help="A Lua script in place of the one that is shipped.", show_default=False),
+]
+NoScript = Annotated[bool, typer.Option("--no-script", help="Without any script, as an autopilot is out of the box.")]
+PilotAshore = Annotated[
+    bool,
+    typer.Option("--pilot", help="With a pilot of its own, who arms, switches the script on and lets the sticks go."),
+]
+Loop = Annotated[float, typer.Option("--loop", metavar="HZ", help="Loops a second.")]
+
+
+def sitl(
+    scenario: ScenarioFile = None,
+    vehicle: Vehicle = None,
+    world: World = None,
+    preset: Preset = "quick",
+    sets: Sets = None,
+    port: Port = 9002,
+    host: Host = "127.0.0.1",
+    rate: Rate = None,
+    params: Params = None,
+    own_clock: OwnClock = False,
+    held: Held = 15.0,
+    watch: Watch = _WATCH,
+    seconds: Seconds = None,
+    json: Json = False,
+) -> None:
+    """Put a vehicle in its water behind ArduSub: ArduPilot's JSON physics link (`--model JSON`), until Ctrl-C.
+
+    Start the firmware, or `wakewise link stand-in --physics 127.0.0.1:9002`, beside it. The vehicle starts anew when
+    the firmware does: at the surface, and then let down to where the scenario starts it.
+    """
+    from wakewise.operation import load_scenario
+    from wakewise_ardusub.physics import Physics, PulseTable
+    from wakewise_ardusub.physics.udp import open_socket, serve
+    from wakewise_ardusub.sitl.own_parameters import read_params
+    from wakewise_ardusub.sitl_plant import BehindFirmware
+
+    if scenario is None and vehicle is None:
+        vehicle = DEFAULT_VEHICLE
+    chosen = overrides(sets, seed=None, vehicle=vehicle, target=None, target_size=None, world=world)
+    flown = load_scenario(preset, scenario, chosen).parts()
+    table = PulseTable.of(flown.vehicle, None if params is None else read_params(params))
+    behind = BehindFirmware(parts=flown, held_s=held)
+    physics = Physics(behind.begin, table.thrusts, rate_hz=rate, own_clock=own_clock)
+    with ExitStack() as stack:
+        listening = stack.enter_context(open_socket(host, port))
+        depths = _depth_watch(stack, watch)
+        with Bars().stage("water") as progress:
+            warning = behind.ready(progress)
+        if warning:
+            typer.echo(warning, err=True)
+        typer.echo(
+            f"{flown.vehicle.name} in {flown.scenario.world} at UDP {host}:{listening.getsockname()[1]}; "
+            "now start the firmware with --model JSON",
+            err=True,
+        )
+
+        def said() -> None:
+            figures = physics.figures()
+            if depths is not None and not figures.stage:
+                depths.look(figures.depth_m)
+            status_line(_physics_line(figures, depths))
+
+        with suppress(KeyboardInterrupt):
+            serve(physics, listening, _until(seconds), said=said)
+    figures = physics.figures()
+    if json:
+        seen = {} if depths is None else depths.facts()
+        print_json({"vehicle": flown.vehicle.name, "world": flown.scenario.world, **asdict(figures), **seen})
+    else:
+        typer.echo(_physics_line(figures, depths))
+        if figures.refused:
+            typer.echo(f"last refused    {physics.why_refused}")
+
+
+def stand_in(
+    vehicle: StandInVehicle = DEFAULT_VEHICLE,
+    physics: Behind_ = None,
+    out: Out = None,
+    params: StandInParams = None,
+    script: ScriptFile = None,
+    no_script: NoScript = False,
+    pilot: PilotAshore = False,
+    loop: Loop = 100.0,
+    seconds: Seconds = None,
+    json: Json = False,
+) -> None:
+    """A stand-in for ArduSub in pure Python, until Ctrl-C: MAVLink, arming, modes, mixer, failsafes and the script.
+
+    It is for trying and for tests, and no copy of the firmware: docs/sitl.md says what it does and what it does not.
+    """
+    from wakewise.core.errors import InputError
+    from wakewise.core.optional_dependencies import need
+
+    need("wakewise link stand-in", "links", only=("pymavlink", "lupa"))
+    from wakewise.robot.importers import any_vehicle
+    from wakewise_ardusub.sitl.own_parameters import own_parameters, read_params
+    from wakewise_ardusub.sitl.piloted import Ashore, carry_to
+    from wakewise_ardusub.sitl.rim import Link, OverUdp, run
+    from wakewise_ardusub.sitl.stand_in import StandIn
+
+    if script is not None and no_script:
+        raise InputError("--script and --no-script: one or the other")
+    chosen = any_vehicle(vehicle)
+    values = own_parameters(len(chosen.thrusters)) | ({} if params is None else read_params(params))
+    scripts = {} if no_script else _scripts(script)
+    # Water of its own has no surface to start at: there it was carried down, switched on, to where it is.
+    zero_m = 0.0 if physics is None else None
+    made = StandIn(values | {"SCHED_LOOP_RATE": loop}, loop_hz=loop, scripts=scripts, zero_depth_m=zero_m)
+    behind = _embedded(chosen, values) if physics is None else OverUdp(*_address("--physics", physics))
+    outs = out or [_STATION, _COMPANION, _WATCH]
+    links = [Link(*_address("--out", each), out=True) for each in outs]
+    typer.echo(f"stand-in for ArduSub, system {made.system}: MAVLink to {', '.join(outs)}", err=True)
+    with ExitStack() as held:
+        held.enter_context(suppress(KeyboardInterrupt))
+        held.callback(behind.close)
+        for link in links:
+            held.callback(link.close)
+        turn = Ashore(made, carry_to(made, links)).turn if pilot else None
+        run(made, behind, links, _until(seconds), turn=turn, said=lambda: status_line(_stand_in_line(made)))
+    if json:
+        print_json(_stand_in_facts(made))
+    else:
+        typer.echo(_stand_in_line(made))
+
+
+def _scripts(file: Path | None) -> dict[str, str]:
+    """The script that is shipped, or another one."""
+    from wakewise.core.errors import InputError
+    from wakewise_ardusub.sitl.rehearsal import shipped_script
+
+    if file is None:
+        return shipped_script()
+    try:
+        return {file.name: file.read_text("latin-1")}
+    except OSError as fault:
+        raise InputError(f"--script {file}: {fault.strerror}") from None
+
+
+def _embedded(vehicle: AnyVehicle, values: dict[str, float]) -> Behind:
+    from wakewise_ardusub.physics import FreeWater, PulseTable
+    from wakewise_ardusub.sitl.rim import Embedded
+
+    return Embedded(body=FreeWater(vehicle), table=PulseTable.of(vehicle, values))
+
+
+def _address(option: str, text: str) -> tuple[str, int]:
+    from wakewise.core.errors import InputError
+
+    host, colon, port = text.rpartition(":")
+    if not colon or not host or not port.isdigit() or not 0 < int(port) <= 65535:
+        raise InputError(f"{option} {text}: must be HOST:PORT, such as 127.0.0.1:14550")
+    return host, int(port)
+
+
+def _until(seconds: float | None) -> Callable[[], bool]:
+    end_s = None if seconds is None else time.monotonic() + seconds
+    return lambda: end_s is None or time.monotonic() < end_s
+
+
+def _depth_watch(stack: ExitStack, where: str) -> DepthWatch | None:
+    """What holds the autopilot's depth against the truth; None, and a line, where nothing can be overheard."""
+    from wakewise.core.errors import EnvironmentFailure
+    from wakewise.core.optional_dependencies import has
+    from wakewise_ardusub.link.connection import parse_connection
+    from wakewise_ardusub.physics.depth_watch import DepthWatch
+
+    if where == "none":
+        return None
+    _address("--watch", where)
+    if not has("links"):
+        typer.echo("the autopilot's depth is not compared: the extra `links` is not installed", err=True)
+        return None
+    from wakewise_ardusub.link.carriers import carrier_of
+    from wakewise_ardusub.link.post import Post
+    from wakewise_ardusub.link.protocol import DEFAULT_SYSTEM
+
+    try:
+        carrier = carrier_of(parse_connection(f"udpin:{where}", "--watch"))
+    except EnvironmentFailure as fault:
+        if where != _WATCH:
+            raise
+        typer.echo(f"the autopilot's depth is not compared: {fault} (--watch HOST:PORT takes another)", err=True)
+        return None
+    stack.callback(carrier.close)
+    return DepthWatch(Post(carrier, DEFAULT_SYSTEM))
+
+
+def _physics_line(figures: PhysicsFigures, depths: DepthWatch | None) -> str:
+    if not figures.frames:
+        return f"no firmware yet; {figures.refused} datagrams refused"
+    pulses = " ".join(str(pulse) for pulse in figures.pulses_us[:8])
+    where = figures.stage or ("" if depths is None else depths.words)
+    return (
+        f"{shown(figures.rate_hz)} Hz, {figures.lost} lost, {figures.repeats} repeated, {figures.refused} refused; "
+        f"t {figures.time_s:.1f} s, depth {figures.depth_m or 0.0:.2f} m{', ' if where else ''}{where}; pulses {pulses}"
+    )
+
+
+def _stand_in_line(made: StandIn) -> str:
+    from wakewise_ardusub.sitl.modes import MODES
+
+    pulses = " ".join(str(pulse) for pulse in made.pulses_us[:8])
+    state = f"{'armed' if made.armed else 'disarmed'}, {MODES.get(made.mode, made.mode)}"
+    depth_m = float(made.motion.p_WB_m[2])
+    said = f"; {made.texts[-1]}" if made.texts else ""
+    return f"t {made.now_s:.1f} s, {state}, depth {depth_m:.2f} m; pulses {pulses}{said}"
+
+
+def _stand_in_facts(made: StandIn) -> dict[str, Any]:
+    return {
+        "time_s": made.now_s,
+        "armed": made.armed,
+        "mode": made.mode,
+        "depth_m": float(made.motion.p_WB_m[2]),
+        "pulses_us": list(made.pulses_us),
+        "bad_data": made.bad_data,
+        "script_faults": made.script_faults,
+        "texts": list(made.texts)[-10:],
+    }

@@ -1,0 +1,361 @@
+"""Whether an ArduSub vehicle may be driven motor by motor: a row for each thing that must be so, go or no-go.
+
+A pure function of facts. `survey.py` gathers them over a connection; without one the rows that need it stay unknown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from wakewise.robot.vehicles import Vehicle
+from wakewise_ardusub.link.buttons import conflict, free_buttons, free_words, parameters_of
+from wakewise_ardusub.link.engagement import Limits
+from wakewise_ardusub.link.frames import FRAMES, match_motors
+from wakewise_ardusub.link.motor_results import MotorResults
+from wakewise_ardusub.link.parameters import GROUND_NAMES, SYSTEM_NAMES, first_of
+from wakewise_ardusub.link.protocol import (
+    ALLOWED_MODES,
+    DEFAULT_MODES,
+    ENABLE_PARAMETER,
+    LEAST_FIRMWARE,
+    MODES_PARAMETER,
+    SCRIPT_VERSION,
+    SLOTS,
+    TRIED_FIRMWARE,
+)
+from wakewise_ardusub.logs.gather import MODES
+from wakewise_ardusub.motors import channels_of_motors
+
+Verdict = Literal["go", "no-go", "unknown"]
+Whole = Literal["go", "no-go", "unknown", "unseen"]
+"""Of all rows; `unseen` is go but for motors that nobody has seen turn."""
+GAP_S = Limits().pose_s
+"""Longer than this nothing that a session needs may stay away."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Heard:
+    """What came over a connection in `seconds`: all of it is unknown without one.
+
+    Parameters
+    ----------
+    seconds : float
+    kind : str
+        What the vehicle says it is, such as "ArduSub".
+    firmware : tuple of int, or None
+        Major, minor, patch of AUTOPILOT_VERSION.
+    script : float or None
+        Version that the script says; None if it says nothing.
+    sticks : dict
+        MANUAL_CONTROL for the vehicle by the system id that sent them, with their number.
+    poses : dict
+        Messages that hold a position by their type, with their number.
+    mavlink_2 : bool
+        Whether the autopilot speaks MAVLink 2 on this connection.
+    gaps_s : dict
+        The longest time between two of "pose", "sticks" and "attitude".
+    """
+
+    seconds: float
+    kind: str = "ArduSub"
+    firmware: tuple[int, int, int] | None = None
+    script: float | None = None
+    sticks: Mapping[int, int] = field(default_factory=dict)
+    poses: Mapping[str, int] = field(default_factory=dict)
+    mavlink_2: bool = True
+    gaps_s: Mapping[str, float] = field(default_factory=dict, compare=False)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Facts:
+    """All that is looked at; `heard` is None without a connection, `results` where no motor was tested.
+
+    `buttons` are those of the pilot's sticks that are to mean something here, as of `Warden`.
+    """
+
+    vehicle: Vehicle
+    parameters: Mapping[str, float]
+    system: int
+    heard: Heard | None = None
+    results: MotorResults | None = None
+    buttons: Mapping[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One thing: what was asked for, what was found, and what to do; `needed` rows must not be unknown.
+
+    `unseen` rows are motors that nobody has seen turn.
+    """
+
+    what: str
+    asked: str
+    found: str
+    verdict: Verdict
+    do: str = ""
+    needed: bool = True
+    unseen: bool = False
+
+
+def check(facts: Facts) -> tuple[Row, ...]:
+    """All rows, in the order in which they are mended."""
+    return tuple(row for part in _PARTS for row in part(facts))
+
+
+def verdict(rows: tuple[Row, ...], *, motors_seen: bool = True) -> Whole:
+    """Go if nothing says no-go, nothing that is needed is unknown and, if asked for, every motor was seen to turn."""
+    if any(row.verdict == "no-go" for row in rows):
+        return "no-go"
+    if any(row.verdict == "unknown" and row.needed for row in rows):
+        return "unknown"
+    return "unseen" if motors_seen and any(row.unseen for row in rows) else "go"
+
+
+def _vehicle(facts: Facts) -> Iterator[Row]:
+    if facts.heard is None:
+        return
+    asked = "ArduSub"
+    yield _row("autopilot", asked, facts.heard.kind, facts.heard.kind == asked, "connect to the vehicle's autopilot")
+
+
+def _firmware(facts: Facts) -> Iterator[Row]:
+    least = ".".join(map(str, LEAST_FIRMWARE))
+    tried = " and ".join(".".join(map(str, version)) for version in TRIED_FIRMWARE)
+    asked = f"ArduSub {least} or later"
+    if facts.heard is None or facts.heard.firmware is None:
+        yield _unknown("firmware", asked, facts, "not said by the autopilot" if facts.heard is not None else "")
+        return
+    found = ".".join(map(str, facts.heard.firmware))
+    if facts.heard.firmware >= LEAST_FIRMWARE:
+        also = "" if facts.heard.firmware[:2] in TRIED_FIRMWARE else f"tried on {tried} only: run --motor-test"
+        yield Row(what="firmware", asked=asked, found=found, verdict="go", do=also)
+    else:
+        yield _row("firmware", asked, found, False, f"update ArduSub to {least} or later: its Lua lacks what is called")
+
+
+def _system(facts: Facts) -> Iterator[Row]:
+    found = first_of(facts.parameters, SYSTEM_NAMES)
+    if found is None:
+        yield _unknown("system id", f"{facts.system}", facts, f"neither {' nor '.join(SYSTEM_NAMES)} is known")
+    else:
+        yield _is(f"system id ({found[0]})", found[1], facts.system, f"say --system {found[1]:g}")
+
+
+def _script(facts: Facts) -> Iterator[Row]:
+    yield _parameter(facts, "SCR_ENABLE", {1.0}, "set SCR_ENABLE to 1 and reboot the autopilot")
+    asked = f"version {SCRIPT_VERSION}, heard"
+    if facts.heard is None:
+        yield _unknown("script", asked, facts)
+    elif facts.heard.script is None:
+        do = "wakewise link script --upload ..., then reboot the autopilot"
+        yield _row("script", asked, "not heard", False, do)
+    else:
+        do = "wakewise link script --upload ... puts the right one there; then reboot the autopilot"
+        yield _row("script", asked, f"version {facts.heard.script:g}", facts.heard.script == SCRIPT_VERSION, do)
+    value = facts.parameters.get(MODES_PARAMETER)
+    if value is not None:
+        allowed = [mode for mode in range(24) if int(value) >> mode & 1]
+        names = ", ".join(MODES.get(mode, str(mode)) for mode in allowed) or "none"
+        more = [MODES.get(mode, str(mode)) for mode in allowed if mode not in ALLOWED_MODES]
+        do = f"{', '.join(more)}: depth or place may jump when the sticks come back" if more else ""
+        do = do or ("" if allowed else f"set {MODES_PARAMETER} to {DEFAULT_MODES}")
+        asked = " or ".join(MODES[mode] for mode in sorted(ALLOWED_MODES, reverse=True))
+        good: Verdict = "go" if allowed else "no-go"
+        yield Row(what=f"modes ({MODES_PARAMETER})", asked=asked, found=names, verdict=good, do=do)
+    switch = facts.parameters.get(ENABLE_PARAMETER)
+    if switch is not None:
+        do = "" if switch == 1.0 else f"set {ENABLE_PARAMETER} to 1 when the companion is to drive; off after a reboot"
+        found = "on" if switch == 1.0 else "off"
+        yield Row(what=f"switch ({ENABLE_PARAMETER})", asked="on or off", found=found, verdict="go", do=do)
+
+
+def _motors(facts: Facts) -> Iterator[Row]:
+    count = len(facts.vehicle.thrusters)
+    asked = f"motors 1 to {count}, each on one channel"
+    if count > SLOTS:
+        yield _row("motors", f"at most {SLOTS}", f"{count} thrusters", False, f"one message holds {SLOTS} motors")
+        return
+    channels = channels_of_motors(facts.parameters)
+    if not any(name.startswith("SERVO") for name in facts.parameters):
+        yield _unknown("motors", asked, facts, "no SERVOn_FUNCTION is known")
+        return
+    found = ", ".join(f"{motor} on {'+'.join(map(str, at))}" for motor, at in channels.items()) or "none"
+    if channels == {motor: [motor] for motor in range(1, len(channels) + 1)} and channels:
+        found = f"motors 1 to {len(channels)}, on channels of the same numbers"
+    twice = [motor for motor, at in channels.items() if len(at) > 1]
+    do = f"vehicle {facts.vehicle.name} has {count} thrusters: name the right --vehicle, or mend SERVOn_FUNCTION"
+    if twice:
+        do = f"motor {twice[0]} is on channels {channels[twice[0]]}: an override reaches only the first of them"
+    good = list(channels) == list(range(1, count + 1)) and not twice
+    yield _row("motors (SERVOn_FUNCTION)", asked, found, good, do)
+    directions = {i: facts.parameters.get(f"MOT_{i}_DIRECTION") for i in range(1, count + 1)}
+    missing = [i for i, value in directions.items() if value is None]
+    if missing:
+        found = f"not said for motor {', '.join(map(str, missing))}"
+        yield _unknown("directions (MOT_n_DIRECTION)", "1 or -1 each", facts, found, needed=True)
+        return
+    found = " ".join(f"{value:+g}" for value in directions.values() if value is not None)
+    good = all(value in {1.0, -1.0} for value in directions.values())
+    yield _row("directions (MOT_n_DIRECTION)", "1 or -1 each", found, good, "set each to 1 or -1: --motor-test")
+    pwm = facts.parameters.get("MOT_PWM_TYPE")
+    if pwm is not None:
+        do = "set MOT_PWM_TYPE to 0: the vehicle's thrust table is of plain pulses"
+        yield _row("pulses (MOT_PWM_TYPE)", "0", f"{pwm:g}", pwm == 0.0, do)
+
+
+def _mixing(facts: Facts) -> Iterator[Row]:
+    value = facts.parameters.get("FRAME_CONFIG")
+    count = len(facts.vehicle.thrusters)
+    asked = f"a frame with {count} motors"
+    if value is None:
+        yield _unknown("frame (FRAME_CONFIG)", asked, facts, "FRAME_CONFIG is not known", needed=True)
+        return
+    if int(value) not in FRAMES:
+        do = "its matrix is built into the firmware: check every motor with --motor-test"
+        yield Row(
+            what="frame (FRAME_CONFIG)", asked=asked, found=f"{value:g}, custom", verdict="unknown", do=do, needed=True
+        )
+        return
+    name, factors = FRAMES[int(value)]
+    found = f"{value:g}, {name}: {len(factors)} motors"
+    good = len(factors) == count
+    yield _row("frame (FRAME_CONFIG)", asked, found, good, f"vehicle {facts.vehicle.name} is not what is flown here")
+    if good:
+        for match in match_motors(facts.vehicle, int(value)):
+            what = f"motor {match.motor} pushes"
+            yield _row(what, f"mixer: {match.by_mixer}", f"vehicle file: {match.by_vehicle}", match.agree, match.advice)
+
+
+def _tested(facts: Facts) -> Iterator[Row]:
+    look = "wakewise link ardusub --motor-test has somebody look at each"
+    if facts.results is None or facts.results.vehicle != facts.vehicle.name:
+        found = "none was tested" if facts.results is None else f"tested were those of {facts.results.vehicle}"
+        asked = "each pushes as expected"
+        row = Row(what="motors seen", asked=asked, found=found, verdict="unknown", do=look, needed=False, unseen=True)
+        yield row
+        return
+    for motor in range(1, min(len(facts.vehicle.thrusters), SLOTS) + 1):
+        what, asked = f"motor {motor} seen", "pushes as expected"
+        seen = facts.results.of(motor)
+        direction = facts.parameters.get(f"MOT_{motor}_DIRECTION")
+        if seen is None or direction is None:
+            found = "not tested"
+            yield Row(what=what, asked=asked, found=found, verdict="unknown", do=look, needed=False, unseen=True)
+        elif seen.right_direction is None:
+            do = f"find what turns: SERVOn_FUNCTION {32 + motor}, the cable of motor {motor}, its speed controller"
+            yield _row(what, asked, seen.answer, False, do)
+        else:
+            right = seen.right_direction
+            found = seen.answer + (", turned since" if seen.direction != direction else "")
+            yield _row(what, asked, found, direction == right, f"set MOT_{motor}_DIRECTION to {right:g}")
+
+
+def _buttons(facts: Facts) -> Iterator[Row]:
+    free = free_buttons(facts.parameters)
+    if not facts.buttons:
+        if free:
+            found = ", ".join(map(str, free))
+            yield Row(what="buttons without a function", asked="any of them for --buttons", found=found, verdict="go")
+        return
+    for what, button in facts.buttons.items():
+        row, asked = f"button {button} ({what})", "no function of the autopilot"
+        missing = next((name for name in parameters_of(button) if name not in facts.parameters), None)
+        if missing:
+            yield _unknown(row, asked, facts, f"{missing} is not known", needed=True)
+            continue
+        words = conflict(button, what, facts.parameters)
+        yield _row(row, asked, words or "none", not words, free_words(facts.parameters, facts.buttons))
+
+
+def _failsafes(facts: Facts) -> Iterator[Row]:
+    yield _parameter(
+        facts, "FS_GCS_ENABLE", {2.0, 3.0, 4.0}, "set FS_GCS_ENABLE to 2: a lost ground station disarms, and ends it"
+    )
+    yield _parameter(facts, "FS_PILOT_INPUT", {2.0}, "set FS_PILOT_INPUT to 2: a silent stick disarms, and ends it")
+    skipped = facts.parameters.get("ARMING_SKIPCHK")
+    if skipped is not None:
+        do = "set ARMING_SKIPCHK to 0, or to the few checks that this vehicle cannot pass"
+        yield _row("arming checks (ARMING_SKIPCHK)", "not all skipped", f"{skipped:g}", skipped != -1.0, do)
+        return
+    checks = facts.parameters.get("ARMING_CHECK")
+    if checks is None:
+        yield _unknown("arming checks", "some", facts, "neither ARMING_CHECK nor ARMING_SKIPCHK is known")
+    else:
+        yield _row("arming checks (ARMING_CHECK)", "not 0", f"{checks:g}", checks != 0.0, "set ARMING_CHECK to 1: all")
+
+
+def _hearing(facts: Facts) -> Iterator[Row]:
+    heard = facts.heard
+    ground = first_of(facts.parameters, GROUND_NAMES)
+    asked = f"MANUAL_CONTROL of system {ground[1]:g}" if ground else "MANUAL_CONTROL of the ground station"
+    if heard is None:
+        for what, wish in (("pilot's sticks", asked), ("pose", "a position"), ("MAVLink", "version 2")):
+            yield _unknown(what, wish, facts)
+        return
+    found = ", ".join(f"{n / heard.seconds:.1f} a second of system {who}" for who, n in sorted(heard.sticks.items()))
+    good = any(ground is None or who == round(ground[1]) for who in heard.sticks)
+    do = (
+        "move a stick; if it stays so, the router does not pass them on: give the companion a UDP endpoint of its own, "
+        "or use --relay"
+    )
+    yield _row("pilot's sticks", asked, found or "none", good, do)
+    found = ", ".join(f"{name} {n / heard.seconds:.1f} a second" for name, n in sorted(heard.poses.items()))
+    do = "no sensor gives a position: a DVL, a positioning system or VISION_POSITION_ESTIMATE is needed to engage"
+    yield _row("pose", "a position", found or "none", bool(heard.poses), do)
+    for what, gap_s in heard.gaps_s.items():
+        even = gap_s <= GAP_S
+        do = f"a session lets go after {1e3 * GAP_S:.0f} ms without: look for what pauses it (Wi-Fi, a busy computer)"
+        yield Row(
+            what=f"longest pause of the {what}",
+            asked=f"at most {1e3 * GAP_S:.0f} ms, better half of it",
+            found=f"{1e3 * gap_s:.0f} ms in {heard.seconds:g} s",
+            verdict="go" if even else "unknown",
+            do="" if even else do,
+            needed=False,
+        )
+    do = "set SERIALn_PROTOCOL of this port, or the endpoint in BlueOS, to MAVLink 2"
+    yield _row("MAVLink", "version 2", "version 2" if heard.mavlink_2 else "version 1", heard.mavlink_2, do)
+
+
+_PARTS: tuple[Callable[[Facts], Iterator[Row]], ...] = (
+    _vehicle,
+    _firmware,
+    _system,
+    _script,
+    _motors,
+    _mixing,
+    _tested,
+    _buttons,
+    _failsafes,
+    _hearing,
+)
+
+
+def _row(what: str, asked: str, found: str, good: bool, do: str) -> Row:
+    return Row(what=what, asked=asked, found=found, verdict="go" if good else "no-go", do="" if good else do)
+
+
+def _is(what: str, found: float, asked: float, do: str) -> Row:
+    return _row(what, f"{asked:g}", f"{found:g}", found == asked, do)
+
+
+def _parameter(facts: Facts, name: str, allowed: set[float], do: str) -> Row:
+    asked = " or ".join(f"{value:g}" for value in sorted(allowed))
+    if name not in facts.parameters:
+        return _unknown(name, asked, facts, "not known", needed=True)
+    found = facts.parameters[name]
+    return _row(name, asked, f"{found:g}", found in allowed, do)
+
+
+def _unknown(what: str, asked: str, facts: Facts, found: str = "", *, needed: bool | None = None) -> Row:
+    """Without a connection nothing can be heard, and only parameters must be known."""
+    offline = facts.heard is None
+    return Row(
+        what=what,
+        asked=asked,
+        found=found or "needs a connection",
+        verdict="unknown",
+        needed=not offline if needed is None else needed,
+    )

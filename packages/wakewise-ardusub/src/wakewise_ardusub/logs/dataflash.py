@@ -1,0 +1,185 @@
+"""Logs that the autopilot writes itself (.BIN): records that begin with A3 95 and a type, described by FMT records.
+
+The format has no checksums. A record counts as bad where its type was never described, as does a stretch of bytes in
+which no record begins; after one the reader goes on where a record is followed by another. A record without a time is
+one of the time of the last that had one, as old logs have parameters, events and messages. One of other fields than are
+known is whole, and is counted by its name.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+from typing import Any
+
+from wakewise_ardusub.logs.gather import SERVOS, Gather, Vessel
+from wakewise_ardusub.logs.identity import firmware_of
+
+HEAD = b"\xa3\x95"
+_FMT_TYPE, _FMT_LENGTH = 128, 89
+_FMT = struct.Struct("<BB4s16s64s")
+# Letters of FMT: how a field is packed, and what it is multiplied by (ArduPilot, AP_Logger/LogStructure.h).
+_CODES: dict[str, tuple[str, float | None]] = {
+    "b": ("b", 1.0), "B": ("B", 1.0), "M": ("B", 1.0), "h": ("h", 1.0), "H": ("H", 1.0), "i": ("i", 1.0),
+    "I": ("I", 1.0), "q": ("q", 1.0), "Q": ("Q", 1.0), "f": ("f", 1.0), "d": ("d", 1.0), "g": ("e", 1.0),
+    "c": ("h", 0.01), "C": ("H", 0.01), "e": ("i", 0.01), "E": ("I", 0.01), "L": ("i", 1e-7),
+    "n": ("4s", None), "N": ("16s", None), "Z": ("64s", None), "a": ("64s", None),
+}  # fmt: skip
+_WANTED = frozenset(
+    {"ATT", "RCOU", "RCIN", "CTUN", "BARO", "BAT", "MODE", "ARM", "EV", "PARM", "XKF1", "MSG", "VER", "BAR2"}
+)
+_ARMED_EVENT, _DISARMED_EVENT = 10, 11
+_MIDDLE_US, _HALF_US = 1500.0, 400.0
+
+
+@dataclass(frozen=True)
+class Format:
+    """One kind of record: its name, its length with the head, how it is packed, and its fields."""
+
+    name: str
+    length: int
+    packed: struct.Struct
+    scales: tuple[float | None, ...]
+    labels: tuple[str, ...]
+
+    def read(self, body: bytes) -> dict[str, Any]:
+        """Fields by name."""
+        values = self.packed.unpack(body)
+        return {
+            label: value if scale is None else value * scale
+            for label, value, scale in zip(self.labels, values, self.scales, strict=False)
+        }
+
+
+def read_dataflash(data: Any) -> Gather:
+    """Read all records of a log of the autopilot, damaged or not."""
+    gather = Gather()
+    vessel = gather.vessel()
+    formats: dict[int, Format] = {}
+    at, size = 0, len(data)
+    lost = False
+    while at + 3 <= size:
+        kind = data[at + 2]
+        length = _FMT_LENGTH if kind == _FMT_TYPE else formats[kind].length if kind in formats else 0
+        whole = data[at : at + 2] == HEAD and length > 0
+        if whole and at + length > size:
+            # The last record of a file that was cut, or damage that looks like one.
+            gather.cut_short = data.find(HEAD, at + 1) < 0
+            if gather.cut_short:
+                break
+            whole = False
+        if whole and lost and data[at + length : at + length + 2] not in (HEAD, b""):
+            whole = False
+        if not whole:
+            after = data.find(HEAD, at + 1)
+            after = size if after < 0 else after
+            if lost:
+                gather.bad_bytes += after - at
+            else:
+                gather.spoiled("no record", after - at)
+            at, lost = after, True
+            continue
+        lost = False
+        body = bytes(data[at + 3 : at + length])
+        at += length
+        try:
+            if kind == _FMT_TYPE:
+                number, described = _format(body)
+                formats[number] = described
+            else:
+                _take(gather, vessel, formats[kind], body)
+        except (KeyError, TypeError, ValueError, struct.error):
+            gather.spoiled("fields", length)
+            continue
+        gather.records += 1
+    return gather
+
+
+def _format(body: bytes) -> tuple[int, Format]:
+    number, length, name, codes, labels = _FMT.unpack(body)
+    text = codes.rstrip(b"\0").decode("ascii")
+    parts = [_CODES[code] for code in text]
+    packed = struct.Struct("<" + "".join(part for part, _ in parts))
+    if packed.size + 3 != length:
+        raise ValueError
+    return number, Format(
+        name=name.rstrip(b"\0").decode("ascii"),
+        length=length,
+        packed=packed,
+        scales=tuple(scale for _, scale in parts),
+        labels=tuple(labels.rstrip(b"\0").decode("ascii").split(",")),
+    )
+
+
+def _take(gather: Gather, vessel: Vessel, form: Format, body: bytes) -> None:
+    if form.name not in _WANTED:
+        return
+    fields = form.read(body)
+    time_s = gather.clock.now_s
+    for label, second in (("TimeUS", 1e-6), ("TimeMS", 1e-3)):
+        if label in fields:
+            time_s = gather.clock.at(second * fields[label])
+            break
+    try:
+        _keep(vessel, form.name, time_s, fields)
+    except KeyError:
+        gather.unread[form.name] += 1
+
+
+def _keep(vessel: Vessel, name: str, time_s: float, fields: dict[str, Any]) -> None:
+    """Keep what a record says; KeyError if it lacks a field that is needed."""
+    match name:
+        case "ATT":
+            vessel.put("attitude", time_s, (_turn(fields[k]) for k in ("Roll", "Pitch", "Yaw")))
+        case "RCOU":
+            vessel.put("servo", time_s, (_output(fields, i) for i in range(1, SERVOS + 1)))
+        case "RCIN":
+            # ArduSub's channels: pitch, roll, throttle (up), yaw, forward, lateral.
+            forward, right, up, turn = ((fields[f"C{i}"] - _MIDDLE_US) / _HALF_US for i in (5, 6, 3, 4))
+            vessel.put("sticks", time_s, (max(-1.0, min(1.0, v)) for v in (forward, right, -up, turn)))
+        case "CTUN":
+            vessel.put("depth CTUN", time_s, (-fields["Alt"],))
+        case "BARO":
+            # The first is inside the hull; old logs have a kind of record for each.
+            if fields.get("I", fields.get("Id", 0)) == 1:
+                vessel.put("depth BARO", time_s, (-fields["Alt"],))
+        case "BAR2":
+            vessel.put("depth BARO", time_s, (-fields["Alt"],))
+        case "XKF1":
+            # The estimator's first core; the autopilot may change over to another, which MAVLink's position follows.
+            if fields.get("C", 0) == 0:
+                vessel.put("position", time_s, (fields[k] for k in ("PN", "PE", "PD")))
+        case "BAT":
+            if fields.get("Inst", fields.get("Instance", fields.get("I", 0))) == 0:
+                vessel.put("voltage", time_s, (fields["Volt"],))
+        case "MODE":
+            vessel.put("mode", time_s, (float(fields["ModeNum"] if "ModeNum" in fields else fields["Mode"]),))
+        case "ARM":
+            vessel.put("armed", time_s, (fields["ArmState"],))
+        case "EV":
+            if fields["Id"] in (_ARMED_EVENT, _DISARMED_EVENT):
+                vessel.put("armed", time_s, (float(fields["Id"] == _ARMED_EVENT),))
+        case "PARM":
+            vessel.parameter(_text(fields["Name"]), float(fields["Value"]))
+        case "MSG":
+            vessel.firmware = vessel.firmware or firmware_of(_text(fields["Message"]))
+        case "VER":
+            vessel.firmware = firmware_of(_text(fields["FWS"])) or vessel.firmware
+
+
+def _output(fields: dict[str, Any], number: int) -> float:
+    """A servo output by its number from 1; old logs name them otherwise."""
+    found = next((fields[f"{begin}{number}"] for begin in ("C", "Ch", "Chan") if f"{begin}{number}" in fields), 0)
+    return float(found)
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, bytes):
+        raise TypeError
+    return value.partition(b"\0")[0].decode("ascii")
+
+
+def _turn(degrees: float) -> float:
+    """Radians in (-pi, pi]; headings are logged from 0 to 360."""
+    return math.remainder(math.radians(degrees), 2.0 * math.pi) if math.isfinite(degrees) else math.nan

@@ -1,0 +1,150 @@
+"""A log as a table: one row per tick of one clock, whatever rate each channel came at.
+
+What a log and a flight in the tank both know has the same name and meaning as in a trial's `steps.parquet`: where the
+vehicle believed to be (`est_`), and with `hindsight.py` its thrusts and wrench.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import polars as pl
+
+from wakewise.core.arrays import Array
+from wakewise.core.geometry import quat_from_euler
+from wakewise.core.physics import GRAVITY_M_S2
+from wakewise_ardusub.logs.gather import HELD_S, MODES, SERVOS, Series, VehicleLog
+
+RATE_HZ = 10.0
+MOST_ROWS = 500_000
+LINE_S = 2.0
+"""Longest gap that depth and attitude are drawn straight across."""
+_POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
+STICKS = ("forward", "right", "down", "turn")
+_STATED = ("depth VFR_HUD", "depth AHRS2", "depth CTUN", "depth BARO")
+_FRESH_KG_M3 = 1000.0
+_ROUNDING_S = 1e-3
+"""Stamps are rounded; a tick this much after the last sample still has it."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LogTable:
+    """Rows of a log at `rate_hz`: time_s, sticks, servo_i_us, depth_m, attitude, armed, mode, voltage_V, est_ poses.
+
+    `depth_from` says which source the depth is of, None without any. What was not known at a time is null.
+    """
+
+    rows: pl.DataFrame
+    rate_hz: float
+    depth_from: str | None
+
+
+def tabulate(log: VehicleLog, rate_hz: float = RATE_HZ) -> LogTable:
+    """Resample a log: commands, states and voltage hold their last value, depth and attitude go straight between two.
+
+    A log longer than `MOST_ROWS` at that rate gets as many rows, at a lower one.
+    """
+    rate = min(rate_hz, MOST_ROWS / max(log.duration_s, 1e-9))
+    time_s = np.arange(int(log.duration_s * rate + _ROUNDING_S) + 1) / rate
+    columns: dict[str, Array | list[str | None]] = {"time_s": time_s}
+    sticks = _held(log, "sticks", time_s, 4)
+    columns |= {f"stick_{name}": sticks[:, i] for i, name in enumerate(STICKS)}
+    servo = _held(log, "servo", time_s, SERVOS)
+    columns |= {f"servo_{i + 1}_us": servo[:, i] for i in range(SERVOS)}
+    depth, source = _depth(log)
+    columns["depth_m"] = _straight(depth, time_s, 1)[:, 0]
+    attitude = log.series.get("attitude")
+    if attitude is not None:
+        known = np.isfinite(attitude.values).all(axis=1)
+        unwound = np.unwrap(attitude.values[known], axis=0)
+        attitude = Series(time_s=attitude.time_s[known].copy(), values=unwound)
+    turned = _straight(attitude, time_s, 3)
+    for i, name in enumerate(("roll", "pitch", "heading")):
+        angle = turned[:, i]
+        columns[f"{name}_rad"] = np.mod(angle, 2.0 * np.pi) if name == "heading" else _wound(angle)
+    columns |= _pose(log, depth, turned, time_s)
+    columns["armed"] = _held(log, "armed", time_s, 1)[:, 0]
+    mode = _held(log, "mode", time_s, 1)[:, 0]
+    modes = MODES if log.identity.is_ardusub else {}
+    columns["mode"] = [None if np.isnan(m) else modes.get(int(m), f"mode {int(m)}") for m in mode]
+    columns["voltage_V"] = _held(log, "voltage", time_s, 1)[:, 0]
+    rows = pl.DataFrame(columns, schema_overrides={"mode": pl.String}).with_columns(pl.col(pl.Float64).fill_nan(None))
+    return LogTable(rows=rows.with_columns(pl.col("armed") > 0.5), rate_hz=rate, depth_from=source)
+
+
+def _pose(log: VehicleLog, depth: Series | None, turned: Array, time_s: Array) -> dict[str, Array]:
+    """Where the vehicle believed to be, as a trial has it; a place that nobody knew is unknown but for its depth."""
+    place = _straight(log.series.get("position"), time_s, 3)
+    if np.isnan(place).all():
+        place[:, 2] = _straight(depth, time_s, 1)[:, 0]
+    attitude = np.full((len(time_s), 4), np.nan)
+    known = np.isfinite(turned).all(axis=1)
+    attitude[known] = quat_from_euler(*turned[known].T)
+    return {f"est_{name}": column for name, column in zip(_POSE, np.column_stack([place, attitude]).T, strict=True)}
+
+
+def _held(log: VehicleLog, channel: str, time_s: Array, width: int) -> Array:
+    """The last sample before each tick, NaN before the first and where it is older than may be; shape (n, width)."""
+    series = log.series.get(channel)
+    result = np.full((len(time_s), width), np.nan)
+    if series is None:
+        return result
+    last = np.searchsorted(series.time_s, time_s + 1e-9, side="right") - 1
+    # The autopilot's own log says states when they change, not again and again.
+    longest = np.inf if log.kind == "dataflash" and channel in ("armed", "mode") else HELD_S[channel]
+    known = (last >= 0) & (time_s - series.time_s[np.maximum(last, 0)] <= longest)
+    result[known] = series.values[last[known]]
+    return result
+
+
+def _straight(series: Series | None, time_s: Array, width: int) -> Array:
+    """Values on the lines between samples, NaN outside and across long gaps; shape (n, width)."""
+    result = np.full((len(time_s), width), np.nan)
+    if series is None:
+        return result
+    good = np.isfinite(series.values).all(axis=1)
+    at, values = series.time_s[good], series.values[good]
+    if len(at) == 0:
+        return result
+    after = np.searchsorted(at, time_s)
+    before_s, after_s = at[np.maximum(after - 1, 0)], at[np.minimum(after, len(at) - 1)]
+    near = (time_s >= at[0]) & (time_s <= at[-1] + _ROUNDING_S) & (after_s - before_s <= LINE_S)
+    for i in range(width):
+        result[near, i] = np.interp(time_s[near], at, values[:, i])
+    return result
+
+
+def _wound(angle: Array) -> Array:
+    """Angles in [-pi, pi)."""
+    return np.asarray(np.mod(angle + np.pi, 2.0 * np.pi) - np.pi)
+
+
+def _depth(log: VehicleLog) -> tuple[Series | None, str | None]:
+    """Depth of the first source that ever changes, else of the first there is."""
+    found: list[tuple[str, Series]] = [
+        (name.removeprefix("depth "), log.series[name]) for name in _STATED if name in log.series
+    ]
+    # The second pressure sensor is the one outside the hull.
+    found += [
+        (f"SCALED_PRESSURE{'' if i == 1 else i}", _of_pressure(log, i))
+        for i in (2, 3, 1)
+        if f"pressure {i}" in log.series
+    ]
+    for name, series in found:
+        values = series.values[np.isfinite(series.values)]
+        if values.size and np.ptp(values) > 0.0:
+            return series, name
+    return (found[0][1], found[0][0]) if found else (None, None)
+
+
+def _of_pressure(log: VehicleLog, number: int) -> Series:
+    """Depth by hydrostatics from the pressure at the surface: the autopilot's, or the least of the log."""
+    series = log.series[f"pressure {number}"]
+    at_surface = log.parameters.get(f"BARO{number}_GND_PRESS", 0.0)
+    if at_surface < 1e4:
+        known = series.values[np.isfinite(series.values)]
+        at_surface = float(known.min()) if known.size else np.nan
+    gravity = log.parameters.get("BARO_SPEC_GRAV", 1.0)
+    density = _FRESH_KG_M3 * (gravity if 0.9 <= gravity <= 1.1 else 1.0)
+    return Series(time_s=series.time_s, values=(series.values - at_surface) / (density * GRAVITY_M_S2))

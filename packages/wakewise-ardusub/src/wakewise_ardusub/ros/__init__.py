@@ -1,0 +1,31 @@
+"""ROS 2 without ROS: what the node in `packages/wakewise-ardusub/ros2/wakewise_ros` does, on plain numbers.
+
+Start reading in `allocator.py` (a wrench, a pose and a target become thrusts). `mapping.py` turns ENU/FLU or NED/FSD
+into our frames and back, `cloud.py` reads the bytes of a PointCloud2.
+"""
+
+from typing import TYPE_CHECKING
+
+from wakewise.core.lazy_imports import lazy_door
+
+if TYPE_CHECKING:
+    from wakewise_ardusub.ros.allocator import Answer, Target, ThrustAllocator, failed_thrusters
+    from wakewise_ardusub.ros.cloud import Field, cloud_points
+    from wakewise_ardusub.ros.mapping import body_points, pose_of, read_frame, world_points, wrench_for, wrench_of
+
+__all__ = [
+    "Answer",
+    "Field",
+    "Target",
+    "ThrustAllocator",
+    "body_points",
+    "cloud_points",
+    "failed_thrusters",
+    "pose_of",
+    "read_frame",
+    "world_points",
+    "wrench_for",
+    "wrench_of",
+]
+
+lazy_door(__name__)

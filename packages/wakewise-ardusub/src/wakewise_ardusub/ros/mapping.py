@@ -1,0 +1,93 @@
+"""Wrenches, poses and points of ROS 2 in our frames, and back.
+
+ROS has ENU worlds and FLU bodies (REP 103, https://www.ros.org/reps/rep-0103.html); marine packages also publish NED
+and forward-starboard-down, our own frames, as `map_ned` and `base_link_fsd` (after REP 105's names,
+https://www.ros.org/reps/rep-0105.html). Quaternions of ROS are (x, y, z, w).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose
+from wakewise.experiments.exports.frames import enu_of, flu_of, ros_body
+
+Frame = Literal["flu", "fsd"]
+FRAMES: dict[Frame, str] = {
+    "flu": "bodies forward-left-up in worlds east-north-up, as ROS has them",
+    "fsd": "bodies forward-starboard-down in worlds north-east-down",
+}
+_UNIT = 1e-2
+"""How far from 1 a quaternion's length may be; more is no rounding, but another thing."""
+
+
+def read_frame(word: str) -> Frame:
+    """The frame that a parameter names."""
+    for frame in FRAMES:
+        if word == frame:
+            return frame
+    raise InputError(f"frame: '{word}', allowed are {', '.join(FRAMES)}")
+
+
+def wrench_of(values: Sequence[float], frame: Frame, before_B: Array) -> Array:
+    """Wrench in FRD, shape (6,), of force x, y, z and torque x, y, z.
+
+    An axis that is NaN stays as it was (`before_B`, shape (6,)), as auv_controllers' own controllers have it.
+
+    Raises
+    ------
+    InputError
+        If there are not six numbers, or one is infinite.
+    """
+    told = np.asarray(values, dtype=np.float64)
+    if told.shape != (6,) or np.isinf(told).any():
+        raise InputError(f"wrench: {' '.join(f'{value:g}' for value in told.ravel())}, must be six finite numbers")
+    known = _turned(told, frame)
+    return np.where(np.isnan(known), before_B, known)
+
+
+def wrench_for(wrench_B: Array, frame: Frame) -> Array:
+    """Force and torque for ROS, shape (6,), of a wrench in FRD."""
+    return _turned(wrench_B, frame)
+
+
+def pose_of(position: Sequence[float], quaternion_xyzw: Sequence[float], frame: Frame) -> Pose:
+    """Pose X_WB of the FRD body in NED of a pose of ROS.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite, or the quaternion is none.
+    """
+    p, q = np.asarray(position, dtype=np.float64), np.asarray(quaternion_xyzw, dtype=np.float64)
+    if p.shape != (3,) or not np.isfinite(p).all():
+        raise InputError(f"pose: position {' '.join(f'{x:g}' for x in p.ravel())}, must be three finite numbers")
+    if q.shape != (4,) or not abs(float(np.linalg.norm(q)) - 1.0) <= _UNIT:
+        raise InputError(f"pose: quaternion {' '.join(f'{x:g}' for x in q.ravel())}, its length must be 1")
+    wxyz = q[[3, 0, 1, 2]] / np.linalg.norm(q)
+    if frame == "flu":
+        p, wxyz = ros_body(p, wxyz)
+    return Pose(p, wxyz)
+
+
+def world_points(xyz: ArrayLike, frame: Frame) -> Array:
+    """Points of ROS's world, shape (n, 3), in NED."""
+    return enu_of(xyz) if frame == "flu" else np.asarray(xyz, dtype=np.float64)
+
+
+def body_points(xyz: ArrayLike, frame: Frame) -> Array:
+    """Points that are fixed to ROS's body, shape (n, 3), in FRD."""
+    return flu_of(xyz) if frame == "flu" else np.asarray(xyz, dtype=np.float64)
+
+
+def _turned(wrench: Array, frame: Frame) -> Array:
+    if frame == "fsd":
+        return np.asarray(wrench, dtype=np.float64)
+    signs = np.array([1.0, -1.0, -1.0])
+    return np.asarray(wrench * np.tile(signs, 2) + 0.0)

@@ -1,0 +1,155 @@
+"""Who takes the photographs at sea: a camera that MAVLink reaches, or a program of the operator's.
+
+The session says when (its buttons, or the mission) and keeps from where; the camera takes them. Three ways:
+
+- `mavlink`: MAV_CMD_IMAGE_START_CAPTURE, one image, to every component of the vehicle (MAVLink's camera protocol; an
+  autopilot of 4.4 or later with a camera set up takes it as well);
+- `digicam`: MAV_CMD_DO_DIGICAM_CONTROL, its older kin, which every ArduPilot with a camera set up takes;
+- `run:PROGRAM ...`: a program for each photograph, for cameras that speak no MAVLink, as the stock one of a BlueROV2.
+
+Nobody waits for any of them in the flying thread.
+"""
+
+from __future__ import annotations
+
+import shlex
+import shutil
+import subprocess
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose
+from wakewise_ardusub.link.journal import Journal
+from wakewise_ardusub.link.listening import DIGICAM_CONTROL, IMAGE_START_CAPTURE
+from wakewise_ardusub.link.warden import Warden
+
+PHOTOGRAPHS = "photographs"
+CAMERAS_FILE = "cameras.csv"
+PATIENCE_S = 30.0
+"""A program that takes longer over a photograph is ended."""
+_COLUMNS = "name,x_m,y_m,z_m,qw,qx,qy,qz,flight_s,utc_s"
+_ALL_COMPONENTS = 0
+RIGHT = "mavlink, digicam, or run:PROGRAM with {file} where the photograph goes"
+
+
+class Camera(Protocol):
+    """Takes photographs."""
+
+    def take(self, number: int) -> None:
+        """Have photograph `number`, from 1, taken; does not wait for it."""
+        ...
+
+    def close(self) -> None:
+        """Finish what is under way."""
+        ...
+
+
+MakeCamera = Callable[[Warden, Path, Journal], Camera]
+"""Makes the camera of a session: its warden, its folder and its journal."""
+
+
+def photo_name(number: int) -> str:
+    """What photograph `number`, from 1, is called in the record."""
+    return f"{number:04d}.jpg"
+
+
+def parse_camera(words: str) -> MakeCamera:
+    """Read what `--camera` says.
+
+    Raises
+    ------
+    InputError
+        If it is none of the ways, or the program is not there.
+    """
+    if words in ("mavlink", "digicam"):
+        return lambda warden, folder, journal: MavlinkCamera(warden, digicam=words == "digicam")  # noqa: ARG005
+    way, _, line = words.partition(":")
+    if way != "run":
+        raise InputError(f"--camera {words!r}: right is {RIGHT}")
+    try:
+        program = shlex.split(line)
+    except ValueError as fault:
+        raise InputError(f"--camera {words!r}: {fault}; right is {RIGHT}") from None
+    if not program:
+        raise InputError(f"--camera {words!r}: nothing to run; right is {RIGHT}")
+    if shutil.which(program[0]) is None:
+        raise InputError(f"--camera {words!r}: there is no program {program[0]}")
+    return lambda warden, folder, journal: ProgramCamera(program, folder / PHOTOGRAPHS, journal)  # noqa: ARG005
+
+
+@dataclass(eq=False)
+class MavlinkCamera:
+    """A camera of the vehicle that takes MAVLink's commands; what it answers is the warden's to hear."""
+
+    warden: Warden
+    digicam: bool = False
+
+    def take(self, number: int) -> None:
+        """Ask for one image now."""
+        # IMAGE_START_CAPTURE: all cameras, no interval, one image, its number. DO_DIGICAM_CONTROL: shoot is the fifth.
+        numbers = (0, 0, 0, 0, 1, number, 0) if self.digicam else (0, 0, 1, number, 0, 0, 0)
+        command = DIGICAM_CONTROL if self.digicam else IMAGE_START_CAPTURE
+        fields = {f"param{i}": float(value) for i, value in enumerate(numbers, start=1)}
+        target = {"target_system": self.warden.known.system, "target_component": _ALL_COMPONENTS}
+        self.warden.say("command_long", {**target, "command": command, "confirmation": 0, **fields})
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+class ProgramCamera:
+    """A program for each photograph, one after the other, in a thread of its own.
+
+    Parameters
+    ----------
+    program : list of str
+        Its words; {file} becomes the photograph's path and {number} its number.
+    folder : Path
+        Where photographs go; made with the first.
+    journal : Journal
+        Is told how each went.
+    """
+
+    def __init__(self, program: list[str], folder: Path, journal: Journal) -> None:
+        self._program, self._folder, self._journal = program, folder, journal
+        self._beside = ThreadPoolExecutor(1, thread_name_prefix="camera")
+
+    def take(self, number: int) -> None:
+        """Start it, or have it wait for the one before."""
+        self._beside.submit(self._run, number)
+
+    def close(self) -> None:
+        """Wait for the last photograph."""
+        self._beside.shutdown(wait=True)
+
+    def _run(self, number: int) -> None:
+        file = self._folder / photo_name(number)
+        words = [word.replace("{file}", str(file)).replace("{number}", str(number)) for word in self._program]
+        began_s = time.monotonic()
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, timeout=PATIENCE_S, check=False)
+            said = done.stderr.decode("utf-8", "replace").strip().splitlines()
+            amiss = "" if done.returncode == 0 else f"ended with {done.returncode}: {said[-1] if said else ''}"
+        except subprocess.TimeoutExpired:
+            amiss = f"took longer than {PATIENCE_S:g} s"
+        except OSError as fault:
+            amiss = fault.strerror or str(fault)
+        took_s = round(time.monotonic() - began_s, 3)
+        self._journal.write("camera", number=number, file=str(file), there=file.exists(), took_s=took_s, amiss=amiss)
+
+
+def note_view(folder: Path, number: int, X_WC: Pose, flight_s: float) -> None:
+    """Add the camera's centre and attitude at a photograph to a table that `wakewise reconstruct` takes."""
+    path = folder / CAMERAS_FILE
+    figures = (*X_WC.p_m, *X_WC.q)
+    row = ",".join(
+        (photo_name(number), *(f"{value:.6f}" for value in figures), f"{flight_s:.3f}", f"{time.time():.3f}")
+    )
+    with path.open("a", encoding="utf-8") as file:
+        file.write(f"{row}\n" if path.stat().st_size else f"{_COLUMNS}\n{row}\n")

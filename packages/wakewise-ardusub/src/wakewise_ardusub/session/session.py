@@ -1,0 +1,265 @@
+"""A session beside the pilot: from a connection to a flight, in threads that none of waits for another.
+
+The link's thread listens and watches from the first moment; another waits until the vehicle is heard, makes the parts,
+rehearses them and then flies (`LiveFlight`). Whoever owns the session looks on, hands the operator's
+key presses over and ends it.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError, StageError
+from wakewise.core.geometry import Pose, matrix_from_quat
+from wakewise.core.interfaces import BodyState
+from wakewise.core.jit.precompile import warm
+from wakewise.operation.flying import FLIGHT_JOBS
+from wakewise.operation.scenario import Scenario
+from wakewise.operation.teleop.live import LiveFlight
+from wakewise.robot.importers import any_vehicle
+from wakewise_ardusub.link.drive import VehicleDrive
+from wakewise_ardusub.link.journal import JOURNAL_FILE, Journal
+from wakewise_ardusub.link.link_thread import LinkThread, Receiving
+from wakewise_ardusub.link.listening import attitude_of
+from wakewise_ardusub.link.warden import Send, Warden
+from wakewise_ardusub.session.cameras import MakeCamera, note_view
+from wakewise_ardusub.session.join import AtSea, at_sea
+from wakewise_ardusub.session.rehearsal import rehearse
+from wakewise_ardusub.session.target import WhatToSpare, ball
+
+LOOK_S = 0.05
+LEFT_S = 2.0
+"""How long preparations are waited for at the end: there is nothing to keep of them."""
+
+
+@dataclass(kw_only=True, eq=False)
+class SeaSession:
+    """One session with one vehicle.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    receiving : Receiving
+    send : callable
+    folder : Path
+        Becomes a trial folder with a journal.
+    spare : WhatToSpare
+    session : int
+        Number of this program's heartbeats.
+    wardens : mapping
+        What else the warden takes: limits, buttons, listen_only.
+    camera : callable, optional
+        Makes what takes the photographs; without it they are noted and not taken.
+    """
+
+    scenario: Scenario
+    receiving: Receiving
+    send: Send
+    folder: Path
+    spare: WhatToSpare
+    session: int
+    wardens: dict[str, Any] = field(default_factory=dict)
+    camera: MakeCamera | None = None
+    fault: BaseException | None = None
+    preparing: str = "not begun"
+    live: LiveFlight | None = None
+    photographs: int = 0
+    sea: AtSea | None = None
+
+    def __post_init__(self) -> None:
+        if (self.folder / "steps.parquet").exists():
+            raise InputError(f"--out {self.folder}: holds a flight already, give another folder")
+        self.vehicle = any_vehicle(self.scenario.vehicle)
+        self.drive = VehicleDrive(self.vehicle)
+        self.journal = Journal(self.folder / JOURNAL_FILE)
+        self.warden = Warden(
+            send=self.send, drive=self.drive, journal=self.journal, session=self.session, **self.wardens
+        )
+        self._camera = None if self.camera is None else self.camera(self.warden, self.folder, self.journal)
+        self._link = LinkThread(self.receiving, self.warden)
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="session", daemon=True)
+
+    def start(self) -> None:
+        """Listen, and fly once the vehicle is heard."""
+        told = {"vehicle": self.vehicle.name, "method": self.scenario.method, "system": self.warden.known.system}
+        self.journal.write("begin", **told)
+        self._link.start()
+        self._thread.start()
+
+    def stop(self, why: str) -> None:
+        """Let go of the vehicle at once, then end the flight, write its folder and close the journal."""
+        self._link.stop(why)
+        self._over.set()
+        if self.live is not None:
+            self.live.stop()
+        if self._thread.is_alive():
+            flies = self.live is not None and self.live.preparing is None
+            self._thread.join(None if flies else LEFT_S)
+        if self._camera is not None:
+            self._camera.close()
+        self.fault = self.fault or self._link.fault
+        known, warden = self.warden.known, self.warden
+        self.journal.write(
+            "end", why=why, messages=known.messages, garbage=known.garbage, thrusts=warden.thrusts_sent,
+            releases=warden.releases_sent, not_sent=warden.unsent, engagements=warden.engagement.entries,
+            **self.figures(),
+        )  # fmt: skip
+        self.journal.close()
+
+    @property
+    def running(self) -> bool:
+        """Whether anything is still at work."""
+        return self._thread.is_alive()
+
+    def figures(self) -> dict[str, Any]:
+        """How the flight's loop kept its time, in ms; None before it began."""
+        live = self.live
+        flies = live is not None and live.time_s > 0.0
+        pace = live.pace if live is not None and flies else None
+        return {
+            "flown_s": None if live is None else round(live.time_s, 3),
+            "loop_jitter_ms_p99": None if pace is None else round(1e3 * pace.late_s(), 3),
+            "photographs": self.photographs,
+            "photographs_confirmed": self.warden.known.photographs,
+            "trips": dict(self.warden.margins.trips),
+        }
+
+    def line(self) -> str:
+        """How it stands, in one line for people."""
+        warden, facts = self.warden, self.warden.facts()
+        known, engagement = warden.known, warden.engagement
+        armed = {True: "armed", False: "disarmed", None: "not heard"}[known.armed]
+        state = f"{engagement.state:<9}" + ("" if engagement.state == "engaged" else f" ({engagement.why})")
+        parts = [state, f"{known.mode_name or '-'} {armed}", f"pose {_age(facts.pose_s)}"]
+        if self.sea is not None and self.sea.figures.speeds_m_s is not None:
+            flown, least = (1e3 * speed for speed in self.sea.figures.speeds_m_s)
+            parts.append(f"water at the target {flown:.1f} mm/s rms, by least thrusts {least:.1f}")
+        margins = warden.margins.words(warden.limits)
+        if margins:
+            parts.append(margins)
+        if self._camera is not None and known.camera:
+            parts.append(known.camera)
+        live = self.live
+        if live is None or live.preparing is not None:
+            parts.append(self.preparing if live is None else f"begins: {live.preparing}")
+        else:
+            parts.append(f"loop {1e3 * live.pace.late_s():.1f} ms")
+        return "  ".join(parts)
+
+    def _run(self) -> None:
+        try:
+            sea = self._prepared()
+            if sea is None:
+                return
+            self.sea = sea
+            self.live = live = LiveFlight(sea.parts, folder=self.folder, watch=sea.figures, checked=False)
+            if self._over.is_set():
+                return
+            live.run()
+        except BaseException as fault:  # the owner asks for it; the vehicle is not driven without a flight
+            self.fault = fault
+            self.warden.release(f"the flight ended ({type(fault).__name__}: {fault})")
+
+    def _warming(self, done: float, total: float, note: str = "") -> None:
+        self.preparing = f"compiles, {done:g} of {total:g} done: {note}" if total else note
+
+    def _prepared(self) -> AtSea | None:
+        """Wait for the vehicle, and join the parts to it; None where the session ended before."""
+        warden = self.warden
+        warm(FLIGHT_JOBS, self._warming)
+        while not self._over.wait(LOOK_S):
+            facts, buttons = warden.facts(), warden.buttons_amiss
+            if buttons:
+                raise InputError(buttons)
+            lacking = [
+                what
+                for what, age_s in (
+                    ("heartbeat", facts.heartbeat_s), ("attitude", facts.telemetry_s), ("position", facts.pose_s),
+                    ("depth", 0.0 if math.isfinite(facts.depth_m) else math.inf),
+                    ("BTNn_FUNCTION", math.inf if buttons is None else 0.0),
+                )
+                if not age_s < warden.limits.heartbeat_s
+            ]  # fmt: skip
+            above_m = 0.0 if lacking else self._above_water_m()
+            if not lacking and above_m <= 0.0:
+                break
+            self.preparing = (
+                f"waits for {', '.join(lacking)} of system {warden.known.system}"
+                if lacking
+                else f"waits until the hull is under water, {above_m:.2f} m of it are above"
+            )
+        else:
+            return None
+        self.preparing = "makes the parts"
+        start = self._here()
+        middle, radius, region = self.spare.found(start, self.vehicle.size_m[0], float(self.vehicle.X_BC.p_m[2]))
+        warden.target_W_m = middle
+        sea = at_sea(
+            self.scenario,
+            warden,
+            start=start,
+            target=ball(middle, radius),
+            region=region,
+            clock=lambda: self._flight().pace,
+            wait=lambda seconds: self._flight().wait(seconds),
+            flown_N=self._flown_N,
+            photographed=self._photographed,
+        )
+        self.preparing = "rehearses"
+        took_s, period_s = rehearse(sea), 1.0 / sea.parts.control.rate_hz
+        self.journal.write("rehearsed", step_ms=1e3 * took_s, period_ms=1e3 * period_s, target_W_m=middle)
+        if took_s > period_s:
+            raise StageError(
+                f"method {self.scenario.method}: a step takes {1e3 * took_s:.0f} ms on this computer, the control "
+                f"period is {1e3 * period_s:.0f} ms; end what else runs here, or take a lighter method, such as instant"
+            )
+        # The vehicle may have moved while parts were made: an estimator that begins where it was takes the step to
+        # where it is for a load, and the controller would push against that.
+        return replace(sea, parts=sea.parts.replace(start=self._here()))
+
+    def _here(self) -> BodyState:
+        """Where the vehicle is now, as heard; a position was heard."""
+        known = self.warden.known
+        assert known.place_W_m is not None
+        return BodyState(X_WB=Pose(known.place_W_m, attitude_of(known)))
+
+    def _above_water_m(self) -> float:
+        """How far the highest corner of the hull's box is above the surface (m); negative if it is below."""
+        R_WB = matrix_from_quat(attitude_of(self.warden.known))
+        return float(0.5 * np.abs(R_WB[2]) @ np.array(self.vehicle.size_m)) - self.warden.known.depth_m
+
+    def _flight(self) -> LiveFlight:
+        assert self.live is not None  # nobody asks before there is one
+        return self.live
+
+    def _flown_N(self) -> Array:
+        known = self.warden.known
+        return self.drive.flown_N(known.parameters, known.servo_us, known.battery_V)
+
+    def _photographed(self) -> None:
+        self.photographs += 1
+        live, sea = self._flight(), self.sea
+        step = live.latest
+        if step is not None and sea is not None:
+            X_WC = step.estimate.X_WB @ self.vehicle.X_BC_at(step.tilt_rad)
+            sea.figures.photographed(X_WC)
+            self.journal.write(
+                "photograph", number=self.photographs, flight_s=live.time_s, p_WC_m=X_WC.p_m, q_WC=X_WC.q
+            )
+            with suppress(OSError):  # a full disk ends no flight; the journal counts what it lost
+                note_view(self.folder, self.photographs, X_WC, live.time_s)
+        if self._camera is not None:
+            self._camera.take(self.photographs)
+
+
+def _age(seconds: float) -> str:
+    return f"{1e3 * seconds:.0f} ms" if seconds < 10.0 else "none"

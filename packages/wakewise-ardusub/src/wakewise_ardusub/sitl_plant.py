@@ -1,0 +1,120 @@
+"""A scenario's vehicle in its water behind an autopilot's firmware: any vehicle and any world that there is a truth of.
+
+The firmware is answered with what truly is, not with what sensors say: its own sensor models are in it. Position is the
+tank's own, with its surface at a depth of 0, which the vehicle cannot leave (`Surface`). Neither mission nor controller
+of the scenario has a part in it, but for where the vehicle starts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.core.interfaces import BodyState, Plant, Witness
+from wakewise.core.jit.precompile import warm
+from wakewise.core.physics import GRAVITY_M_S2
+from wakewise_ardusub.physics.datagrams import Motion
+from wakewise_ardusub.physics.lowering import Lowered
+from wakewise_ardusub.physics.physics import Body
+from wakewise_ardusub.physics.surface import Surface
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from wakewise.operation.parts import Parts
+
+_GRAVITY_W_M_S2 = np.array([0.0, 0.0, GRAVITY_M_S2])
+
+
+class FlownBody:
+    """A plant with a witness, as `wakewise_ardusub.physics.Body`.
+
+    The specific force is the mean over the step: what the velocity in the world gained, less gravity, in B.
+
+    Parameters
+    ----------
+    plant : Plant
+    witness : Witness
+    surface : Surface, optional
+        Where the water ends; the plant must have a method `push`.
+    """
+
+    def __init__(self, plant: Plant, witness: Witness, surface: Surface | None = None) -> None:
+        self._plant, self._witness, self._surface = plant, witness, surface
+        self._time_s = 0.0
+        self.state = witness.observe().state
+        """Where it is and how it moves."""
+        self._v_W_m_s = _velocity_W(self.state)
+        self._push: Callable[[Array], None] | None = None if surface is None else plant.push  # type: ignore[attr-defined]
+
+    def step(self, thrusts_N: Array, dt_s: float) -> Motion:
+        """Hold commanded thrusts, shape (n,), for `dt_s`."""
+        if self._surface is not None and self._push is not None:
+            self._push(self._surface.wrench_B(self.state.X_WB))
+            thrusts_N = self._surface.thrusts(thrusts_N, self.state.X_WB)
+        self._plant.step(thrusts_N, dt_s)
+        self._time_s += dt_s
+        self.state = state = self._witness.observe().state
+        R_WB, before = state.X_WB.R, self._v_W_m_s
+        self._v_W_m_s = _velocity_W(state)
+        return Motion(
+            time_s=self._time_s,
+            omega_B_rad_s=state.nu_B[3:],
+            force_B_m_s2=((self._v_W_m_s - before) / dt_s - _GRAVITY_W_M_S2) @ R_WB,
+            p_WB_m=state.X_WB.p_m,
+            q_WB=state.X_WB.q,
+            v_W_m_s=self._v_W_m_s,
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BehindFirmware:
+    """The world of a scenario's parts, made ready to be driven by a firmware; `begin` is what `Physics` takes.
+
+    Parameters
+    ----------
+    parts : Parts
+    held_s : float
+        How long the vehicle is held at the surface first, see `Lowered`; 0 begins at its start.
+    """
+
+    parts: Parts
+    held_s: float = 0.0
+
+    def begin(self) -> Body:
+        """The vehicle at its start, a fresh one at each call.
+
+        Raises
+        ------
+        InputError
+            If there is no truth of the world that could be told, or the vehicle does not fit into it.
+        """
+        plant, witness = self.parts.world.begin()
+        if witness is None:
+            raise InputError(f"--world {self.parts.scenario.world}: nobody knows the truth of it, a firmware needs it")
+        surface = Surface.of(self.parts.vehicle) if self.has_surface(plant) else None
+        body = FlownBody(plant, witness, surface)
+        return Lowered(body, body.state, self.held_s) if self.held_s > 0.0 else body
+
+    @staticmethod
+    def has_surface(plant: Plant) -> bool:
+        """Whether a plant can be given a surface: all of this package can, those of others may lack `push`."""
+        return hasattr(plant, "push")
+
+    def ready(self, progress: Callable[..., None]) -> str:
+        """Compile what a flight in it needs and move it once; what people should know of it, in words."""
+        warm(("fly",), progress)
+        plant, witness = self.parts.world.begin()
+        if witness is not None:
+            FlownBody(plant, witness).step(np.zeros(len(self.parts.vehicle.thrusters)), 0.0025)
+        self.begin()
+        return "" if self.has_surface(plant) else "the world has no method push: the vehicle can rise out of its water"
+
+
+def _velocity_W(state: BodyState) -> Array:
+    velocity: Array = state.X_WB.R @ state.nu_B[:3]
+    return velocity

@@ -1,0 +1,221 @@
+"""The meter itself: pulses and pose in, a reading out, and sums over the last minute and the whole dive."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose
+from wakewise.wake.disturbance import split_roots
+from wakewise.wake.view import WakeView
+from wakewise_ardusub.logs.gather import SERVOS
+from wakewise_ardusub.motors import directions_of_motors, motor_channels
+from wakewise_ardusub.vehicle_summary import Craft
+from wakewise_ardusub.wash_meter.hearing import Hearing
+from wakewise_ardusub.wash_savings import SHARES, Shares, Spared, Sparing, look, saved_pct
+
+MINUTE_S = 60.0
+"""Over how long the one number is taken: long enough to be calm, short enough to answer what a pilot tries."""
+_HERE = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Reading:
+    """One instant of m thrusters.
+
+    Parameters
+    ----------
+    time_s : float
+    why_not : str or None
+        Why there is no judgement at this instant, None where there is one.
+    spared : Spared or None
+    peak_m_s, rms_m_s : dict of float
+        Highest speed at the points and root mean square over them, as flown, with least thrusts and with gentle ones.
+    shares : ndarray, shape (m,)
+        Of D as flown that each thruster's jet brings, in per cent; they add up to 100, and one whose jet takes speed
+        out of another's is negative. Zeros without D.
+    in_world : bool
+        Whether the points stand in the world (a marked target), or go with the vehicle.
+    """
+
+    time_s: float
+    why_not: str | None = None
+    spared: Spared | None = None
+    peak_m_s: dict[Shares, float] = field(default_factory=dict)
+    rms_m_s: dict[Shares, float] = field(default_factory=dict)
+    shares: Array = field(default_factory=lambda: np.zeros(0))
+    in_world: bool = False
+
+    @property
+    def running(self) -> bool:
+        """Whether a thruster runs."""
+        return self.spared is not None and bool(np.any(self.spared.thrusts_N["flown"]))
+
+
+@dataclass
+class Sum:
+    """D added up over instants in which thrusters ran."""
+
+    instants: int = 0
+    flown: float = 0.0
+    gentle: float = 0.0
+
+    def add(self, flown: float, gentle: float, instants: int = 1) -> None:
+        """Add an instant, or take one away."""
+        self.instants += instants
+        self.flown += flown
+        self.gentle += gentle
+
+    def saved_pct(self, weight: float) -> float | None:
+        """Of D as flown that gentle thrusts would have spared; None where there was next to none."""
+        return saved_pct(self.flown, self.gentle, self.instants * weight) if self.instants else None
+
+
+class Meter:
+    """Judges what a `Hearing` holds, whenever it is asked.
+
+    Parameters
+    ----------
+    craft : Craft
+    hearing : Hearing
+    points_B_m, weights : ndarray, shape (n, 3) and (n,)
+        What is to be spared, in the vehicle's frame.
+
+    Raises
+    ------
+    InputError
+        If the autopilot's parameters as known beforehand do not fit the craft, or this computer cannot judge it.
+    """
+
+    def __init__(self, craft: Craft, hearing: Hearing, points_B_m: Array, weights: Array) -> None:
+        self.craft, self.hearing = craft, hearing
+        self.weight = float(np.sum(weights))
+        self.dive = Sum()
+        self._points_B_m, self._weights = points_B_m, weights
+        self._carried = _Seen.at(look(craft, points_B_m, weights), _HERE)
+        self._mark: WakeView | None = None
+        self._minute: deque[tuple[float, float, float]] = deque()
+        self._known: dict[str, float] | None = None
+        self._misfit: str | None = None
+        self._sparing = Sparing(craft, directions_of_motors({}, craft.count))
+        self._channels = motor_channels(craft, {})
+        self._fit()
+        if self._misfit is not None:
+            raise InputError(self._misfit)
+        # Kernels that are compiled or read are so now, not when thrusters first run.
+        self._sparing.judge(np.full(craft.count, 1600.0), self._sparing.supply_V(None), self._carried.gram)
+
+    @property
+    def directions_known(self) -> bool:
+        """Whether the autopilot has said which motors run the other way."""
+        known = self.hearing.parameters
+        return all(f"MOT_{i + 1}_DIRECTION" in known for i in range(self.craft.count))
+
+    @property
+    def marked(self) -> bool:
+        """Whether the target stands in the world."""
+        return self._mark is not None
+
+    def mark(self, now_s: float) -> str | None:
+        """Let the points stay where they are now while the vehicle moves; why not, where its place is not known."""
+        pose = self.hearing.pose(now_s)
+        if pose is None:
+            return "the autopilot does not say where the vehicle is (LOCAL_POSITION_NED and ATTITUDE)"
+        self._mark = look(self.craft, pose.apply(self._points_B_m), self._weights)
+        return None
+
+    def unmark(self) -> None:
+        """Let the points go with the vehicle again."""
+        self._mark = None
+
+    def saved_pct(self) -> float | None:
+        """Spared over the last minute; None where there was nothing to spare."""
+        last = Sum(len(self._minute), sum(d for _, d, _ in self._minute), sum(g for _, _, g in self._minute))
+        return last.saved_pct(self.weight)
+
+    def read(self, now_s: float) -> Reading:
+        """The reading at a time, which must not run back."""
+        self._fit()
+        while self._minute and self._minute[0][0] < now_s - MINUTE_S:
+            self._minute.popleft()
+        pulses = self.hearing.last("servo", now_s)
+        if self.hearing.identity.is_other:
+            return Reading(time_s=now_s, why_not=f"the vehicle is no ArduSub: {self.hearing.identity.words}")
+        if self._misfit is not None:
+            return Reading(time_s=now_s, why_not=self._misfit)
+        if pulses is None:
+            return Reading(time_s=now_s, why_not="no servo outputs are heard")
+        own = pulses[[channel - 1 for channel in self._channels]]
+        if not np.isfinite(own).all():
+            return Reading(time_s=now_s, why_not="a motor's servo output says nothing")
+        seen = self._carried
+        if self._mark is not None:
+            pose = self.hearing.pose(now_s)
+            if pose is None:
+                return Reading(time_s=now_s, why_not="the vehicle's place is not known, so the mark's is not")
+            seen = _Seen.at(self._mark, pose)
+        supply_V = self._sparing.supply_V(self.hearing.number("voltage", now_s))
+        spared = self._sparing.judge(own, supply_V, seen.gram)
+        reading = Reading(
+            time_s=now_s,
+            spared=spared,
+            peak_m_s={share: seen.peak_m_s(spared.thrusts_N[share]) for share in SHARES},
+            rms_m_s={share: float(np.sqrt(spared.disturbance[share] / self.weight)) for share in SHARES},
+            shares=seen.shares_pct(spared.thrusts_N["flown"]),
+            in_world=self._mark is not None,
+        )
+        if reading.running:
+            flown, gentle = spared.disturbance["flown"], spared.disturbance["gentle"]
+            self._minute.append((now_s, flown, gentle))
+            self.dive.add(flown, gentle)
+        return reading
+
+    def _fit(self) -> None:
+        """Take the autopilot's parameters when they changed."""
+        known = self.hearing.parameters
+        if known == self._known:
+            return
+        self._known = known
+        self._misfit = None
+        try:
+            self._channels = motor_channels(self.craft, known)
+        except InputError as fault:
+            # They come one by one; until all are there, the motors are taken in their order.
+            self._channels = motor_channels(self.craft, {})
+            self._misfit = str(fault) if all(f"SERVO{i + 1}_FUNCTION" in known for i in range(SERVOS)) else None
+        directions = directions_of_motors(known, self.craft.count)
+        if not np.array_equal(directions, self._sparing.directions):
+            self._sparing = Sparing(self.craft, directions)
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """Points before the jets at one pose: D's matrix, shape (2 m, 2 m), and velocities, shape (2 m, n, 3)."""
+
+    gram: Array
+    velocity: Array
+
+    @classmethod
+    def at(cls, view: WakeView, pose: Pose) -> _Seen:
+        """What a pose makes of a view."""
+        R = pose.R
+        origins, axes = pose.apply(view.positions_B_m), view.axes_B @ R.T
+        jets = (np.concatenate([origins, origins]), np.concatenate([-axes, axes]), np.tile(view.areas_m2, 2))
+        return cls(gram=view.gram(pose), velocity=view.wake.unit_velocity(view.points_W_m, *jets))
+
+    def peak_m_s(self, thrusts_N: Array) -> float:
+        """Highest speed at a point."""
+        velocity = np.einsum("i,inx->nx", split_roots(thrusts_N), self.velocity)
+        return float(np.max(np.linalg.norm(velocity, axis=1)))
+
+    def shares_pct(self, thrusts_N: Array) -> Array:
+        """Of D that each thruster brings, shape (m,): s_i (G s)_i over s' G s."""
+        roots = split_roots(thrusts_N)
+        part = roots * (self.gram @ roots)
+        total = float(np.sum(part))
+        m = len(thrusts_N)
+        return 100.0 * (part[:m] + part[m:]) / total if total > 0.0 else np.zeros(m)

@@ -1,0 +1,39 @@
+"""A fresh Python in which nothing can be imported but the standard library, NumPy, pymavlink and this package."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+SOURCE = Path(__file__).parents[3] / "src"
+GATE = """
+import sys
+class Gate:
+    allowed = frozenset(sys.stdlib_module_names) | {"numpy", "pymavlink", "fastcrc", "wakewise"}
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] not in self.allowed:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+sys.meta_path.insert(0, Gate())
+"""
+"""fastcrc is pymavlink's own."""
+
+
+def command(code: str, *arguments: str) -> list[str]:
+    """What to run; `-X importtime` would show that nothing else is there."""
+    return [sys.executable, "-W", "error", "-c", GATE + code, *arguments]
+
+
+def environment() -> dict[str, str]:
+    """The package from its source, whatever is installed."""
+    return os.environ | {"PYTHONPATH": str(SOURCE)}
+
+
+def bare(code: str, *arguments: str) -> str:
+    """Run code there; what it printed."""
+    done = subprocess.run(
+        command(code, *arguments), env=environment(), capture_output=True, text=True, check=False, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout

@@ -1,0 +1,284 @@
+"""A flight beside the pilot, against the stand-in and the shipped script, in its own time."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import BodyState
+from wakewise.operation.flying import loop_of, recorder_of
+from wakewise.operation.scenario import Scenario
+from wakewise.operation.teleop.shutter import Shutter
+from wakewise.robot.vehicles import load_vehicle
+from wakewise_ardusub.link.journal import Journal, read_journal
+from wakewise_ardusub.link.listening import attitude_of
+from wakewise_ardusub.link.protocol import ALT_HOLD, STABILIZE
+from wakewise_ardusub.session.join import SEA, at_sea
+from wakewise_ardusub.session.rehearsal import rehearse
+from wakewise_ardusub.session.session import SeaSession
+from wakewise_ardusub.session.target import WhatToSpare, ball, ball_points
+from wakewise_ardusub.sitl.aboard import Aboard
+from wakewise_ardusub.sitl.rehearsal import Rehearsal
+
+MISSION = {
+    "mission.elevations_deg": [15.0],
+    "mission.views": [4],
+    "mission.speed_m_s": 0.25,
+    "mission.acceleration_m_s2": 0.2,
+    "mission.approach_m": 0.1,
+    "mission.settle_s": 0.5,
+    "mission.standoff_m": 0.7,
+}
+
+
+def aboard(journal: Journal | None = None) -> Aboard:
+    """A warden beside the stand-in whose thrusts are the flight's alone."""
+    made = Aboard(Rehearsal(load_vehicle("bluerov2-heavy"), loop_hz=50.0), journal=journal)
+    made.decides = False
+    return made
+
+
+class Clock:
+    """A flight that begins now."""
+
+    def __init__(self, began_s: float) -> None:
+        self.began_s = began_s
+
+    def due_s(self, time_s: float) -> float:
+        """When a time of the flight has come."""
+        return self.began_s + time_s
+
+
+def afloat(companion: Aboard, method: str = "dp"):
+    """The parts of a flight of the vehicle of a companion, and how often it took a photograph."""
+    known = companion.warden.known
+    start = BodyState(X_WB=Pose(known.place_W_m, attitude_of(known)))
+    middle = start.X_WB.apply(np.array([0.9, 0.0, 0.0]))
+    scenario = Scenario(vehicle="bluerov2-heavy", method=method).replace(**SEA, **MISSION)
+    photographs: list[float] = []
+    sea = at_sea(
+        scenario,
+        companion.warden,
+        start=start,
+        target=ball(middle, 0.2),
+        region=ball_points(middle, 0.2),
+        clock=lambda: Clock(companion.clock()),
+        wait=companion.flight.run,
+        flown_N=companion.flown_N,
+        photographed=lambda: photographs.append(companion.clock()),
+    )
+    return sea, photographs
+
+
+def test_arm_engage_fly_an_orbit_capture_release_disarm(tmp_path):
+    """The whole of a session: an orbit round the target with its photographs, on thrusts that the script puts out.
+
+    The pilot has the vehicle before and after; no output is driven while it is disarmed or the pilot flies.
+    """
+    journal = Journal(tmp_path / "journal.jsonl")
+    companion = aboard(journal)
+    companion.flight.run(1.0)
+    sea, photographs = afloat(companion)
+    assert rehearse(sea) < 5.0
+    shutter = Shutter(sea.parts)
+    steps, goals = [], []
+
+    def watch(step):
+        record(step)
+        sea.figures(step)
+        steps.append(step)
+        goals.append(float(np.linalg.norm(step.goal.X_WB.p_m - step.estimate.X_WB.p_m)))
+
+    plant, witness = sea.parts.world.begin()
+    record = recorder_of(sea.parts, witness, shutter)
+    fly = loop_of(sea.parts, plant, witness, watch)
+    at = {"engaged": 0.0, "released": 0.0}
+
+    def direct(time_s: float) -> None:
+        """What the operator does, by the clock of the flight."""
+        if companion.warden.entry is None and at["engaged"] == 0.0 and time_s > 2.5:
+            assert companion.warden.press() == "engaged"
+            at["engaged"] = companion.clock()
+        elif at["engaged"] and companion.clock() > at["engaged"] + 1.0 and not photographs:
+            sea.desk.set(mode="scan")
+        if at["engaged"] and not at["released"] and len(photographs) == 4 and sea.desk.state.mode == "hold":
+            companion.warden.press()
+            at["released"] = companion.clock()
+
+    companion.flight.arm(True)
+    companion.flight.set("WKW_ENABLE", 1.0)
+    over = iter(range(800))
+    fly(duration_s=None, pace=direct, stop=lambda: next(over, 799) > 700 or bool(at["released"]))
+    companion.flight.run(1.0)
+    companion.flight.arm(False)
+    companion.flight.run(1.0)
+    companion.warden.end("the session is over")
+    companion.flight.run(0.2)
+    journal.close()
+
+    assert len(photographs) == 4
+    flown = [step for step in steps if step.command.thrusts_N.any()]
+    away = np.array([step.estimate.X_WB.p_m - sea.parts.target.centre_W_m for step in flown])
+    turned = np.ptp(np.unwrap(np.arctan2(away[:, 1], away[:, 0])))
+    assert np.degrees(turned) > 265.0  # from the first of four views to the last
+    apart = [far for step, far in zip(steps, goals, strict=True) if step.command.thrusts_N.any()]
+    assert np.sqrt(np.mean(np.square(apart))) < 0.1
+    driven = [moment.time_s + 1000.0 for moment in companion.flight.moments if moment.overridden]
+    assert all(moment.armed for moment in companion.flight.moments if moment.overridden)
+    assert min(driven) >= at["engaged"]
+    assert max(driven) <= at["released"] + 0.3
+    assert not companion.flight.moments[-1].thrusting
+    values = {m.name for m in companion.flight.said if m.get_type() == "NAMED_VALUE_FLOAT"}
+    assert {"WKW_ENG", "WKW_VER"} <= values
+    lines, spoiled = read_journal(tmp_path / "journal.jsonl")
+    assert spoiled == 0
+    states = [line["after"] for line in lines if line["event"] == "state"]
+    assert states.count("engaged") == 1
+    assert "refused" not in states
+
+
+def test_depth_is_held_while_engaged_in_alt_hold_and_after_hand_back():
+    """Sticks let go: within 3 cm under the controller's thrusts, and 7 cm after the autopilot's ALT_HOLD has it back.
+
+    Those are what ALT_HOLD, entered at rest, sags by itself before its sum holds a vehicle that is 1 N too heavy.
+
+    Between them the sticks take the vehicle down by more than 20 cm; so ALT_HOLD holds another depth than it had.
+    """
+    companion = aboard()
+    flight = companion.flight.run(1.0)
+    flight.set_mode(ALT_HOLD)
+    flight.arm(True)
+    flight.set("WKW_ENABLE", 1.0)
+    flight.run(3.0)
+    sea, _ = afloat(companion)
+    rehearse(sea)
+    depths: dict[str, list[float]] = {"held": [], "after": []}
+    at = {"engaged": 0.0, "released": 0.0}
+
+    def direct(time_s: float) -> None:
+        """Consent, down by the stick for 4 s, 6 s to come to rest and 5 s of holding, then hand back."""
+        if not at["engaged"] and time_s > 1.5:
+            assert companion.warden.press() == "engaged"
+            at["engaged"] = time_s
+        since_s = time_s - at["engaged"] if at["engaged"] else -1.0
+        flight.sticks = (0, 0, 200, 0) if 0.5 < since_s < 4.5 else (0, 0, 500, 0)
+        if since_s > 10.5:
+            depths["held"].append(float(flight.stand_in.motion.p_WB_m[2]))
+        if since_s > 15.5 and not at["released"]:
+            assert "released" in companion.warden.press()
+            at["released"] = time_s
+
+    before_m = float(flight.stand_in.motion.p_WB_m[2])
+    plant, witness = sea.parts.world.begin()
+    fly = loop_of(sea.parts, plant, witness, sea.figures)
+    fly(duration_s=None, pace=direct, stop=lambda: bool(at["released"]))
+    assert flight.stand_in.mode in (ALT_HOLD, STABILIZE)
+    for _ in range(100):
+        flight.run(0.1)
+        depths["after"].append(float(flight.stand_in.motion.p_WB_m[2]))
+    assert flight.stand_in.mode == ALT_HOLD
+    assert not flight.moments[-1].overridden
+    held = np.array(depths["held"])
+    assert held.mean() - before_m > 0.2
+    assert np.ptp(held) < 0.03
+    assert np.abs(np.array(depths["after"]) - held[-1]).max() < 0.07
+
+
+class Deaf:
+    """A connection on which nothing comes: the warden is told by hand."""
+
+    def receive(self, timeout_s):
+        time.sleep(timeout_s)
+        return [], 0
+
+
+def session_of(folder, monkeypatch, **wardens) -> SeaSession:
+    """A session that compiles nothing and hears nothing by itself."""
+    monkeypatch.setattr("wakewise_ardusub.session.session.warm", lambda jobs, progress: None)
+    return SeaSession(
+        scenario=Scenario(vehicle="bluerov2-heavy", method="dp").replace(**SEA),
+        receiving=Deaf(),
+        send=lambda name, fields: None,
+        folder=folder,
+        spare=WhatToSpare(),
+        session=1,
+        wardens=wardens,
+    )
+
+
+def test_a_session_with_a_button_of_the_autopilots_ends_in_one_line(tmp_path, monkeypatch):
+    """The stand-in's default table, whose button 4 disarms: no parts are made, and the fault names what is free."""
+    companion = Aboard(Rehearsal(load_vehicle("bluerov2-heavy"), loop_hz=50.0), buttons={"engage": 4})
+    session = session_of(tmp_path / "sea", monkeypatch, buttons={"engage": 4, "scan": 0})
+    companion.flight.run(3.0)
+    session.warden.known = companion.warden.known
+    session.start()
+    session._thread.join(60.0)
+    session.stop("over")
+    assert isinstance(session.fault, InputError)
+    assert str(session.fault) == "--buttons engage=4: BTN4_FUNCTION is 4 (disarm) on this autopilot; free is 15"
+    assert not (tmp_path / "sea" / "steps.parquet").exists()
+
+
+def test_a_flight_begins_where_the_vehicle_is_when_its_parts_are_made(tmp_path, monkeypatch):
+    """It moves while they are made: an estimator that began where it was would take the step for a load."""
+    companion = aboard()
+    companion.flight.run(1.0)
+    session = session_of(tmp_path / "sea", monkeypatch)
+    session.warden.known = companion.warden.known
+    facts = companion.warden.facts()
+    session.warden.facts = lambda: facts
+    before = session._here()
+
+    def moved(sea):
+        assert sea.parts.start.X_WB.p_m == pytest.approx(before.X_WB.p_m)
+        known = session.warden.known
+        place_W_m = np.asarray(known.place_W_m) + np.array([0.2, 0.0, 0.3])
+        session.warden.known = replace(known, place_W_m=place_W_m)
+        return 0.0
+
+    monkeypatch.setattr("wakewise_ardusub.session.session.rehearse", moved)
+    sea = session._prepared()
+    assert sea.parts.start.X_WB.p_m == pytest.approx(before.X_WB.p_m + np.array([0.2, 0.0, 0.3]))
+
+
+def test_a_session_waits_for_a_hull_that_is_still_afloat(tmp_path, monkeypatch):
+    """Before a dive the vehicle floats on its tether: the session says how much of it is above, and goes on waiting."""
+    companion = aboard()
+    companion.flight.run(1.0)
+    session = session_of(tmp_path / "sea", monkeypatch)
+    session.warden.known = replace(companion.warden.known, depth_m=0.0)
+    facts = replace(companion.warden.facts(), depth_m=0.0)
+    said = []
+
+    def looked():
+        said.append(session.preparing)
+        if len(said) == 3:
+            session._over.set()
+        return facts
+
+    session.warden.facts = looked
+    assert session._prepared() is None
+    assert said[-1] == "waits until the hull is under water, 0.13 m of it are above"
+
+
+def test_sticks_never_break_the_surface_at_sea():
+    """The water's surface lies as far above the vehicle as its depth says, wherever the autopilot's origin is."""
+    companion = aboard()
+    companion.flight.run(1.0)
+    sea, _ = afloat(companion)
+    around = sea.parts.surroundings
+    known = companion.warden.known
+    assert around.names == ("the water surface", "the target")
+    assert around.planes[0][:3] == pytest.approx([0.0, 0.0, 1.0])
+    assert around.planes[0][3] == pytest.approx(known.place_W_m[2] - known.depth_m, abs=1e-6)
+    keep = sea.parts.pilot.inner.keep_off
+    high = Pose(np.array([0.0, 0.0, around.planes[0][3] + 0.5 * 0.254 + 0.06]), np.array([1.0, 0.0, 0.0, 0.0]))
+    velocity, blocks = keep.allowed(high, np.array([0.0, 0.0, -0.3]), np.zeros(3))
+    assert blocks == "the water surface"
+    assert velocity[2] > -0.1

@@ -1,0 +1,22 @@
+"""A neural radiance field on a hash grid, learnt from posed photos; PyTorch (extra `nerf`) is imported when it runs."""
+
+from typing import TYPE_CHECKING
+
+from wakewise.core.lazy_imports import lazy_door
+
+if TYPE_CHECKING:
+    from wakewise_nerf.field.backend import DEVICES, pick_device, require_torch
+    from wakewise_nerf.field.pipeline import build_field
+    from wakewise_nerf.field.settings import PROFILES, FieldSettings, profile
+
+__all__ = [
+    "DEVICES",
+    "PROFILES",
+    "FieldSettings",
+    "build_field",
+    "pick_device",
+    "profile",
+    "require_torch",
+]
+
+lazy_door(__name__, "nerf", "photos")

@@ -1,0 +1,98 @@
+"""Shows what `wakewise bench operator` found: the claim against its bars, then a table of worlds and w_tracks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import typer
+
+from wakewise.ui.cli.console import print_table, shown
+from wakewise_paper.cli.bench_wash_reduction import reduction
+
+_BARS = (
+    ("velocity_deviation_pct", "velocity_deviation_interval_pct", "velocity deviation, %", "< 15"),
+    ("target_speed_reduction_pct", "target_speed_reduction_interval_pct", "less wash in trouble, %", "> 60"),
+    ("disturbance_reduction_pct", "disturbance_reduction_interval_pct", "less D, %", "> 60"),
+    ("energy_ratio", "energy_ratio_interval", "energy over direct's", ""),
+    ("position_ratio", "position_ratio_interval", "place error over direct's", ""),
+    ("silt_lifted_ratio", "silt_lifted_ratio_interval", "silt lifted over direct's", ""),
+    ("sway_wash_ratio", "sway_wash_ratio_interval", "the wash's sway over direct's", ""),
+)
+_COLUMNS = ("flights", "deviation", "floor", "planned %", "mm/s", "direct", "less wash", "trouble", "less D", "energy")
+
+
+def show_operator(result: Mapping[str, Any]) -> None:
+    """The claim first, with pilots, courses and rivals beside it; then each world by w_track; then the paper's."""
+    from rich.table import Table
+
+    claim = result["claim"]
+    beside: dict[str, Mapping[str, Any]] = {**claim["pilots"], **claim["courses"], **claim["rivals"]}
+    words = f"claim: w_track 5, {claim['flights']} flights, of {claim['trouble_flights']} direct leaves over 10 mm/s"
+    table = Table(title=words, title_justify="left")
+    for title in ("", "wake-aware", "95 %", *beside, "bar"):
+        table.add_column(title, justify="left" if not title else "right")
+    for key, ends, name, bar in _BARS:
+        told = claim[ends]
+        interval = "" if told is None else f"{shown(told[0])} to {shown(told[1])}"
+        table.add_row(name, shown(claim[key]), interval, *(shown(one[key]) for one in beside.values()), bar)
+    print_table(table)
+    table = Table(title="worlds; less wash and D than direct allocation on the same seeds", title_justify="left")
+    table.add_column("world")
+    table.add_column("w_track")
+    for title in _COLUMNS:
+        table.add_column(title, justify="right")
+    for name, world in result["worlds"].items():
+        for w_track, row in world["w_track"].items():
+            table.add_row(name, w_track, *_cells(row))
+        table.add_row(name, "bow-rule", *_cells(world["bow-rule"]))
+    print_table(table)
+    for key, where in (("w_track", "in front"), ("w_track_over", "above")):
+        for w_track, row in result["paper"][key].items():
+            typer.echo(
+                f"paper (circular), {where}, w_track {w_track}: deviation {shown(row['velocity_deviation_pct'])} %, "
+                f"D less by {reduction(row['disturbance_reduction_pct'])}, "
+                f"wash by {reduction(row['target_speed_reduction_pct'])}"
+            )
+    _show_cockpit(result)
+    typer.echo(
+        f"{result['flown']} flights flown, {result['flights'] - result['flown'] - result['failed']} known, "
+        f"{result['failed']} failed"
+    )
+    for failure in result["failures"]:
+        typer.echo(f"failed: {failure['flow']}, {failure['name']}, seed {failure['seed']}: {failure['reason']}")
+
+
+def _show_cockpit(result: Mapping[str, Any]) -> None:
+    for name, one in (result.get("cockpit") or {}).items():
+        typer.echo(
+            f"cockpit, cores {name}: stick to thrust {one['latency_ms_p50']:.0f} ms, p99 {one['latency_ms_p99']:.0f} "
+            f"(< 120); {one['pictures_per_s']:.1f} pictures a second; first light {one['first_light_s']:.1f} s"
+        )
+    for name, one in (result.get("coverage") or {}).items():
+        typer.echo(
+            f"coverage, {name.replace('_', ' ')}, {one['photos']} photographs: right of "
+            f"{one['coverage_agreement_pct']:.1f} % of the target (a trivial guess {one['coverage_trivial_pct']:.1f}), "
+            f"{one['coverage_ms_per_photo']:.1f} ms each"
+        )
+    for key in ("latency_ms_p99", "coverage_agreement_pct"):
+        if key in result["why"]:
+            typer.echo(f"{key}: not measured: {result['why'][key]}")
+
+
+def _cells(row: Mapping[str, Any]) -> list[str]:
+    def mm_s(key: str) -> str:
+        return shown(None if row[key] is None else 1e3 * row[key])
+
+    return [
+        str(row["flights"]),
+        shown(row["velocity_deviation_pct"]),
+        shown(row["velocity_deviation_floor_pct"]),
+        shown(row["velocity_deviation_planned_pct"]),
+        mm_s("target_speed_mean_m_s"),
+        mm_s("direct_target_speed_mean_m_s"),
+        reduction(row["target_speed_reduction_all_pct"], row["target_speed_reduction_all_interval_pct"]),
+        reduction(row["target_speed_reduction_pct"]),
+        reduction(row["disturbance_reduction_pct"]),
+        shown(row["energy_ratio"]),
+    ]

@@ -1,0 +1,217 @@
+"""`wakewise reproduce`: the paper's tables beside ours."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from wakewise.core.errors import InputError
+from wakewise.ui.cli.console import Bars, plain, print_json, print_table, shown, write_page
+from wakewise.ui.cli.options import Json
+
+Names = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="TABLE",
+        help="dynamic, success, station, ablation, sediment, flow, solver, wake, field, operator, comparison, or all.",
+    ),
+]
+Trials = Annotated[
+    int | None,
+    typer.Option(
+        help="Seeds for each target in each world, from 1; 1 if neither this nor --budget is given.", show_default=False
+    ),
+]
+Budget = Annotated[
+    str | None,
+    typer.Option(help="Time for all of it, such as 30min, 2h or 90s: as many trials as fit.", show_default=False),
+]
+Worlds = Annotated[
+    str | None,
+    typer.Option(
+        "--world",
+        help="Where trials are made, with commas between: worlds of the library (`wakewise world list`), paper (its "
+        "own wake as the water: circular), lattice, caco3, field; each table's own if not given.",
+        show_default=False,
+    ),
+]
+Methods = Annotated[
+    str | None,
+    typer.Option(help="Only these, with commas between; each table's own if not given.", show_default=False),
+]
+Targets = Annotated[
+    str | None,
+    typer.Option(help="In place of the tables' own, with commas between; any target.", show_default=False),
+]
+Duration = Annotated[
+    float | None,
+    typer.Option(
+        "--duration",
+        help="Only so many seconds of each flight, to try it; scans are whole.",
+        min=1.0,
+        show_default=False,
+    ),
+]
+Out = Annotated[Path, typer.Option("--out", help="Folder for results.json and the page (or pages).")]
+Store = Annotated[Path, typer.Option("--store", help="Folder that keeps the trials, of all calls together.")]
+Workers = Annotated[int, typer.Option("--workers", help="Trials at a time.", min=1, max=1024)]
+Again = Annotated[bool, typer.Option("--again", help="Try trials anew that failed in an earlier run.")]
+Markdown = Annotated[
+    bool, typer.Option("--markdown", help="Write Markdown pages and small plots in place of the page with pictures.")
+]
+
+_UNITS = {"s": 1.0, "min": 60.0, "m": 60.0, "h": 3600.0}
+
+
+def reproduce(
+    names: Names,
+    trials: Trials = None,
+    budget: Budget = None,
+    worlds: Worlds = None,
+    methods: Methods = None,
+    targets: Targets = None,
+    duration: Duration = None,
+    out: Out = Path("runs/reproduce"),
+    store: Store = Path("runs/reproduce-trials"),
+    workers: Workers = 2,
+    again: Again = False,
+    markdown: Markdown = False,
+    json: Json = False,
+) -> None:
+    """Make the paper's tables from trials of our own: paper, ours, interval, met or not.
+
+    What is finished is kept: the same command goes on where it was stopped, and more --trials only adds what is new.
+    A flight takes 5 to 20 s of a core, one of 180 s about a minute, a whole scan with its model two minutes.
+    """
+    from wakewise.core.optional_dependencies import need
+    from wakewise_paper.reproduction.claim import TABLES
+    from wakewise_paper.reproduction.run import Options
+
+    need("wakewise reproduce", "photos", "reports", "logs")
+    chosen = list(TABLES) if "all" in names else list(dict.fromkeys(names))
+    for name in chosen:
+        if name not in TABLES:
+            raise InputError(f"table '{name}': not known, allowed: {', '.join(TABLES)}, all")
+    with Bars().stage("reproduce") as progress:
+        from wakewise_paper.reproduction.run import reproduce as run
+
+        tables = run(
+            chosen,
+            store,
+            Options(
+                trials=trials,
+                budget_s=None if budget is None else seconds("--budget", budget),
+                worlds=_listed(worlds),
+                methods=_listed(methods),
+                targets=_listed(targets),
+                duration_s=duration,
+                workers=workers,
+                again=again,
+                progress=progress,
+            ),
+        )
+    pages: list[Path] = []
+    _keep(tables, out)
+    write_page("page", lambda: pages.append(_write(tables, store, out, markdown)))
+    if json:
+        told = {name: _told(table) for name, table in tables.items()}
+        print_json(told[chosen[0]] if len(chosen) == 1 else {"tables": told})
+        return
+    for table in tables.values():
+        show_table(table)
+    for page in pages:
+        typer.echo(f"page: {page}")
+
+
+def seconds(option: str, text: str) -> float:
+    """Seconds of a time such as 30min.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    found = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*(s|min|m|h)?\s*", text)
+    if found is None or float(found[1]) <= 0.0:
+        raise InputError(f"{option} '{text}': must be a time such as 30min, 2h or 90s")
+    return float(found[1]) * _UNITS[found[2] or "s"]
+
+
+def show_table(table: dict[str, Any]) -> None:
+    """Rows as people read them: paper, ours, interval, met or not."""
+    from rich.table import Table
+
+    counted = f"{table['made']} trials, {table['failed']} failed" if table["made"] else "not made"
+    drawn = Table(title=f"{table['table']}: {table['title']} ({counted})", title_justify="left")
+    for title, side in (
+        ("world", "left"),
+        ("method", "left"),
+        ("target", "left"),
+        ("figure", "left"),
+        ("paper", "right"),
+        ("ours", "right"),
+        ("95 %", "right"),
+        ("n", "right"),
+        ("unit", "left"),
+        ("met", "left"),
+    ):
+        drawn.add_column(title, justify="left" if side == "left" else "right")
+    for row in table["rows"]:
+        ends = "" if row["low"] is None else f"{shown(row['low'])} to {shown(row['high'])}"
+        drawn.add_row(
+            row["world"],
+            plain(row["method"]),
+            row["target"] or "all",
+            plain(row["figure"]),
+            shown(row["paper"]),
+            shown(row["ours"]),
+            ends,
+            str(row["n"]),
+            row["unit"],
+            _verdict(row),
+        )
+    print_table(drawn)
+    for failure in table["failures"]:
+        typer.echo(f"failed: {failure['trial']}: {failure['reason']}")
+    if table["left_undone"]:
+        typer.echo(f"{table['left_undone']} trials had no room in the budget; the same command goes on")
+    for reason in table["why"].values():
+        typer.echo(reason)
+
+
+def _verdict(row: dict[str, Any]) -> str:
+    if row["met"] is None:
+        return ""
+    return ("yes" if row["met"] else "no") + ("" if row["sure"] is not False else ", unsure")
+
+
+def _told(table: dict[str, Any]) -> dict[str, Any]:
+    """What is printed as JSON: all but where the pictures lie."""
+    first = ("rows", "trials", "seeds", "config_hash")
+    return {key: table[key] for key in first} | {
+        key: value for key, value in table.items() if key not in (*first, "places")
+    }
+
+
+def _keep(tables: dict[str, dict[str, Any]], out: Path) -> None:
+    from wakewise.core.files import write_json
+
+    write_json(out / "results.json", {"tables": {name: _told(table) for name, table in tables.items()}})
+
+
+def _write(tables: dict[str, dict[str, Any]], store: Path, out: Path, markdown: bool) -> Path:
+    from wakewise_paper.reports.reproduction import write_pages, write_results
+
+    return write_results(tables, store, out) if markdown else write_pages(tables, store, out)
+
+
+def _listed(text: str | None) -> tuple[str, ...] | None:
+    if text is None:
+        return None
+    names = tuple(name.strip() for name in text.split(";" if ";" in text else ",") if name.strip())
+    if not names:
+        raise InputError("a list with nothing in it: must be names with commas between")
+    return names

@@ -1,0 +1,192 @@
+"""`wakewise wake validate|learn|calibrate-flight`: wake models against flows, a learned model, a jet from a hover."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from wakewise.ui.cli.console import Bars, print_json, print_table, shown, write_page
+from wakewise.ui.cli.options import Json, seed_option
+
+Seed = Annotated[int, typer.Option("--seed", callback=seed_option, help="Seed of the split and of the resamples.")]
+ReportOut = Annotated[
+    Path | None, typer.Option("--out", help="Folder for wake.html and wake.json.", show_default=False)
+]
+Reference = Annotated[
+    Path, typer.Option("--data", help="Folder of reference data (the real jets).", envvar="WAKEWISE_DATA")
+]
+Quick = Annotated[bool, typer.Option("--quick", help="Coarser samples, no PIV.")]
+ThroughPiv = Annotated[
+    bool, typer.Option("--through-piv", help="Also see the lattice's swirling jet and the parcels through virtual PIV.")
+]
+
+
+def validate(
+    out: ReportOut = None,
+    data: Reference = Path("../shared/data"),
+    quick: Quick = False,
+    through_piv: ThroughPiv = False,
+    seed: Seed = 0,
+    json: Json = False,
+) -> None:
+    """Hold every wake model against every flow, on held-out thrusts, beside the paper's 0.99 and 0.82."""
+    from wakewise.core.optional_dependencies import need
+    from wakewise_paper.wake_validation import ValidationOptions, figures
+    from wakewise_paper.wake_validation import validate as run
+
+    if out is not None:
+        need("--out", "reports")
+    with Bars().stage("validate") as progress:
+        result = run(
+            ValidationOptions(
+                quick=quick,
+                data=data if data.is_dir() else None,
+                through_piv=through_piv,
+                seed=seed,
+                progress=progress,
+            )
+        )
+    values = figures(result)
+    if out is not None:
+        from wakewise.core.files import write_json
+        from wakewise_paper.reports.wake import write_wake_report
+
+        write_json(out / "wake.json", values)
+        write_page("report", lambda: write_wake_report(result, values, out))
+    if json:
+        print_json(values)
+        return
+    _show_validation(values)
+    if out is not None:
+        typer.echo(f"report: {out / 'wake.html'}")
+
+
+def _show_validation(values: dict[str, Any]) -> None:
+    from rich.table import Table
+
+    for key, words in values["definitions"].items():
+        table = Table(title=f"{key}: {words}", title_justify="left")
+        flows = list(next(iter(values["models"].values())))
+        table.add_column("model")
+        for flow in flows:
+            table.add_column(flow, justify="right")
+        for model, by_flow in values["models"].items():
+            table.add_row(model, *(shown(by_flow[flow][key]) for flow in flows))
+        print_table(table)
+    paper = values["paper"]
+    typer.echo(f"the paper claims {paper['r2_core']} and {paper['r2_wake']} for its proxy")
+    convergence = values["grid_convergence_pct"]
+    typer.echo(f"lattice, two grids, centreline speed at 0.3 m: {shown(convergence)} % apart")
+    for key, reason in values["why"].items():
+        typer.echo(f"not computed: {key}: {reason}")
+
+
+Draws = Annotated[int, typer.Option("--draws", min=1, max=1000, help="Waters of the tank to train on, each drawn.")]
+Steps = Annotated[int, typer.Option("--steps", min=100, max=1_000_000, help="Steps of the training.")]
+NetworkOut = Annotated[
+    Path | None, typer.Option("--out", help="Write the network here; else it is judged and thrown away.")
+]
+Shipped = Annotated[bool, typer.Option("--shipped", help="Judge the network that ships instead of training one.")]
+HeldOut = Annotated[int, typer.Option("--held-out", min=1, max=100, help="Waters of the tank to judge on.")]
+
+
+def learn(
+    draws: Draws = 60,
+    steps: Steps = 8000,
+    out: NetworkOut = None,
+    shipped: Shipped = False,
+    held_out: HeldOut = 8,
+    seed: Seed = 0,
+    json: Json = False,
+) -> None:
+    """Train the learned rival on tank and lattice; hold every model against water that none was fitted to."""
+    from wakewise.wake.learned import load_network
+    from wakewise_paper.learned_wake import judging
+    from wakewise_paper.learned_wake.making import Recipe, make
+
+    with Bars().stage("learn") as progress:
+        if shipped:
+            network = load_network()
+        else:
+            network, _ = make(Recipe(draws=draws, steps=steps, seed=seed), out, progress)
+        result = judging.judge(network, judging.held_out(held_out, progress=progress))
+    if json:
+        print_json(result | {"out": None if out is None else str(out)})
+        return
+    _show_rivals(result)
+    if out is not None:
+        typer.echo(f"written: {out}")
+
+
+def _show_rivals(result: dict[str, Any]) -> None:
+    from rich.table import Table
+
+    for key, words in (
+        ("error_share", "root mean square error of the velocity over that of the velocity itself"),
+        ("factor_of_2_pct", "share of the points with more than 1 cm/s (at 1 N) right within a factor of two, %"),
+    ):
+        table = Table(title=f"{key}: {words}", title_justify="left")
+        table.add_column("model")
+        for truth in result["scores"]:
+            table.add_column(truth, justify="right")
+        for model in next(iter(result["scores"].values())):
+            table.add_row(model, *(shown(by_model[model][key]) for by_model in result["scores"].values()))
+        print_table(table)
+    typer.echo(f"learned: {result['weights']} weights, {result['circular']}")
+
+
+World = Annotated[str, typer.Option("--world", help="World of the library to fly in.")]
+Method = Annotated[str, typer.Option("--method", help="Who holds the hover.")]
+Minutes = Annotated[float, typer.Option("--minutes", min=0.5, max=30.0, help="How long the hover is.")]
+HeldStill = Annotated[bool, typer.Option("--held", help="Hold the vehicle and let its bow thrusters push in turn.")]
+FlightSeed = Annotated[
+    int, typer.Option("--seed", callback=seed_option, help="Seed of the world, which draws the jets' width.")
+]
+
+
+def calibrate_flight(
+    world: World = "payload",
+    method: Method = "dp",
+    minutes: Minutes = 5.0,
+    seed: FlightSeed = 1,
+    held: HeldStill = False,
+    json: Json = False,
+) -> None:
+    """Calibrate the jet from a hover, by flakes that the camera sees drift; its error against minutes."""
+    from wakewise_paper.flight_fit.curve import CalibrationFlight, curve, held_curve
+
+    if held:
+        result = held_curve(world, seed, minutes)
+    else:
+        with Bars().stage("fly") as progress:
+            result = curve(CalibrationFlight(world=world, method=method, seed=seed, minutes=minutes), progress)
+    if json:
+        print_json(result)
+        return
+    from rich.table import Table
+
+    table = Table(title=f"half width slope, drawn {result['true_half_width_growth']:.3f}")
+    for name in ("minutes", "flakes", "slope", "+-", "strength", "+-", "off by, %", "error of the water, share"):
+        table.add_column(name, justify="right")
+    table.add_row(
+        "0",
+        "0",
+        *map(shown, (result["believed"]["slope"], None, 1.0, None)),
+        "",
+        shown(result["believed"]["error_share"]),
+    )
+    for row in result["curve"]:
+        numbers = (row["half_width_slope"], row["slope_standard_error"], row["gain"], row["gain_standard_error"])
+        table.add_row(
+            shown(row["minutes"]),
+            str(row["flakes"]),
+            *map(shown, numbers),
+            shown(row["slope_error_pct"]),
+            shown(row["error_share"]),
+        )
+    print_table(table)
+    if result["curve"]:
+        law = shown(result["curve"][-1]["gain"] ** 2)
+        typer.echo(f"momentum flux over thrust: {law} at the end, strength squared; the law says 1")

@@ -1,0 +1,199 @@
+"""`wakewise bench operator`: the paper's claim in the tank's worlds, and the sweep of w_track in the paper's own.
+
+For each world and w_track, `wake-aware` against direct allocation (`dp`) on the same seeds, by a script and by the
+human model; `unaware` at the same w_track and `bow-rule` beside them. What is flown and how it is judged was written
+down before the first flight (docs/decisions/0047). Flights are kept: a run that was stopped goes on.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from wakewise.control.intent import PAPER_W_TRACK
+from wakewise.experiments.campaigns import Processes
+from wakewise.experiments.trials.timing import BenchOptions
+from wakewise.operation import load_scenario
+from wakewise.operation.worlds.library import load_world
+from wakewise_paper import side_by_side
+from wakewise_paper.flight_store import FLIES, FlightStore, store_folder
+from wakewise_paper.operator_study import paper
+from wakewise_paper.operator_study.figures import Flights, Known, sliced, table
+from wakewise_paper.operator_study.flight import PILOTS, OperatorTrial, course_of
+from wakewise_paper.operator_study.plan import (
+    DIRECT,
+    GRID_SEEDS,
+    OURS,
+    RULE,
+    UNAWARE,
+    flight_s,
+    key_of,
+    planned_trials,
+    wished_w_tracks,
+    wished_worlds,
+)
+from wakewise_paper.operator_study.waters import water_of
+from wakewise_paper.side_by_side import Failure, Key
+from wakewise_paper.wash_reduction.figures import Row
+
+SOURCES = (
+    *FLIES,
+    "pilot",
+    *(f"studies/operator/{name}.py" for name in ("waters", "courses", "heard", "flight", "paper")),
+)
+"""Parts of the package that can change a flight of this bench."""
+ELSEWHERE = {
+    "latency_ms_p99": "from stick to thrust: measured in the cockpit's loop, not in a flight without one",
+    "coverage_agreement_pct": "the coverage guide is not flown by this bench",
+    "coverage_ms_per_photo": "the coverage guide is not timed by this bench",
+}
+
+_engine = Processes
+_FLY, _FLY_PAPER = "wakewise_paper.operator_study.flight:fly_trial", "wakewise_paper.operator_study.paper:fly_trial"
+
+
+def run(options: BenchOptions) -> dict[str, Any]:
+    """Fly what is wished and not known yet; a table per world and w_track, the claim, the paper's world.
+
+    Raises
+    ------
+    InputError
+        If a world is not known or a w_track not possible.
+    """
+    began = time.monotonic()
+    worlds, w_tracks = wished_worlds(options.worlds), wished_w_tracks(options.w_tracks)
+    trials = planned_trials(worlds, w_tracks, options.seeds, min(options.seeds, GRID_SEEDS))
+    store = FlightStore(options.store or store_folder("operator"), options.fresh, SOURCES)
+    left_s = sum(flight_s(trial) for trial in trials.values() if store.load(trial, _FLY) is None)
+    words = f"{len(trials)} flights, some {left_s / 60.0 / options.workers:.0f} min of {options.workers} free cores"
+    options.progress(0, max(len(trials), 1), words)
+    rows, failures, kept = side_by_side.fly_all(trials, _FLY, store, options, _engine)
+    own = paper.paper_trials(w_tracks, min(options.seeds, paper.SEEDS))
+    papers, lost, known = side_by_side.fly_all(own, _FLY_PAPER, store, options, _engine)
+    told = Told(trials, rows, failures)
+    default = load_scenario("quick", None, {}).world
+    tables = {name: world_figures(name, w_tracks, told) for name in worlds}
+    answer: dict[str, Any] = {
+        "claim": claim(worlds, told),
+        "worlds": tables,
+        "default_world": default,
+        "w_track": tables[default]["w_track"] if default in tables else None,
+        "paper": paper.paper_figures(papers, w_tracks),
+    }
+    answer |= dict.fromkeys(ELSEWHERE)
+    answer |= {
+        "solve_ms_p99": _worst(rows, "solve_ms_p99"),
+        "seeds": options.seeds,
+        "flights": len(trials) + len(own),
+        "flown": len(rows) + len(papers) - kept - known,
+        "failed": len(failures) + len(lost),
+        "failures": [vars(failure) for failure in (*failures, *lost)],
+        "flight_cpu_s": _mean(rows, "cpu_s"),
+        "wall_s": time.monotonic() - began,
+    }
+    answer["why"] = ELSEWHERE | ({} if default in tables else {"w_track": f"{default} was left out"})
+    return answer
+
+
+class Told:
+    """Rows of the bench by method, w_track and flight."""
+
+    def __init__(self, trials: Mapping[Key, OperatorTrial], rows: Mapping[Key, Row], failures: list[Failure]) -> None:
+        self._rows: dict[str, dict[Known, Row]] = {}
+        self._lost: dict[str, set[Known]] = {}
+        gone = {(failure.flow, failure.name, failure.seed) for failure in failures}
+        self.trims: dict[Known, str] = {}
+        self.courses: dict[Known, str] = {}
+        for key, trial in trials.items():
+            known = (trial.world, trial.pilot, trial.seed)
+            self.trims[known] = water_of(trial.world, trial.seed).trim
+            self.courses[known] = course_of(trial)
+            if key in rows:
+                self._rows.setdefault(key[1], {})[known] = rows[key]
+            elif key in gone:
+                self._lost.setdefault(key[1], set()).add(known)
+
+    def of(self, method: str, w_track: float = PAPER_W_TRACK) -> dict[Known, Row]:
+        """Flights of a method."""
+        return self._rows.get(_name(method, w_track), {})
+
+    def lost(self, method: str, w_track: float = PAPER_W_TRACK) -> frozenset[Known]:
+        """Flights of a method that failed."""
+        return frozenset(self._lost.get(_name(method, w_track), ()))
+
+    def table(self, method: str, w_track: float, world: str | None = None, pilot: str | None = None) -> dict[str, Any]:
+        """Figures of a method against direct allocation, of all worlds and pilots or of one."""
+        ours, direct = (sliced(self.of(m, w_track), world=world, pilot=pilot) for m in (method, DIRECT))
+        lost: dict[Known, Row] = {k: {} for k in self.lost(method, w_track)}
+        return table(ours, direct, self.trims, frozenset(sliced(lost, world=world, pilot=pilot)))
+
+    def grid_table(self, method: str, w_track: float, world: str) -> dict[str, Any]:
+        """The same over the flights that every w_track has: the script's first seeds."""
+
+        def here(flights: Flights) -> dict[Known, Row]:
+            return {k: row for k, row in sliced(flights, world=world, pilot=PILOTS[0]).items() if k[2] <= GRID_SEEDS}
+
+        empty: dict[Known, Row] = {key: {} for key in self.lost(method, w_track)}
+        return table(here(self.of(method, w_track)), here(self.of(DIRECT)), self.trims, frozenset(here(empty)))
+
+    def course_table(self, method: str, w_track: float, course: str) -> dict[str, Any]:
+        """The same over the flights of a course."""
+
+        def here(flights: Flights) -> dict[Known, Row]:
+            return {key: row for key, row in flights.items() if self.courses[key] == course and key[1] == PILOTS[0]}
+
+        empty: dict[Known, Row] = {key: {} for key in self.lost(method, w_track)}
+        lost = here(empty)
+        return table(here(self.of(method, w_track)), here(self.of(DIRECT)), self.trims, frozenset(lost))
+
+
+def world_figures(name: str, w_tracks: tuple[float, ...], told: Told) -> dict[str, Any]:
+    """Tables of one world: by w_track ours, each pilot's alone and `unaware`; the bow rule once.
+
+    `grid` is over the flights that all w_tracks have, for holding one w_track against another.
+    """
+    sweep: dict[str, Any] = {}
+    for w_track in w_tracks:
+        row = told.table(OURS, w_track, name)
+        row["pilots"] = {pilot: told.table(OURS, w_track, name, pilot) for pilot in PILOTS}
+        row[UNAWARE] = told.table(UNAWARE, w_track, name)
+        row["grid"] = told.grid_table(OURS, w_track, name)
+        sweep[f"{w_track:g}"] = row
+    return {"title": load_world(name).file.title, "w_track": sweep, RULE: told.table(RULE, PAPER_W_TRACK, name)}
+
+
+def claim(worlds: tuple[str, ...], told: Told) -> dict[str, Any]:
+    """All worlds and both pilots together at the paper's w_track, against the bars; rivals, pilots, courses beside."""
+    ours = told.table(OURS, PAPER_W_TRACK)
+    deviation, wash, D = (
+        ours[key] for key in ("velocity_deviation_pct", "target_speed_reduction_pct", "disturbance_reduction_pct")
+    )
+    courses = dict.fromkeys(told.courses.values())
+    return {
+        "w_track": PAPER_W_TRACK,
+        "worlds": list(worlds),
+        **ours,
+        "deviation_ok": None if deviation is None else deviation < 15.0,
+        "wash_ok": None if wash is None else wash > 60.0,
+        "disturbance_ok": None if D is None else D > 60.0,
+        "pilots": {pilot: told.table(OURS, PAPER_W_TRACK, pilot=pilot) for pilot in PILOTS},
+        "courses": {name: told.course_table(OURS, PAPER_W_TRACK, name) for name in courses},
+        "rivals": {name: told.table(name, PAPER_W_TRACK) for name in (UNAWARE, RULE)},
+    }
+
+
+def _name(method: str, w_track: float) -> str:
+    return key_of(OperatorTrial(world="", pilot="", method=method, seed=1, w_track=w_track))[1]
+
+
+def _mean(rows: Mapping[Key, Row], key: str) -> float | None:
+    known = [row[key] for row in rows.values() if row.get(key) is not None]
+    return float(np.mean(np.array(known, dtype=np.float64))) if known else None
+
+
+def _worst(rows: Mapping[Key, Row], key: str) -> float | None:
+    known = [value for row in rows.values() if (value := row.get(key)) is not None]
+    return max(known) if known else None

@@ -1,0 +1,218 @@
+"""The same in the paper's own world, circular: the planner's model is the water
+(`wakewise.operation.worlds.wake_world`).
+
+`wake-aware` against `unaware` at the same weight, same commands, same seeds, by the paper's cost alone (no levers). The
+operator asks for 0.1 m/s, reached at 0.1 m/s2. Two courses. `front`: sideways, up, back and down in front of the
+target, camera on it, where spare thrusters alone can keep every jet off it. `over`: to and fro above the target in a
+vehicle that sinks by the largest unknown trim; its lift blows at the target whatever the spare thrusters do, and only
+disobedience is left.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from wakewise.control import ControlSettings, LeverSettings, make_controller
+from wakewise.control.intent import PAPER_W_TRACK, Intent, goal_of, moved_on, obeying, slewed
+from wakewise.core.arrays import Array
+from wakewise.core.interfaces import BodyState, Goal, Witness
+from wakewise.operation import Scenario, fly
+from wakewise.operation.loop import Step
+from wakewise.operation.worlds.wake_world import InstantWorld, paper_jets
+from wakewise.robot.vehicles import load_vehicle, perturbed
+from wakewise.scene.missions import open_route
+from wakewise.simulation.tank import TankSettings
+from wakewise.wake import WakeSettings, WakeView, disturbance, wake_model
+from wakewise_paper.operator_study.flight import deviations
+from wakewise_paper.operator_study.heard import Overheard
+from wakewise_paper.side_by_side import Key
+from wakewise_paper.wash_reduction.figures import Row
+from wakewise_paper.wash_reduction.paper import OFF, PAPER_WAKE, paper_place
+
+SEEDS = 1
+SPEED_M_S, HOLD_S = 0.10, 5.0
+DIRECT, OURS, UNAWARE = "dp", "wake-aware", "unaware"
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperCourse:
+    """What the operator asks for: directions in W one after the other, from a place beside the target's centre.
+
+    `watches`: the camera is kept on the target; otherwise the vehicle is level and heads north. `sinks`: heavier than
+    believed by the largest trim; otherwise the trim is drawn.
+    """
+
+    from_target_m: tuple[float, float, float]
+    legs_W: tuple[tuple[float, float, float], ...]
+    leg_s: float
+    watches: bool = True
+    sinks: bool = False
+
+
+PAPER_COURSES = {
+    "front": PaperCourse(
+        from_target_m=(-0.65, -0.2, -0.30),
+        legs_W=((0.0, 1.0, 0.0), (0.0, 0.0, -0.5), (0.0, -1.0, 0.0), (0.0, 0.0, 0.5)),
+        leg_s=4.0,
+    ),
+    "over": PaperCourse(
+        from_target_m=(0.0, -0.3, -0.42),
+        legs_W=((0.0, 1.0, 0.0), (0.0, -1.0, 0.0)),
+        leg_s=6.0,
+        watches=False,
+        sinks=True,
+    ),
+}
+"""Climbing and sinking at half speed. 0.42 m above the target's centre leaves 0.2 m between hull and coral."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperTrial:
+    """One flight there; hashable, so that it can be handed to a worker."""
+
+    course: str
+    method: str
+    seed: int
+    w_track: float = PAPER_W_TRACK
+
+
+@dataclass
+class ScriptedOperator:
+    """A `Pilot` that asks for one velocity after the other; holds its place for the first seconds."""
+
+    course: PaperCourse
+    watch_W_m: Array | None
+    start: Goal
+    dt_s: float
+    velocity_W: Array = field(default_factory=lambda: np.zeros(3))
+    place_W: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.place_W = self.start.X_WB.p_m
+
+    def goal(self, time_s: float, estimate: BodyState) -> Goal:
+        """Hold, then the leg's velocity, reached at 0.1 m/s2."""
+        if time_s < HOLD_S:
+            return self.start
+        leg = min(int((time_s - HOLD_S) / self.course.leg_s), len(self.course.legs_W) - 1)
+        self.velocity_W = slewed(self.velocity_W, SPEED_M_S * np.array(self.course.legs_W[leg]), self.dt_s)
+        self.place_W = moved_on(self.place_W, self.velocity_W, estimate, self.dt_s)
+        return goal_of(Intent(velocity_W_m_s=self.velocity_W, watch_W_m=self.watch_W_m), self.place_W)
+
+
+def paper_trials(w_tracks: tuple[float, ...], seeds: int) -> dict[Key, PaperTrial]:
+    """Flights to make, seed by seed; `dp`, which has no w_track, once a seed."""
+    trials = [
+        PaperTrial(course=course, method=method, seed=seed, w_track=w_track)
+        for seed in range(1, seeds + 1)
+        for course in PAPER_COURSES
+        for method, weights in ((DIRECT, (PAPER_W_TRACK,)), (OURS, w_tracks), (UNAWARE, w_tracks))
+        for w_track in weights
+    ]
+    return {(f"paper, {t.course}", f"{t.method} {t.w_track:g}", t.seed): t for t in trials}
+
+
+def paper_figures(rows: Mapping[Key, Row], w_tracks: tuple[float, ...]) -> dict[str, Any]:
+    """Sweeps of both courses, the first as `w_track`; against `unaware` at the same weight, which is direct there."""
+
+    def flights(course: str, method: str, w_track: float) -> list[Row]:
+        return [row for key, row in rows.items() if key[:2] == (f"paper, {course}", f"{method} {w_track:g}")]
+
+    answer: dict[str, Any] = {"circular": True, "seeds": len({key[2] for key in rows})}
+    for course, name in zip(PAPER_COURSES, ("w_track", "w_track_over"), strict=True):
+        floor = _mean(flights(course, DIRECT, PAPER_W_TRACK), "velocity_deviation_pct")
+        answer[name] = {f"{w:g}": _row(flights(course, OURS, w), flights(course, UNAWARE, w), floor) for w in w_tracks}
+    return answer
+
+
+def _row(gentle: list[Row], careless: list[Row], floor: float | None) -> dict[str, Any]:
+    def less(key: str) -> float | None:
+        ours, theirs = _mean(gentle, key), _mean(careless, key)
+        return None if ours is None or not theirs else 100.0 * (1.0 - ours / theirs)
+
+    names = ("velocity_deviation_pct", "velocity_deviation_planned_pct", "velocity_deviation_behind_plan_pct")
+    told: dict[str, Any] = {name: _mean(gentle, name) for name in (*names, "target_speed_mean_m_s")}
+    told["velocity_deviation_floor_pct"] = floor
+    told["velocity_deviation_unaware_pct"] = _mean(careless, names[0])
+    told["disturbance_reduction_pct"] = less("disturbance")
+    told["target_speed_reduction_pct"] = less("target_speed_mean_m_s")
+    told["why"] = {key: "no flight gave it" for key, value in told.items() if value is None}
+    return told
+
+
+def _mean(rows: list[Row], key: str) -> float | None:
+    known = [float(value) for row in rows if (value := row.get(key)) is not None]
+    return float(np.mean(known)) if known else None
+
+
+def fly_trial(trial: PaperTrial) -> dict[str, float | None]:
+    """Figures of one flight, from the end of rest on."""
+    began = time.process_time()
+    course, seed = PAPER_COURSES[trial.course], trial.seed
+    vehicle, tank = load_vehicle("paper"), TankSettings()
+    target, region = paper_place(tank.size_m[2])
+    base = ControlSettings(wake=WakeSettings(**PAPER_WAKE), levers=LeverSettings(**OFF))
+    control = base.model_copy(update={"plan": obeying(base.plan, trial.w_track)})
+    plant_rng, _ = np.random.default_rng([seed, 13]).spawn(2)
+    trim_N = float(plant_rng.uniform(-tank.mismatch.trim_range_N, tank.mismatch.trim_range_N))
+    true = perturbed(
+        vehicle,
+        plant_rng,
+        mass_pct=5.0,
+        damping_pct=30.0,
+        added_mass_pct=20.0,
+        thrust_pct=5.0,
+        trim_N=-tank.mismatch.trim_range_N if course.sinks else trim_N,
+    )
+    watch = target.centre_W_m if course.watches else None
+    rest = Intent(velocity_W_m_s=np.zeros(3), watch_W_m=watch)
+    here = goal_of(rest, target.centre_W_m + np.array(course.from_target_m))
+    start = BodyState(X_WB=here.X_WB)
+    world = InstantWorld(
+        name="paper",
+        jets=paper_jets(),
+        vehicle=true,
+        target=target,
+        settings=tank,
+        start=start,
+        draw=lambda: np.random.default_rng([seed, 13]).spawn(2)[1],
+    )
+    pilot = ScriptedOperator(course, watch, here, 1.0 / control.rate_hz)
+    controller = Overheard(make_controller(trial.method, vehicle, region, wake_model(control.wake), control))
+    view = WakeView.of(vehicle, region, wake_model(WakeSettings(**PAPER_WAKE)))
+    velocities: list[tuple[Array, Array, Array]] = []
+    D: list[float] = []
+    speed: list[float] = []
+
+    def record(step: Step, witness: Witness | None) -> None:
+        if step.time_s < HOLD_S or step.truth is None or witness is None:
+            return
+        state, asked, planned = step.truth.state, pilot.velocity_W, controller.planned_W_m_s
+        velocities.append((asked, state.X_WB.R @ state.nu_B[:3], asked if planned is None else planned))
+        if len(velocities) % 5 == 0:
+            D.append(disturbance(view.gram(state.X_WB), step.truth.thrusts_N))
+            speed.append(witness.water().target_speed_mean_m_s)
+
+    parts = Scenario(method=trial.method, seed=seed, control=control, tank=tank).parts()
+    flown = parts.replace(
+        vehicle=vehicle,
+        target=target,
+        region=region,
+        route=open_route(target.centre_W_m, HOLD_S + course.leg_s * len(course.legs_W)),
+        start=start,
+        pilot=pilot,
+        controller=controller,
+        world=world,
+    )
+    fly(flown, checked=False, watch=record)
+    figures = deviations(*(np.array(column) for column in zip(*velocities, strict=True)))
+    return figures | {
+        "disturbance": float(np.mean(D)),
+        "target_speed_mean_m_s": float(np.mean(speed)),
+        "cpu_s": time.process_time() - began,
+    }

@@ -1,0 +1,292 @@
+"""From trials to rows: the paper's figure, ours with its interval, whether it is met, and how sure a difference is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.experiments.campaigns.glance import by_target
+from wakewise.experiments.campaigns.statistics import (
+    WORST,
+    Interval,
+    holm,
+    paired_test,
+    pairs_needed,
+    probability_of_improvement,
+    stratified_bootstrap,
+    wilson,
+)
+from wakewise.experiments.campaigns.statistics.intervals import RESAMPLES, ratio_of_sums
+from wakewise.experiments.campaigns.task import Outcome
+from wakewise_paper.reproduction.blocks import NOWHERE, Plan
+from wakewise_paper.reproduction.claim import ORDER, Claim
+
+Row = dict[str, Any]
+Known = tuple[str, int]
+"""Target and seed: what pairs are known by."""
+
+
+@dataclass(frozen=True)
+class Made:
+    """A trial and what became of it."""
+
+    plan: Plan
+    outcome: Outcome
+
+    @property
+    def flown(self) -> bool:
+        """Whether it was made at all: one that a budget left undone is no failure."""
+        return self.outcome.figures is not None or (self.outcome.attempts > 0 and self.outcome.reason != NOT_MADE)
+
+
+NOT_MADE = "not finished"
+"""What a campaign says of a trial that it has not come to, or was stopped at."""
+
+
+class Trials:
+    """The trials of one table in one world, by method."""
+
+    def __init__(self, made: Iterable[Made]) -> None:
+        self._rows: dict[str, dict[Known, Mapping[str, Any] | None]] = {}
+        for one in made:
+            if one.flown:
+                known = (one.plan.target, one.plan.seed)
+                self._rows.setdefault(one.plan.method, {})[known] = one.outcome.figures
+
+    @property
+    def methods(self) -> list[str]:
+        """Those that were flown."""
+        return list(self._rows)
+
+    def of(self, method: str, target: str | None = None) -> dict[Known, Mapping[str, Any] | None]:
+        """Figures by target and seed, None of a trial that failed; of one target or all."""
+        return {k: v for k, v in self._rows.get(method, {}).items() if target is None or k[0] == target}
+
+    def values(self, method: str, figure: str, target: str | None = None, itt: bool = False) -> dict[Known, float]:
+        """A figure where it is known; where `itt`, the worst of it in place of what is missing."""
+        found: dict[Known, float] = {}
+        for known, row in self.of(method, target).items():
+            value = None if row is None else row.get(figure)
+            if value is None or not math.isfinite(float(value)):
+                if itt and figure in WORST:
+                    found[known] = WORST[figure]
+                continue
+            found[known] = float(value)
+        return found
+
+    def targets(self, method: str) -> list[str]:
+        """Targets that it has trials of."""
+        return list(dict.fromkeys(known[0] for known in self._rows.get(method, {})))
+
+
+def table_rows(claims: Sequence[Claim], worlds: Mapping[str, Trials]) -> list[Row]:
+    """Rows of a table whose trials are flights or scans, world by world; claims without a trial have none there."""
+    rows: list[Row] = []
+    for world, trials in worlds.items():
+        here: list[Row] = []
+        for claim in claims:
+            if claim.method not in trials.methods and claim.reading != "order":
+                continue
+            if claim.than is not None and claim.than not in trials.methods:
+                continue
+            row = _READ[claim.reading](claim, trials)
+            if row is None:
+                continue
+            here.append(_whole(claim, world, None, row))
+            targets = trials.targets(claim.method)
+            if claim.reading == "mean" and len(targets) > 1 and not claim.itt:
+                here += [
+                    _whole(claim, world, target, found, quoted=False)
+                    for target in targets
+                    if (found := _mean(claim, trials, target)) is not None
+                ]
+        _correct(here)
+        rows += here
+    return rows
+
+
+def once_rows(claims: Sequence[Claim], figures: Mapping[str, Any], world: str = NOWHERE) -> list[Row]:
+    """Rows of one measurement, whose figures are called "METHOD/FIGURE", or "METHOD/TARGET/FIGURE"."""
+    rows: list[Row] = []
+    for claim in claims:
+        for key, value in figures.items():
+            method, *between, figure = key.split("/")
+            if method != claim.method or figure != claim.figure:
+                continue
+            target = between[0] if between else None
+            found = {"ours": value, "low": None, "high": None, "n": 1, "failed": 0}
+            if value is None:
+                found["why"] = "the data do not reach it"
+            if not between:
+                found |= _counted(claim, figures)
+            rows.append(_whole(claim, world, target, found))
+    return rows
+
+
+def _whole(claim: Claim, world: str, target: str | None, found: Row, quoted: bool = True) -> Row:
+    """A row with all its keys; of a part of what the paper's figure is about, no paper's figure."""
+    ours, low, high = found["ours"], found["low"], found["high"]
+    met = found.pop("met") if "met" in found else claim.met(ours) if quoted else None
+    sure = None
+    if met is not None and low is not None and high is not None and claim.bar is not None:
+        worst = high if (claim.side == "less") == met else low
+        sure = claim.met(worst) == met
+    row: Row = {
+        "method": claim.method,
+        "target": target,
+        "figure": claim.title,
+        "paper": claim.paper if quoted else None,
+        "ours": ours,
+        "low": low,
+        "high": high,
+        "n": found["n"],
+        "met": met,
+        "world": world,
+        "unit": claim.unit,
+        "key": claim.figure,
+        "reading": claim.reading,
+        "than": claim.than,
+        "asked": claim.bar if quoted else None,
+        "side": claim.side if quoted else "none",
+        "paper_says": claim.said if quoted else "not quoted by target",
+        "failed": found["failed"],
+        "sure": sure,
+        "how": claim.how,
+    }
+    row |= {key: value for key, value in found.items() if key not in row}
+    why = {} if "why" not in row else {"ours": row.pop("why")}
+    if low is None:
+        why["low"] = why["high"] = "a single trial has no interval" if found["n"] == 1 else "not an estimate"
+    if row["paper"] is None:
+        why["paper"] = row["paper_says"]
+    if met is None:
+        why["met"] = why.get("ours", "the paper's number is not quoted here")
+    return row | {"why": why}
+
+
+def _mean(claim: Claim, trials: Trials, target: str | None = None) -> Row | None:
+    values = trials.values(claim.method, claim.figure, target, claim.itt)
+    rows = trials.of(claim.method, target)
+    failed = sum(known not in trials.values(claim.method, claim.figure, target) for known in rows)
+    if not values:
+        why = "no trial gave it" if rows else "not flown"
+        return {"ours": None, "low": None, "high": None, "n": 0, "failed": failed, "why": why}
+    scaled = claim.scale * np.array(list(values.values()))
+    mean, ends = stratified_bootstrap(scaled, [known[0] for known in values])
+    return _told(mean, ends, len(values), failed)
+
+
+def _less_pct(claim: Claim, trials: Trials) -> Row | None:
+    """Ratio of means over pairs that both have, with the tests of the differences."""
+    assert claim.than is not None
+    ours, theirs = (trials.values(method, claim.figure) for method in (claim.method, claim.than))
+    both = [known for known in ours if known in theirs]
+    failed = len(trials.of(claim.method)) - len(both)
+    if not both:
+        return {"ours": None, "low": None, "high": None, "n": 0, "failed": failed, "why": "no pair was flown"}
+    a, b = (np.array([side[known] for known in both]) for side in (ours, theirs))
+    if not b.sum() > 0.0:
+        return {
+            "ours": None, "low": None, "high": None, "n": len(both), "failed": failed, "why": "nothing to be less than"
+        }  # fmt: skip
+    value, ends = stratified_bootstrap(np.column_stack([a, b]), [known[0] for known in both], ratio_of_sums)
+    turned = None if ends is None else Interval(100.0 * (1.0 - ends.high), 100.0 * (1.0 - ends.low))
+    test = paired_test(a, b)
+    better, _ = probability_of_improvement(*(by_target(side, both) for side in (ours, theirs)))
+    return _told(100.0 * (1.0 - value), turned, len(both), failed) | {
+        "theirs": float(b.mean()),
+        "own": float(a.mean()),
+        "p_t": test.p_t,
+        "p_wilcoxon": test.p_wilcoxon,
+        "d_z": test.d_z,
+        "hedges_g": test.g_z,
+        "improvement": better,
+        "pairs_for_80_pct": None if test.d_z is None or test.d_z == 0.0 else pairs_needed(test.d_z),
+    }
+
+
+def _share_pct(claim: Claim, trials: Trials) -> Row | None:
+    values = trials.values(claim.method, claim.figure, itt=True)
+    if not values:
+        return {"ours": None, "low": None, "high": None, "n": 0, "failed": 0, "why": "not flown"}
+    good, n = round(sum(values.values())), len(values)
+    ends = wilson(good, n)
+    return _told(100.0 * good / n, Interval(100.0 * ends.low, 100.0 * ends.high), n, n - good)
+
+
+def _spread_pct(claim: Claim, trials: Trials) -> Row | None:
+    """Coefficient of variation over seeds, mean over the targets that have two or more."""
+    shares, n = [], 0
+    for target in trials.targets(claim.method):
+        values = np.array(list(trials.values(claim.method, claim.figure, target).values()))
+        if len(values) >= 2 and values.mean() > 0.0:
+            shares.append(100.0 * float(values.std(ddof=1) / values.mean()))
+            n += len(values)
+    if not shares:
+        return {"ours": None, "low": None, "high": None, "n": 0, "failed": 0, "why": "no target was modelled twice"}
+    return _told(float(np.mean(shares)), None, n, 0)
+
+
+def _order(claim: Claim, trials: Trials) -> Row | None:
+    """How often a bootstrap's draws have the paper's order, over the trials that all methods have."""
+    named = [method for method in ORDER if method in trials.methods]
+    if len(named) < len(ORDER):
+        return None
+    values = [trials.values(method, claim.figure, itt=True) for method in ORDER]
+    both = [known for known in values[0] if all(known in other for other in values)]
+    if not both:
+        return {"ours": None, "low": None, "high": None, "n": 0, "failed": 0, "why": "no block was flown whole"}
+    table = np.array([[side[known] for side in values] for known in both])
+    means = table.mean(axis=0)
+    ours = " > ".join(ORDER[k] for k in np.argsort(-means, kind="stable"))
+    drawn = table[np.random.default_rng(0).integers(len(table), size=(RESAMPLES, len(table)))].mean(axis=1)
+    share = 100.0 * float(_falls(drawn).mean()) if len(table) > 1 else None
+    found = _told(share, None, len(both), 0) | {"our_order": ours, "met": bool(_falls(means[None])[0])}
+    return found if share is not None else found | {"why": "a single block says only its own order"}
+
+
+def _falls(means: Array) -> Array:
+    return np.asarray((np.diff(means, axis=1) < 0.0).all(axis=1))
+
+
+def _counted(claim: Claim, figures: Mapping[str, Any]) -> Row:
+    """Intervals of the planner's figures, which come with their counts."""
+    plans = figures.get(f"{claim.method}/plans")
+    if not plans:
+        return {}
+    n = round(float(plans))
+    counts = {"converged_pct": "converged", "late_pct": "late"}
+    if claim.figure in counts:
+        ends = wilson(round(float(figures[f"{claim.method}/{counts[claim.figure]}"])), n)
+        return {"low": 100.0 * ends.low, "high": 100.0 * ends.high, "n": n}
+    if claim.figure == "ms_mean":
+        half = 1.96 * float(figures[f"{claim.method}/ms_sd"]) / math.sqrt(n)
+        mean = float(figures[f"{claim.method}/ms_mean"])
+        return {"low": mean - half, "high": mean + half, "n": n, "sd": figures[f"{claim.method}/ms_sd"]}
+    return {"n": n} if claim.figure in ("thrusts_beyond", "clearance_broken") else {}
+
+
+def _told(value: float | None, ends: Interval | None, n: int, failed: int) -> Row:
+    low, high = (None, None) if ends is None else ends
+    return {"ours": value, "low": low, "high": high, "n": n, "failed": failed}
+
+
+def _correct(rows: list[Row]) -> None:
+    """Holm's correction over the differences of one table in one world."""
+    tested = [row for row in rows if row.get("p_t") is not None]
+    for row, p in zip(tested, holm([row["p_t"] for row in tested]) if tested else (), strict=True):
+        row["p_holm"] = float(p)
+
+
+_READ = {
+    "mean": _mean,
+    "less_pct": _less_pct,
+    "share_pct": _share_pct,
+    "spread_pct": _spread_pct,
+    "order": _order,
+}

@@ -1,0 +1,296 @@
+"""Makes tables: as many trials as were asked for, or as many as a budget of time has room for.
+
+With a budget the first block of each table is made, which tells what a block costs here; then whole blocks are added to
+the table on which the least time was spent, until no further one has room. What was finished stays in the campaign's
+folder, so the same call goes on where it was stopped.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from wakewise.core.errors import InputError
+from wakewise.core.interfaces import Progress, no_progress
+from wakewise.core.jit.precompile import warm
+from wakewise.experiments.campaigns import Processes
+from wakewise.experiments.campaigns import run as run_campaign
+from wakewise.experiments.campaigns.store import Store, open_store
+from wakewise_paper.reproduction.blocks import NOWHERE, TABLE, Block, Wish, blocks_of
+from wakewise_paper.reproduction.claim import TABLES
+from wakewise_paper.reproduction.comparison import comparison_claims
+from wakewise_paper.reproduction.quoted import CLAIMS
+from wakewise_paper.reproduction.rows import Made, Row, Trials, once_rows, table_rows
+
+MOST_TRIALS = 1000
+TRIAL_LIMIT_S = 3600.0
+"""A trial that takes longer is ended: sixty times what one takes here."""
+RESERVE = 0.9
+"""Share of what is left of a budget that is planned: the last trials do not end together."""
+LAST = 1.25
+"""At this times the budget what is under way is stopped."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """How tables are made.
+
+    Parameters
+    ----------
+    trials : int or None
+        Seeds for each target in each world; with a budget, at most so many.
+    budget_s : float or None
+        Wall time for all tables together.
+    worlds, methods, targets : tuple of str or None
+        In place of the tables' own.
+    duration_s : float or None
+        Only the first part of each flight.
+    workers : int
+        Trials at a time.
+    again : bool
+        Try trials anew that failed in an earlier run.
+    """
+
+    trials: int | None = None
+    budget_s: float | None = None
+    worlds: tuple[str, ...] | None = None
+    methods: tuple[str, ...] | None = None
+    targets: tuple[str, ...] | None = None
+    duration_s: float | None = None
+    workers: int = 2
+    again: bool = False
+    progress: Progress = no_progress
+
+    def __post_init__(self) -> None:
+        if self.trials is not None and not 1 <= self.trials <= MOST_TRIALS:
+            raise InputError(f"--trials {self.trials}, allowed 1 to {MOST_TRIALS}")
+        if self.budget_s is not None and not self.budget_s > 0.0:
+            raise InputError(f"--budget {self.budget_s:g} s, must be more than 0")
+
+    @property
+    def wish(self) -> Wish:
+        """What is asked of each table."""
+        trials = self.trials or (MOST_TRIALS if self.budget_s is not None else 1)
+        return Wish(
+            trials=trials,
+            worlds=self.worlds,
+            methods=self.methods,
+            targets=self.targets,
+            duration_s=self.duration_s,
+        )
+
+
+@dataclass
+class _Growing:
+    """A table while its trials are made."""
+
+    name: str
+    coming: Iterator[Block]
+    taken: list[Block] = field(default_factory=list)
+    made: list[Made] = field(default_factory=list)
+    block_s: float = 0.0
+    spent_s: float = 0.0
+    why: str | None = None
+
+    def take(self) -> Block | None:
+        """The next block, if there is one."""
+        block = next(self.coming, None)
+        if block is not None:
+            self.taken.append(block)
+        return block
+
+    def is_made(self, block: Block, store: Store) -> bool:
+        """Whether an earlier run made all of a block."""
+        return all(store.figures(plan.task.key) is not None for plan in block)
+
+    def leave(self, block: Block, store: Store) -> bool:
+        """Take a block back for which there is no room, unless an earlier run made a part of it, which is shown."""
+        begun = any(store.figures(plan.task.key) is not None for plan in block)
+        if not begun:
+            self.taken.remove(block)
+        return not begun
+
+
+def reproduce(names: Sequence[str], folder: Path, options: Options) -> dict[str, dict[str, Any]]:
+    """Tables by name: `rows` of paper and ours, `trials` (most seeds of a target), `seeds`, `config_hash` and more.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of `claim.TABLES`.
+    folder : Path
+        A campaign's, made if it is not there.
+
+    Raises
+    ------
+    InputError
+        If a table, world or method is not known, or the folder holds something else.
+    EnvironmentFailure
+        If the disk is full; what was finished is kept.
+    """
+    began = time.monotonic()
+    for name in names:
+        if name not in TABLES:
+            raise InputError(f"table '{name}': not known, allowed: {', '.join(TABLES)}, all")
+    tables = [_Growing(name, blocks_of(name, _fitting(name, options.wish))) for name in names]
+    for table in tables:
+        table.block_s = TABLE[table.name].block_s
+    options.progress(0, 1, "compiling what is not compiled yet")
+    warm(progress=options.progress)
+    if options.budget_s is None:
+        for table in tables:
+            while table.take() is not None:
+                pass
+        _make(tables, folder, options, None)
+    else:
+        _within(tables, folder, options, began)
+    return {table.name: _figures(table) for table in tables}
+
+
+def _fitting(name: str, wish: Wish) -> Wish:
+    """What is wished of one table: methods that only others have say nothing of it."""
+    if wish.methods is None:
+        return wish
+    own = tuple(method for method in wish.methods if method in TABLE[name].methods)
+    return replace(wish, methods=own or wish.methods)
+
+
+def _within(tables: list[_Growing], folder: Path, options: Options, began: float) -> None:
+    """The first block of each table that has room, then more of what cost least so far."""
+    budget_s = options.budget_s or 0.0
+    until = began + LAST * budget_s
+
+    store = open_store(folder)
+
+    def room_s() -> float:
+        return RESERVE * (budget_s - (time.monotonic() - began)) * options.workers
+
+    left_s = room_s()
+    for table in tables:
+        block = table.take()
+        if block is None or table.is_made(block, store):
+            continue
+        if table.block_s > left_s and len(tables) > 1 and table.leave(block, store):
+            table.why = f"no room in {budget_s / 60.0:.0f} min: its first trials take some {table.block_s:.0f} s"
+            continue
+        left_s -= table.block_s
+    _make(tables, folder, _telling(options, "the first block of each table"), until)
+    left_s = room_s()
+    open_tables = [table for table in tables if table.why is None]
+    while open_tables:
+        cheapest = min(open_tables, key=lambda table: table.spent_s / TABLE[table.name].weight)
+        block = cheapest.take()
+        if block is None:
+            open_tables.remove(cheapest)
+            continue
+        if not cheapest.is_made(block, store):
+            if cheapest.block_s > left_s:
+                cheapest.leave(block, store)
+                open_tables.remove(cheapest)
+                continue
+            left_s -= cheapest.block_s
+        cheapest.spent_s += cheapest.block_s
+    _make(tables, folder, options, until)
+
+
+def _telling(options: Options, words: str) -> Options:
+    """The same, with these words before what is told of progress: its time left is not that of the budget."""
+
+    def progress(done: float, total: float, note: str = "") -> None:
+        options.progress(done, total, f"{words}: {note}")
+
+    return replace(options, progress=progress)
+
+
+def _make(tables: list[_Growing], folder: Path, options: Options, until: float | None) -> None:
+    """Have all that was taken made, side by side; what is known already costs nothing."""
+    plans = [(table, plan) for table in tables for block in table.taken for plan in block]
+    if not plans:
+        return
+    outcomes = run_campaign(
+        [plan.task for _, plan in plans],
+        folder,
+        Processes(options.workers),
+        timeout_s=TRIAL_LIMIT_S,
+        progress=options.progress,
+        until=until,
+        again=options.again,
+    )
+    for table in tables:
+        table.made = [Made(plan, out) for (own, plan), out in zip(plans, outcomes, strict=True) if own is table]
+        took = [one.outcome.took_s for one in table.made if one.outcome.took_s > 0.0]
+        if took and table.taken:
+            table.spent_s = sum(took)
+            table.block_s = sum(took) / len(took) * len(table.taken[0])
+
+
+def _figures(table: _Growing) -> dict[str, Any]:
+    """A table as it is printed and written."""
+    flown = [one for one in table.made if one.flown]
+    return {
+        "table": table.name,
+        "title": TABLES[table.name],
+        "rows": rows_of(table.name, table.made),
+        "trials": _trials(flown),
+        "seeds": sorted({one.plan.seed for one in flown}),
+        "config_hash": config_hash(table.made),
+        "worlds": list(dict.fromkeys(one.plan.world for one in flown if one.plan.world != NOWHERE)),
+        "methods": list(dict.fromkeys(one.plan.method for one in flown if one.plan.method != NOWHERE)),
+        "made": len(flown),
+        "left_undone": len(table.made) - len(flown),
+        "failed": sum(one.outcome.figures is None for one in flown),
+        "failures": [
+            {"trial": one.plan.task.name, "reason": one.outcome.reason} for one in flown if one.outcome.figures is None
+        ],
+        "trial_s": sum(one.outcome.took_s for one in flown),
+        "places": [place_of(one) for one in flown],
+        "why": {} if table.why is None else {"rows": table.why},
+    }
+
+
+def rows_of(name: str, made: Sequence[Made]) -> list[Row]:
+    """Rows of a table from its trials."""
+    claims = comparison_claims() if name == "comparison" else CLAIMS[name]
+    if TABLE[name].once:
+        return [
+            row
+            for one in made
+            if one.outcome.figures is not None
+            for row in once_rows(claims, one.outcome.figures, one.plan.world)
+        ]
+    worlds: dict[str, list[Made]] = {}
+    for one in made:
+        worlds.setdefault(one.plan.world, []).append(one)
+    return table_rows(claims, {world: Trials(own) for world, own in worlds.items()})
+
+
+def config_hash(made: Sequence[Made]) -> str:
+    """Hash of all trials of a table: what was flown, by which source."""
+    keys = "\n".join(sorted(one.plan.task.key for one in made))
+    return hashlib.sha256(keys.encode()).hexdigest()[:16]
+
+
+def place_of(one: Made) -> dict[str, Any]:
+    """Where a page finds what a trial left, below the campaign's folder."""
+    figures: Mapping[str, Any] = one.outcome.figures or {}
+    return {
+        "world": one.plan.world,
+        "method": one.plan.method,
+        "target": one.plan.target,
+        "seed": one.plan.seed,
+        "folder": f"trials/{one.plan.task.key}/work",
+        "figures": dict(figures) if one.plan.world != NOWHERE else {},
+        "reason": one.outcome.reason if one.outcome.figures is None else figures.get("failure"),
+    }
+
+
+def _trials(flown: Sequence[Made]) -> int:
+    counts: dict[tuple[str, str, str], int] = {}
+    for one in flown:
+        key = (one.plan.world, one.plan.method, one.plan.target)
+        counts[key] = counts.get(key, 0) + 1
+    return max(counts.values(), default=0)

@@ -1,0 +1,94 @@
+"""Work of a campaign: one whole scan and its model, of which the pictures that a page shows are kept.
+
+What stays in the trial's folder is `metrics.json` and what a page shows (see
+`wakewise.experiments.campaigns.pictures`); the rest, some fifty megabytes, goes.
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wakewise.core.files import write_json
+from wakewise.core.interfaces import Progress
+from wakewise.experiments.campaigns.pictures import keep_pictures
+from wakewise.experiments.trials import run_trial
+from wakewise.operation import Parts, Scenario
+from wakewise.scene.targets import read_mesh
+from wakewise.vision.evaluation import Crop
+from wakewise.vision.evaluation.extent import area_and_volume
+
+FIGURES = (
+    "rmse_mm",
+    "rmse_mean_shape_mm",
+    "accuracy_median_mm",
+    "completeness_pct",
+    "completeness_visible_pct",
+    "registered_images",
+    "target_speed_mean_m_s",
+    "target_speed_p95_m_s",
+    "exposure_speed_mean_m_s",
+    "exposure_optical_depth",
+    "ray_optical_depth",
+    "silt_lifted_g",
+    "sway_rms_mm",
+    "sway_wash_mm",
+    "position_rmse_mm",
+    "estimate_rmse_mm",
+    "velocity_deviation_pct",
+    "roll_pitch_rms_deg",
+    "energy_kJ",
+    "collisions",
+    "fallbacks",
+    "duration_s",
+)
+
+
+def scan_one(settings: Mapping[str, Any], folder: Path, progress: Progress) -> dict[str, Any]:
+    """Figures of one scan.
+
+    Parameters
+    ----------
+    settings : mapping
+        `fields` of a scenario by dotted names, over the preset `quick`; `extent`, whether area and volume of the model
+        are measured, which takes a mesh.
+
+    A model that did not come about is no fault: its figures are missing, `success` is 0 and `failure` says why.
+    """
+    began = time.process_time()
+    extent = bool(settings.get("extent", True))
+    fields = dict(settings["fields"]) | {"reconstruction.mesh": extent}
+    parts = Scenario.preset("quick", **fields).parts()
+    place = folder / "scan"
+    told = run_trial(parts, place)
+    progress(0.9, 1.0, "figures")
+    figures: dict[str, Any] = {key: _plain(told.get(key)) for key in FIGURES}
+    figures["success"] = float(bool(told["success"]))
+    figures["failure"] = None if told.get("rmse_mm") is not None else str(told["why"].get("rmse_mm", "no model"))
+    if extent:
+        figures |= _extent(parts, place)
+    write_json(folder / "metrics.json", told)
+    keep_pictures(parts.target, place, folder)
+    shutil.rmtree(place)
+    return figures | {"cpu_s": time.process_time() - began}
+
+
+def _extent(parts: Parts, place: Path) -> dict[str, float | None]:
+    """Area and volume of model and truth, and by how much the model is off."""
+    crop = Crop(bed_z_m=parts.target.bed_z_m)
+    area, volume = area_and_volume(parts.target.mesh, crop)
+    found: dict[str, float | None] = {"true_area_cm2": 1e4 * area, "true_volume_cm3": 1e6 * volume}
+    path = place / "mesh.ply"
+    if not path.is_file():
+        return found | {"area_cm2": None, "volume_cm3": None}
+    model_area, model_volume = area_and_volume(read_mesh(path), crop)
+    return found | {"area_cm2": 1e4 * model_area, "volume_cm3": 1e6 * model_volume}
+
+
+def _plain(value: Any) -> float | None:
+    return None if value is None or not np.isfinite(value) else float(value)

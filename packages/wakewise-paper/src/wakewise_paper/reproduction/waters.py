@@ -1,0 +1,106 @@
+"""Where the trials of a table are made: the paper's pump tank, the worlds with the trouble, the paper's own wake.
+
+Names are those of the library's worlds, and three more: `paper`, the pump tank whose water is the paper's own wake
+model, with a vehicle that sinks, so that there is something to avoid (circular: planner and water are one law);
+`lattice`, the pump tank judged by the lattice; `caco3` and `field`, the pump tank with calcium carbonate in its water,
+and a dive at sea.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from wakewise.core.errors import InputError
+from wakewise.operation.worlds.library import load_world, world_names
+from wakewise_paper.wash_reduction.paper import OFF, PAPER_WAKE
+
+PUMP_TANK, PAPER, LATTICE, CACO3, FIELD = "pump-tank", "paper", "lattice", "caco3", "field"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Water:
+    """A world as a table knows it.
+
+    Parameters
+    ----------
+    name, title : str
+    world : str
+        Of the library.
+    fields : dict
+        Of a scenario, by their dotted names, over the world's.
+    draws : dict
+        What the seed draws beyond the world's own draws.
+    circular : bool
+        Planner and water are one law: figures say what a method does, not what water does.
+    """
+
+    name: str
+    title: str
+    world: str
+    fields: dict[str, Any] = field(default_factory=dict)
+    draws: dict[str, Any] = field(default_factory=dict)
+    circular: bool = False
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """Fields for `Scenario.preset`."""
+        draws = {"draws": self.draws} if self.draws else {}
+        return {"world": self.world, **self.fields, **draws}
+
+
+_STILL_TARGET = {"target.sway": "none"}
+_OWN = {
+    PAPER: Water(
+        name=PAPER,
+        title="the pump tank, its water the paper's own wake model (circular)",
+        world=PUMP_TANK,
+        fields=_STILL_TARGET
+        | {"flow": "paper"}
+        | {f"control.wake.{key}": value for key, value in PAPER_WAKE.items()}
+        | {f"control.levers.{key}": value for key, value in OFF.items()},
+        draws={"tank.mismatch.trim_N": [-3.3, -1.0]},
+        circular=True,
+    ),
+    LATTICE: Water(
+        name=LATTICE,
+        title="the pump tank, judged by the lattice",
+        world=PUMP_TANK,
+        fields=_STILL_TARGET | {"flow": "lattice"},
+    ),
+    CACO3: Water(
+        name=CACO3,
+        title="the pump tank with 50 mg/l of calcium carbonate of 0.3 mm",
+        world=PUMP_TANK,
+        fields={"tank.silt.kind": "caco3-50mg"},
+    ),
+    FIELD: Water(
+        name=FIELD,
+        # 4.8 over 1.54 per metre in green is 3.1 m of sight (Zaneveld and Pegau 2003, doi 10.1364/OE.11.002997).
+        title="a reef with swell, a current to 0.5 m/s and 3 m of sight",
+        world="reef",
+        # A stony coral, as the paper's were: the reef's gorgonian bends beyond its theory from about 0.35 m/s on.
+        fields={"imaging.water_type": "5C", "target.kind": "branching"},
+        draws={"tank.current.velocity_m_s": {"level": [0.1, 0.5]}},
+    ),
+}
+
+
+def water_names() -> tuple[str, ...]:
+    """All names."""
+    return (*world_names(), *_OWN)
+
+
+def water(name: str) -> Water:
+    """The water of that name.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    if name in _OWN:
+        return _OWN[name]
+    if name not in world_names():
+        raise InputError(f"--world '{name}': not known, allowed: {', '.join(water_names())}")
+    return Water(name=name, title=load_world(name).file.title, world=name)

@@ -1,0 +1,92 @@
+"""Which flights the bench makes: methods, wrong currents and levers, in scenarios and worlds, seed by seed."""
+
+from __future__ import annotations
+
+from wakewise.control import MAKERS
+from wakewise.core.errors import InputError
+from wakewise.operation.worlds.library import load_world
+from wakewise_paper.side_by_side import Key
+from wakewise_paper.wash_reduction.flight import TRIM, Trial
+from wakewise_paper.wash_reduction.headline import WRONG
+from wakewise_paper.wash_reduction.levers import LEVER_SEEDS, Settings, lever_settings
+from wakewise_paper.wash_reduction.library import WORLD
+
+METHODS = (
+    "dp",
+    "manual",
+    "bow-rule",
+    "ardusub",
+    "pseudo-inverse",
+    "unaware",
+    "smooth",
+    "instant",
+    "wake-aware",
+    "wake-aware+trim",
+    "dp+trim",
+    "bow-rule+trim",
+)
+"""The first is what the others are held against."""
+
+
+def flown_methods(wished: tuple[str, ...] | None) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Methods to fly, in the bench's order, and why others are not.
+
+    Raises
+    ------
+    InputError
+        If a name is none of the bench's.
+    """
+    for name in wished or ():
+        if name not in METHODS:
+            raise InputError(f"methods: '{name}' is not known, allowed: {', '.join(METHODS)}")
+    reasons: dict[str, str] = {}
+    for name in METHODS:
+        if wished is not None and name not in wished:
+            reasons[name] = "this method was left out"
+        elif name.removesuffix(TRIM) not in MAKERS:
+            reasons[name] = "there is no such method yet"
+    return tuple(name for name in METHODS if name not in reasons), reasons
+
+
+def planned_trials(
+    scenarios: tuple[str, ...], methods: tuple[str, ...], levers: tuple[str, ...], seeds: int
+) -> dict[Key, Trial]:
+    """Flights to make, seed by seed, so that a run that is stopped has whole seeds; dearest levers last."""
+    trials: dict[Key, Trial] = {}
+    for seed in range(1, seeds + 1):
+        for scenario in scenarios:
+            for method in methods:
+                trials[scenario, method, seed] = Trial(scenario=scenario, method=method, seed=seed)
+            if "wake-aware" in methods and runs(scenario):
+                trials[scenario, WRONG, seed] = Trial(
+                    scenario=scenario, method="wake-aware", seed=seed, wrong_current=True
+                )
+    table = lever_settings(levers) if "wake-aware" in methods else {}
+    for seed in range(1, min(seeds, LEVER_SEEDS) + 1):
+        for scenario in scenarios:
+            for name, settings in table.items():
+                trials[scenario, name, seed] = lever_trial(scenario, settings, seed)
+    return trials
+
+
+def lever_trial(scenario: str, settings: Settings, seed: int) -> Trial:
+    """Flight of `wake-aware` with some fields changed."""
+    return Trial(scenario=scenario, method="wake-aware", seed=seed, control=tuple(sorted(settings.items())))
+
+
+def runs(scenario: str) -> bool:
+    """Whether there is a current that can be believed wrong."""
+    if not scenario.startswith(WORLD):
+        return True
+    world = load_world(scenario.removeprefix(WORLD))
+    field = "tank.current.velocity_m_s"
+    return field in world.draws or any(world.values.get(field, ()))
+
+
+def flight_s(trial: Trial) -> float:
+    """About how much CPU time a flight takes, in seconds: measured on two cores, for saying how long a run is."""
+    if trial.duration_s is not None:
+        return 0.2 * trial.duration_s
+    name = trial.scenario.split("/")[0]
+    base = {"station": 34.0, "nadir": 5.0, "brake": 6.0}.get(name, 8.0)
+    return base + (3.0 if trial.method.endswith(TRIM) else 0.0)

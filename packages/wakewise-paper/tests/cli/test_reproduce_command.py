@@ -1,0 +1,103 @@
+"""`wakewise reproduce` on the command line; the trials themselves are stood in for."""
+
+import json
+
+import pytest
+
+from wakewise.core.errors import InputError
+from wakewise.experiments.campaigns.task import Outcome
+from wakewise.ui.cli.main import run
+from wakewise_paper.cli.reproduce import seconds
+
+
+@pytest.fixture
+def made(monkeypatch, tmp_path):
+    """Every trial becomes the same figures, but for the method's own wash; runs in an empty folder."""
+    from wakewise_paper.reproduction import run as module
+
+    def campaign(tasks, folder, engine, **options):
+        wash = {"manual": 0.03, "dp": 0.02, "unaware": 0.02, "smooth": 0.018, "wake-aware": 0.005}
+        fields = [task.settings["fields"] for task in tasks]
+        return [
+            Outcome(
+                task=task,
+                figures={
+                    "target_speed_mean_m_s": wash[own["method"]] + 1e-4 * own["seed"],
+                    "position_rmse_mm": 2.0, "estimate_rmse_mm": 5.0, "energy_kJ": 1.0, "roll_pitch_rms_deg": 1.0,
+                },
+                attempts=1,
+                took_s=1.0,
+            )
+            for task, own in zip(tasks, fields, strict=True)
+        ]  # fmt: skip
+
+    monkeypatch.setattr(module, "run_campaign", campaign)
+    monkeypatch.setattr(module, "warm", lambda **_: None)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_json_is_one_object_with_the_promised_keys(made, capsys):
+    """And nothing else on standard output; a table not met is no fault."""
+    assert run(["reproduce", "station", "--trials", "3", "--world", "pump-tank", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert list(told)[:4] == ["rows", "trials", "seeds", "config_hash"]
+    assert told["trials"] == 3 and told["seeds"] == [1, 2, 3] and "places" not in told
+    rows = {(row["method"], row["figure"]): row for row in told["rows"]}
+    assert all(
+        list(row)[:9] == ["method", "target", "figure", "paper", "ours", "low", "high", "n", "met"]
+        for row in rows.values()
+    )
+    less = rows["wake-aware", "wash at the target, less than dp"]
+    assert less["paper"] == 67.0 and less["ours"] == pytest.approx(74.3, abs=0.1) and less["met"] and less["sure"]
+    assert rows["wake-aware", "energy, less than unaware"]["met"] is False
+
+
+def test_people_get_a_table_and_a_page(made, capsys):
+    """With paper, ours and verdict in words."""
+    assert run(["reproduce", "station", "--world", "pump-tank"]) == 0
+    said = capsys.readouterr().out
+    assert "wash at the target, less than dp" in said and "67.0" in said and "page:" in said
+    page = (made / "runs" / "reproduce" / "reproduce.html").read_text(encoding="utf-8")
+    assert "The paper" in page and "station" in page
+    assert json.loads((made / "runs" / "reproduce" / "results.json").read_text())["tables"]["station"]["rows"]
+
+
+def test_markdown_pages_are_for_keeping_beside_the_code(made, capsys):
+    """Small, without pictures of trials, with machine, versions and seeds."""
+    assert run(["reproduce", "station", "--trials", "2", "--world", "pump-tank", "--markdown", "--out", "kept"]) == 0
+    names = {path.name for path in (made / "kept").iterdir()}
+    assert {"README.md", "station.md", "reproduced.md", "results.json", "station-methods.svg"} <= names
+    assert sum(path.stat().st_size for path in (made / "kept").iterdir()) < 300_000
+    index = (made / "kept" / "README.md").read_text(encoding="utf-8")
+    assert "cores" in index and "numpy" in index and "1 to 2" in index
+    why = (made / "kept" / "reproduced.md").read_text(encoding="utf-8")
+    assert "Met in at least one world" in why and "Met in none" in why and str(made) not in index + why
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["quantum"], "'quantum'"),
+        (["station", "--world", "atlantis"], "pump-tank"),
+        (["station", "--methods", "magic"], "wake-aware"),
+        (["dynamic", "--targets", "unicorn"], "brain"),
+        (["station", "--budget", "soon"], "30min"),
+        (["station", "--trials", "0"], "--trials"),
+        (["station", "--methods", ","], "names"),
+    ],
+)
+def test_bad_input_is_one_line_and_nothing_is_left(made, capsys, arguments, words):
+    """What is wrong and what would be right."""
+    assert run(["reproduce", *arguments]) == 2
+    said = capsys.readouterr()
+    assert words in said.err and said.out == ""
+    assert list(made.iterdir()) == []
+
+
+def test_times_are_read_as_people_write_them():
+    """Minutes, hours, seconds; a number alone is seconds."""
+    assert [seconds("--budget", text) for text in ("30min", "2h", "90s", "1.5 h", "45")] == [1800, 7200, 90, 5400, 45]
+    for text in ("", "-1min", "0h", "1 week"):
+        with pytest.raises(InputError, match="--budget"):
+            seconds("--budget", text)

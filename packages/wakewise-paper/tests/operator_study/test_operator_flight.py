@@ -1,0 +1,55 @@
+"""One flight of the operator's bench, really flown for its first seconds; deviations; what is overheard."""
+
+import math
+
+import numpy as np
+import pytest
+
+from wakewise.control.receding import PlanState
+from wakewise_paper.operator_study.flight import (
+    DEVIATIONS,
+    FIGURES,
+    OperatorTrial,
+    course_of,
+    deviations,
+    fly_trial,
+    parts_of,
+)
+from wakewise_paper.operator_study.heard import Overheard, within
+
+
+def test_deviation_is_the_rms_of_what_is_missed_over_that_of_what_is_asked():
+    """Of vectors; what the plan misses and what the vehicle misses of its plan beside it; nothing asked, no share."""
+    asked, off = np.tile([0.1, 0.0, 0.0], (4, 1)), np.array([0.0, 0.01, 0.0])
+    told = deviations(asked, asked + off, asked + 0.6 * off, 2.0 * asked)
+    assert told["velocity_deviation_pct"] == pytest.approx(10.0)
+    assert told["velocity_deviation_planned_pct"] == pytest.approx(6.0)
+    assert told["velocity_deviation_behind_plan_pct"] == pytest.approx(4.0)
+    assert told["velocity_deviation_from_sticks_pct"] == pytest.approx(50.2, abs=0.1)
+    assert deviations(0.0 * asked, asked, asked)["velocity_deviation_pct"] is None
+
+
+def test_the_same_seed_is_the_same_water_for_every_method_and_pilot():
+    """Tank, start and course do not depend on who flies; the method does not change what is asked."""
+    one, two = (parts_of(OperatorTrial(world="close", pilot="script", method=m, seed=2)) for m in ("dp", "bow-rule"))
+    person = parts_of(OperatorTrial(world="close", pilot="human", method="dp", seed=2))
+    assert one.scenario.tank == two.scenario.tank == person.scenario.tank
+    assert one.start.X_WB.p_m == pytest.approx(two.start.X_WB.p_m)
+    assert isinstance(one.controller, Overheard) and one.controller.name == "dp"
+    assert course_of(OperatorTrial(world="close", pilot="human", method="dp", seed=1)) == "look"
+
+
+def test_a_plan_is_found_however_deep_it_lies():
+    """The state of a method that shares a plan's wrench out anew has the plan's in it; that of one without has none."""
+    deep, flat = (parts_of(OperatorTrial(world="mud", pilot="script", method=m, seed=1)) for m in ("wake-aware", "dp"))
+    assert isinstance(within(deep.controller.init(), PlanState), PlanState)
+    assert within(flat.controller.init(), PlanState) is None
+
+
+def test_one_flight_gives_the_figures_of_the_table():
+    """Finite ones of velocity, water, D and cost; the first command is obeyed within a half, by direct allocation."""
+    row = fly_trial(OperatorTrial(world="payload", pilot="script", method="dp", seed=3, duration_s=9.5))
+    assert set(row) == set(FIGURES)
+    for key in (*DEVIATIONS, "disturbance", "target_speed_mean_m_s", "energy_kJ", "position_rmse_mm", "solve_ms_p99"):
+        assert row[key] is not None and math.isfinite(row[key])
+    assert 0.0 < row["velocity_deviation_pct"] < 50.0 and row["velocity_deviation_planned_pct"] == 0.0

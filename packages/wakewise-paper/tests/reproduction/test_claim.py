@@ -1,0 +1,81 @@
+"""What a figure of the paper is, and the figures themselves."""
+
+import math
+from pathlib import Path
+
+import pytest
+import yaml
+
+from wakewise_paper.reproduction.claim import TABLES, UNQUOTED, Claim
+from wakewise_paper.reproduction.quoted import CLAIMS, UNKNOWN
+
+EVERY = [(name, claim) for name, claims in CLAIMS.items() for claim in claims]
+
+
+def _claim(**told):
+    return Claim(**{"method": "m", "figure": "f", "title": "t", "unit": "", "said": "", "how": "h"} | told)
+
+
+@pytest.mark.parametrize(("side", "better", "worse"), [("less", 1.0, 3.0), ("more", 3.0, 1.0)])
+def test_a_claim_is_met_on_its_side_and_at_its_value(side, better, worse):
+    """Equal is met; nothing measured is neither."""
+    claim = _claim(paper=2.0, side=side)
+    assert (claim.met(better), claim.met(2.0), claim.met(worse), claim.met(None)) == (True, True, False, None)
+
+
+def test_what_is_not_quoted_is_judged_by_what_is_asked_or_not_at_all():
+    """A direction can be asked where the number is not known."""
+    assert _claim(paper=None, side="more", asked=0.0).met(5.0) is True
+    assert _claim(paper=None, side="none").met(5.0) is None
+    assert _claim(paper=2.0, side="more", asked=9.0).bar == 2.0
+
+
+def test_every_table_of_the_paper_has_its_claims():
+    """All but the comparison, whose cells are not quoted."""
+    assert set(CLAIMS) == set(TABLES)
+    assert [name for name, claims in CLAIMS.items() if not claims] == ["comparison"]
+
+
+@pytest.mark.parametrize(("name", "claim"), EVERY)
+def test_a_number_of_the_paper_is_finite_and_one_that_is_not_known_says_so(name, claim):
+    """And each says how it is measured, and against whom a difference is."""
+    assert claim.how and claim.title
+    assert (claim.than is not None) == (claim.reading == "less_pct")
+    if claim.paper is None:
+        assert claim.said and (claim.side == "none" or claim.asked is not None), (name, claim.title)
+    else:
+        assert math.isfinite(claim.paper) and claim.said != UNQUOTED
+
+
+def test_the_figures_that_the_records_quote_are_among_them():
+    """Values, with their method, as the paper's tables and sections have them."""
+    known = {(name, c.method, c.figure, c.than): c.paper for name, c in EVERY if c.paper is not None}
+    rmse = {m: known["dynamic", m, "rmse_mm", None] for m in ("manual", "unaware", "smooth", "wake-aware")}
+    assert rmse == {"manual": 8.7, "unaware": 4.3, "smooth": 2.8, "wake-aware": 1.9}
+    assert known["dynamic", "wake-aware", "completeness_pct", None] == 94.8
+    assert known["success", "wake-aware", "success", None] == 98.5
+    assert known["station", "wake-aware", "position_rmse_mm", None] == 2.1
+    assert known["station", "wake-aware", "energy_kJ", "dp"] == 31.0
+    asked = {c.than: c.asked for _, c in EVERY if (c.figure, c.reading) == ("roll_pitch_rms_deg", "less_pct")}
+    assert asked == {"dp": None, "manual": 45.0, "smooth": 45.0, "unaware": 45.0}
+    assert known["station", "wake-aware", "roll_pitch_rms_deg", "dp"] == 45.0
+    whole = {m: known["dynamic", m, "completeness_pct", None] for m in ("manual", "unaware", "smooth", "wake-aware")}
+    assert whole == {"manual": 34.2, "unaware": 68.5, "smooth": 87.0, "wake-aware": 94.8}
+    assert known["success", "unaware", "success", None] == 45.0
+    assert known["solver", "wake-aware", "ms_mean", None] == 45.0
+    assert known["wake", "paper", "r2_core", None] == 0.99
+    assert known["operator", "wake-aware, w_track 5", "velocity_deviation_pct", None] == 15.0
+    shares = 100.0 * (1.0 - 0.06 / 0.18)
+    assert known["flow", "wake-aware", "piv_speed_m_s", "unaware"] == pytest.approx(shares, abs=0.5)
+    assert UNKNOWN
+
+
+def test_the_paper_is_named_where_readers_and_citers_look():
+    """Title and authors stand in README, CITATION.cff and the page of the tables."""
+    root = Path(__file__).parents[4]
+    for name in ("README.md", "CITATION.cff", "docs/reproduce.md"):
+        text = " ".join((root / name).read_text(encoding="utf-8").split())
+        assert "Disturbance-Aware Motion Planning for Over-Actuated Underwater Vehicles" in text, name
+        assert all(author in text for author in ("Gao", "Xu", "Liu", "Cai")), name
+    cited = yaml.safe_load((root / "CITATION.cff").read_text(encoding="utf-8"))["references"]
+    assert [author["family-names"] for author in cited[0]["authors"]] == ["Gao", "Xu", "Liu", "Cai"]

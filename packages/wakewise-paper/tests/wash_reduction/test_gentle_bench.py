@@ -1,0 +1,149 @@
+"""The gentle bench: its trials, its keys, what it keeps, what it says of what failed."""
+
+import json
+
+import pytest
+
+from pools import Here
+from wakewise.control import METHODS as MADE
+from wakewise.control import ControlSettings
+from wakewise.core.errors import InputError, StageError
+from wakewise.experiments.trials import BenchOptions
+from wakewise_paper.cli.bench_wash_reduction import show_gentle
+from wakewise_paper.reports.wash_reduction import draw_gentle
+from wakewise_paper.wash_reduction import bench as gentle
+from wakewise_paper.wash_reduction.figures import SPEED
+from wakewise_paper.wash_reduction.flight import FIGURES, parts_of
+from wakewise_paper.wash_reduction.headline import WRONG
+from wakewise_paper.wash_reduction.levers import LEVERS, NONE, alone, left_out, lever_settings, wished_levers
+from wakewise_paper.wash_reduction.paper import FIGURES as PAPER_FIGURES
+from wakewise_paper.wash_reduction.plan import METHODS, flown_methods, lever_trial, planned_trials
+
+ROW = dict.fromkeys(FIGURES, 1.0)
+SHARE = {"dp": 1.0, "bow-rule": 0.4, "wake-aware": 0.1}
+
+
+def made_up(trial):
+    """Figures that depend on the trial alone: less without a lever."""
+    worse = 1.0 + len(trial.control) + trial.wrong_current
+    return ROW | {SPEED: 0.02 * trial.seed * SHARE.get(trial.method, 0.8) * worse}
+
+
+@pytest.fixture
+def here(monkeypatch):
+    """No process and no flight; gives the trials that were flown."""
+    flown = []
+
+    def flight(trial):
+        flown.append(trial)
+        return made_up(trial)
+
+    monkeypatch.setattr(gentle, "_engine", lambda _: Here())
+    monkeypatch.setattr("wakewise_paper.side_by_side.warm", lambda **_: None)
+    monkeypatch.setattr("wakewise_paper.wash_reduction.flight.fly_trial", flight)
+    monkeypatch.setattr(
+        "wakewise_paper.wash_reduction.paper.fly_paper", lambda trial: dict.fromkeys(PAPER_FIGURES, float(trial.seed))
+    )
+    return flown
+
+
+def test_the_answer_has_the_keys_that_were_promised(here, tmp_path, capsys):
+    """Scenarios with methods, reductions and levers; headline; flows; a picture of them."""
+    found = gentle.run(
+        BenchOptions(seeds=3, scenarios=("orbit/paper", "world/mud", "paper"), levers=("all",), store=tmp_path)
+    )
+    json.dumps(found, allow_nan=False)
+    assert set(found) >= {"scenarios", "headline", "flows", "flights", "failed", "why"}
+    scenario = found["scenarios"]["orbit/paper"]
+    assert scenario["dp_target_speed_m_s"] == pytest.approx(0.04)
+    assert scenario["reduction_vs_dp_pct"] == pytest.approx(90.0)
+    assert scenario["reduction_vs_bow_rule_pct"] == pytest.approx(75.0)
+    row = scenario["methods"]["wake-aware"]
+    for key in ("exceedance_1cm_s_pct", "exceedance_ambient_pct", "attitude_rmse_deg", "camera_rmse_mm"):
+        assert row[key] == 1.0
+    assert row["rmse_mm"] is None and "bench worlds" in row["why"]["rmse_mm"]
+    for name in LEVERS:
+        assert scenario["levers"][name]["left_out_pct"] == pytest.approx(50.0)
+        assert scenario["levers"][name]["alone_pct"] > 0.0
+    trouble = found["headline"]["trouble"]
+    assert trouble["flights"] == 6 and trouble["worst_world_pct"] == pytest.approx(90.0)
+    assert trouble["wrong_current_keeps_pct"] == pytest.approx(100.0 * 80.0 / 90.0)
+    assert found["flows"]["paper"]["circular"] is True
+    show_gentle(found)
+    said = capsys.readouterr().out
+    assert "headline" in said and "orbit/paper" in said and "levers" in said and "circular" in said
+    draw_gentle(found, tmp_path / "gentle.png")
+    assert (tmp_path / "gentle.png").stat().st_size > 10_000
+    with pytest.raises(InputError, match="ending"):
+        draw_gentle(found, tmp_path / "gentle.doc")
+
+
+def test_a_bench_that_was_stopped_goes_on_and_failures_count(here, monkeypatch, tmp_path):
+    """A second run flies what the first could not; a failed flight is named, is no gain, and is not kept."""
+    lost = True
+
+    def flight(trial):
+        here.append(trial)
+        if lost and trial.method == "wake-aware" and trial.seed == 2 and not trial.wrong_current:
+            raise StageError("the vehicle was lost")
+        return made_up(trial)
+
+    monkeypatch.setattr("wakewise_paper.wash_reduction.flight.fly_trial", flight)
+    said = []
+    options = BenchOptions(
+        seeds=2,
+        scenarios=("orbit/paper",),
+        methods=("dp", "wake-aware"),
+        store=tmp_path,
+        progress=lambda done, total, note="": said.append((done, total, note)),
+    )
+    first = gentle.run(options)
+    assert first["flights"] == 6 and first["failed"] == 1 and first["flown"] == 5
+    assert first["failures"] == [
+        {"flow": "orbit/paper", "name": "wake-aware", "seed": 2, "reason": "StageError: the vehicle was lost"}
+    ]
+    assert first["headline"]["trouble"]["position_ok"] is False
+    assert first["headline"]["trouble"]["reduction_vs_dp_pct"] < 70.0
+    assert first["scenarios"]["orbit/paper"]["methods"]["wake-aware"]["failed"] == 1
+    assert "s left" in said[-1][2]
+    lost = False
+    again = gentle.run(options)
+    assert again["flown"] == 1 and again["failed"] == 0 and len(here) == 7
+    assert again["why"]["smooth"] == "this method was left out" and "paper" in again["why"]
+
+
+def test_a_method_that_is_not_made_is_left_out_with_a_reason():
+    """Names of the bench that no controller has are not flown and are said; +trim is flown by the method it ends."""
+    methods, reasons = flown_methods(None)
+    assert set(methods) | set(reasons) == set(METHODS)
+    assert ("ardusub" in methods) == ("ardusub" in MADE) and "wake-aware+trim" in methods
+    assert flown_methods(("dp",))[1]["manual"] == "this method was left out"
+
+
+def test_each_lever_is_left_out_once_and_flown_alone_once():
+    """All levers' settings are accepted, none is without effect, and left out and alone differ."""
+    table = lever_settings(tuple(LEVERS))
+    assert set(table) == {NONE, *(left_out(n) for n in LEVERS), *(alone(n) for n in LEVERS)}
+    usual = ControlSettings()
+    for settings in table.values():
+        control = parts_of(lever_trial("calm/paper", settings, 1)).scenario.control
+        assert control != usual
+    assert wished_levers(None) == () and wished_levers(("all",)) == tuple(LEVERS) and lever_settings(()) == {}
+
+
+def test_wrong_currents_are_flown_where_water_runs():
+    """Not in the still tank; there nothing can be believed wrong."""
+    trials = planned_trials(("world/still-tank", "world/kelp", "orbit/paper"), ("dp", "wake-aware"), (), 1)
+    assert {key[0] for key in trials if key[1] == WRONG} == {"world/kelp", "orbit/paper"}
+
+
+def test_wishes_are_checked():
+    """Names that do not exist and numbers out of range are refused with what is allowed."""
+    with pytest.raises(InputError, match="allowed: dp"):
+        gentle.run(BenchOptions(methods=("magic",)))
+    with pytest.raises(InputError, match="allowed: none"):
+        gentle.run(BenchOptions(levers=("magic",)))
+    with pytest.raises(InputError, match="allowed: orbit"):
+        gentle.run(BenchOptions(scenarios=("magic",)))
+    with pytest.raises(InputError, match="seeds: 0"):
+        BenchOptions(seeds=0)

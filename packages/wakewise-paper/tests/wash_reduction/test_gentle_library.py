@@ -1,0 +1,68 @@
+"""Scenarios of the gentle bench: files with sources, one world for all methods, names."""
+
+import pytest
+
+from wakewise.core.errors import InputError
+from wakewise_paper.wash_reduction.flight import TRIM, Trial, parts_of, wrong_current
+from wakewise_paper.wash_reduction.library import SCENARIOS, VEHICLES, drawn, fields_of, load_scenario_file, names_of
+from wakewise_paper.wash_reduction.plan import METHODS
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_every_scenario_says_why_and_whence(name):
+    """Numbers have sources; what every world draws is drawn, but in the plain tank."""
+    file = load_scenario_file(name)
+    assert len(file.why) > 40 and file.trims_source and file.current_source
+    assert all(field.source for field in file.fields.values())
+    _, draws = fields_of(name)
+    assert ("tank.jets.half_width_growth" in draws) == (name != "calm")
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_what_a_seed_draws_lies_within_its_stratum(name):
+    """Trim and current's speed are where the file has them; no two scenarios share a seed."""
+    file = load_scenario_file(name)
+    for seed in range(1, 10):
+        found = drawn(name, seed)
+        low, high = file.trims_N[found.trim]
+        assert low <= found.trim_N <= high
+        north, east, _ = found.current_W_m_s
+        assert file.current_m_s[0] - 1e-4 <= (north**2 + east**2) ** 0.5 <= file.current_m_s[1] + 1e-4
+    assert len({drawn(other, 1).seed for other in SCENARIOS}) == len(SCENARIOS)
+
+
+def test_methods_and_levers_of_one_seed_meet_the_same_world():
+    """Trials of one seed differ in method and control alone, in scenarios and in worlds."""
+    for scenario in ("close/bluerov2-heavy", "world/mud"):
+        plain = parts_of(Trial(scenario=scenario, method="dp", seed=2))
+        for trial in (
+            Trial(scenario=scenario, method="wake-aware", seed=2),
+            Trial(scenario=scenario, method="wake-aware" + TRIM, seed=2),
+            Trial(scenario=scenario, method="wake-aware", seed=2, control=(("levers.drift", False),)),
+            Trial(scenario=scenario, method="wake-aware", seed=2, wrong_current=True),
+        ):
+            other = parts_of(trial)
+            same = other.scenario.model_copy(update={"control": plain.scenario.control, "method": "dp"})
+            assert same == plain.scenario
+            assert other.route.duration_s == plain.route.duration_s
+            assert (other.start.X_WB.p_m == plain.start.X_WB.p_m).all()
+
+
+def test_a_wrong_current_is_wrong_by_what_it_says():
+    """A third too fast or too slow, and turned by 30 deg to either side; the seeds draw all four."""
+    ways = set()
+    for seed in range(30):
+        north, east, down = wrong_current((0.1, 0.0, 0.0), seed)["levers.drift_m_s"]
+        assert down == 0.0 and abs(east / north) == pytest.approx(3**-0.5, rel=1e-3)
+        ways.add((round((north**2 + east**2) ** 0.5, 3), east > 0.0))
+    assert ways == {(0.13, True), (0.13, False), (0.07, True), (0.07, False)}
+
+
+def test_names_stand_for_vehicles_and_worlds():
+    """`orbit` is flown by both vehicles, `worlds` are eight; all by default; others are refused."""
+    assert names_of(("orbit",)) == tuple(f"orbit/{vehicle}" for vehicle in VEHICLES)
+    assert len(names_of(("worlds",))) == 8 and names_of(("world/mud", "calm/paper")) == ("calm/paper", "world/mud")
+    assert len(names_of(None)) == len(SCENARIOS) * len(VEHICLES) + 8 and names_of(()) == ()
+    with pytest.raises(InputError, match="allowed: orbit"):
+        names_of(("magic",))
+    assert METHODS[0] == "dp"

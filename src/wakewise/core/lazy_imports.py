@@ -1,0 +1,82 @@
+"""Doors that open when somebody walks through: a room's names are imported when they are asked for, not before.
+
+A room's `__init__` states what it exports as plain imports in a block `if TYPE_CHECKING:`, which type checkers and the
+import contracts read, and hands itself to `lazy_door`, which reads the same block: nothing is listed twice. So
+settings can be read without the room's compiled libraries, and commands that need little start fast.
+"""
+
+from __future__ import annotations
+
+import ast
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+from wakewise.core.errors import MissingExtra
+from wakewise.core.optional_dependencies import missing_extra
+
+
+class _Door(ModuleType):
+    """A package whose exports are imported at first use (PEP 562, as a class: see `__setattr__`)."""
+
+    _homes: dict[str, tuple[str, str]]
+    _extras: tuple[str, ...]
+
+    def __getattr__(self, name: str) -> Any:
+        home = self.__dict__["_homes"].get(name)
+        if home is None:
+            raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
+        try:
+            value = getattr(import_module(home[0]), home[1])
+        except (ModuleNotFoundError, MissingExtra) as fault:
+            # Another room's door may have refused on the way: what was asked for here is what is told of.
+            missing = fault.__cause__ if isinstance(fault, MissingExtra) else fault
+            if not isinstance(missing, ModuleNotFoundError):
+                raise
+            refusal = missing_extra(f"{self.__name__}.{name}", missing, *self._extras)
+            if refusal is None:
+                raise
+            raise refusal from missing
+        self.__dict__[name] = value
+        return value
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Set an attribute, but leave an export alone when a module of the same name is imported below the room."""
+        if not (isinstance(value, ModuleType) and name in self.__dict__["_homes"]):
+            super().__setattr__(name, value)
+
+    def __dir__(self) -> list[str]:
+        """The exports, and what every module has; not what the page itself imported."""
+        return sorted({*self._homes, *(name for name in self.__dict__ if name.startswith("__"))})
+
+
+def lazy_door(name: str, *extras: str) -> None:
+    """Make a package import its exports lazily; called as ``lazy_door(__name__)`` in its `__init__`.
+
+    Parameters
+    ----------
+    name : str
+        Of the package; what its `if TYPE_CHECKING:` block imports from elsewhere is what it exports.
+    *extras : str
+        Extras to name first where a third party's module is missing, see `wakewise.core.optional_dependencies`.
+    """
+    room = sys.modules[name]
+    loader = room.__spec__.loader if room.__spec__ is not None else None
+    source = loader.get_source(name) if loader is not None and hasattr(loader, "get_source") else None
+    if source is None:
+        raise ImportError(f"{name}: its source is not there, and a lazy door is read from it", name=name)
+    room.__dict__.update(_homes=_homes(source), _extras=extras)
+    room.__class__ = _Door
+
+
+def _homes(source: str) -> dict[str, tuple[str, str]]:
+    """Module and name there of every import below `if TYPE_CHECKING:`."""
+    return {
+        alias.asname or alias.name: (line.module, alias.name)
+        for block in ast.parse(source).body
+        if isinstance(block, ast.If) and isinstance(block.test, ast.Name) and block.test.id == "TYPE_CHECKING"
+        for line in block.body
+        if isinstance(line, ast.ImportFrom) and line.module is not None
+        for alias in line.names
+    }

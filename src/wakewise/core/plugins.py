@@ -1,0 +1,104 @@
+"""What a name of a scenario stands for: one of ours, one that an installed package offers, or `package.module:name`.
+
+Packages offer parts through entry points, a group for each kind (see `GROUPS`), so that a controller, wake model or
+world from outside is named in a scenario as ours are. `package.module:name` is imported from where Python finds it,
+the working folder included, and needs no installed package.
+"""
+
+from __future__ import annotations
+
+import difflib
+import sys
+from collections.abc import Mapping
+from functools import cache
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Any, Generic, NamedTuple, TypeVar
+
+from wakewise.core.errors import InputError
+
+T = TypeVar("T")
+
+GROUPS = {
+    "method": "wakewise.controllers",
+    "wake model": "wakewise.wake_models",
+    "vehicle format": "wakewise.vehicle_formats",
+    "target": "wakewise.targets",
+    "pilot": "wakewise.pilots",
+    "world": "wakewise.worlds",
+    "current": "wakewise.currents",
+}
+"""Entry point group of each kind of part."""
+
+
+class Found(NamedTuple, Generic[T]):
+    """A part's maker and where it comes from: "" for our own, else such as "package 1.2" or "my.module:make"."""
+
+    maker: T
+    origin: str
+
+
+def find(kind: str, name: str, own: Mapping[str, T]) -> Found[T]:
+    """What `name` stands for.
+
+    Parameters
+    ----------
+    kind : str
+        A key of `GROUPS`.
+    name : str
+        One of `own`, of an entry point of this kind, or ``package.module:name``.
+    own : mapping
+        Our own parts of this kind.
+
+    Raises
+    ------
+    InputError
+        If there is nothing of that name, or it cannot be imported; the reason is named.
+    """
+    if name in own:
+        return Found(own[name], "")
+    offered = _offered(GROUPS[kind])
+    if name in offered:
+        point = offered[name]
+        package = f"{point.dist.name} {point.dist.version}" if point.dist is not None else point.value
+        return Found(_loaded(kind, name, point.value), package)
+    if ":" in name:
+        return Found(_loaded(kind, name, name), name)
+    known = names(kind, own)
+    close = difflib.get_close_matches(name, known, 1)
+    hint = f"did you mean {close[0]}? " if close else ""
+    raise InputError(f"{kind} '{name}': unknown, {hint}allowed: {', '.join(known)}, or package.module:name")
+
+
+def names(kind: str, own: Mapping[str, Any]) -> list[str]:
+    """Names of this kind, ours first, then those that installed packages offer."""
+    return [*own, *(name for name in sorted(_offered(GROUPS[kind])) if name not in own)]
+
+
+def offered(kind: str) -> list[str]:
+    """Names of this kind that installed packages offer."""
+    return sorted(_offered(GROUPS[kind]))
+
+
+@cache
+def _offered(group: str) -> dict[str, EntryPoint]:
+    return {point.name: point for point in entry_points(group=group)}
+
+
+def _loaded(kind: str, name: str, target: str) -> Any:
+    module, _, attribute = target.partition(":")
+    if not module or not attribute:
+        raise InputError(f"{kind} '{name}': must be package.module:name")
+    here = str(Path.cwd())
+    if here not in sys.path:
+        sys.path.append(here)
+    try:
+        found: Any = import_module(module)
+        for part in attribute.split("."):
+            found = getattr(found, part)
+    except InputError:
+        raise
+    except Exception as fault:  # whatever a foreign module raises while it is imported is the user's to see
+        raise InputError(f"{kind} '{name}': cannot be loaded, {type(fault).__name__}: {fault}") from fault
+    return found

@@ -1,0 +1,36 @@
+"""Campaigns: many trials, made on one computer or a cluster, each once, whatever is killed on the way.
+
+What people write is a campaign file (`definition.py`, `outside.py`), whose trials fly scenarios (`flights.py`). A trial
+is plain values (`task.py`), its folder is the truth (`store.py`), and whoever makes it claims it (`claims.py`) and
+notes each attempt (`attempts.py`). Start reading in `run.py`, the driver's loop. An attempt is made in a process
+(`worker.py`) that a slot minds (`slot.py`, `memory.py`); an engine says where slots are: in processes of this computer
+(`engines.py`) or on a Dask cluster (`cluster.py`). `index.py` is a cache of the folders, `plan.py` what they were made
+for, `table.py` what came of them, `contest.py` what is compared with what and `glance.py` who won, with `pictures.py`
+for a page; `versions.py` says which source made a trial, and `statistics/` what figures of many trials say.
+"""
+
+from typing import TYPE_CHECKING
+
+from wakewise.core.lazy_imports import lazy_door
+
+if TYPE_CHECKING:
+    from wakewise.experiments.campaigns.definition import Campaign, load_campaign, planned
+    from wakewise.experiments.campaigns.engines import Engine, Processes
+    from wakewise.experiments.campaigns.run import run
+    from wakewise.experiments.campaigns.task import Outcome, Task
+    from wakewise.experiments.campaigns.versions import FLIES, PHOTOGRAPHS
+
+__all__ = [
+    "FLIES",
+    "PHOTOGRAPHS",
+    "Campaign",
+    "Engine",
+    "Outcome",
+    "Processes",
+    "Task",
+    "load_campaign",
+    "planned",
+    "run",
+]
+
+lazy_door(__name__)

@@ -1,0 +1,249 @@
+"""A campaign as people write it: methods x targets x worlds x vehicles x variations x seeds, as YAML.
+
+Every combination is a scenario, checked before the first trial is made, and a trial of its own.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field, ValidationError, field_validator
+
+from wakewise.core.errors import InputError
+from wakewise.core.files import not_a_name
+from wakewise.core.safe_yaml import yaml_file
+from wakewise.core.settings import Seed, Settings
+from wakewise.experiments.campaigns.outside import check_there, outside_of
+from wakewise.experiments.campaigns.task import Task
+from wakewise.experiments.campaigns.versions import FLIES, PHOTOGRAPHS
+from wakewise.operation.scenario import PRESETS, Scenario, describe_fault, load_scenario
+from wakewise.scene.targets import coral_kinds
+
+FACTORS = ("method", "target", "world", "vehicle", "variation", "seed")
+"""What a trial of a campaign differs in, in the order of its name."""
+MOST_TRIALS = 100_000
+AS_IS = "as-is"
+"""Name of the variation that changes nothing."""
+_WORK = {
+    "fly": "wakewise.experiments.campaigns.flights:fly_stage",
+    "model": "wakewise.experiments.campaigns.flights:model_stage",
+}
+_SOURCES = {"fly": (*FLIES, "campaigns/flights.py"), "model": (*PHOTOGRAPHS, "campaigns/flights.py")}
+
+
+class Campaign(Settings):
+    """What a campaign file says."""
+
+    name: str = Field("campaign", min_length=1, max_length=80, description="what it is called in tables and pages")
+    preset: Literal["quick", "standard"] = Field("quick", description="the scenario that everything is laid over")
+    scenario: dict[str, Any] = Field(
+        default={}, description="fields of the scenario of all trials, nested or by dotted names"
+    )
+    stages: Literal["fly", "model"] = Field(
+        "model", description="fly: the flight and the water; model: photographs, model and its figures, too"
+    )
+    keep: Literal["figures", "all"] = Field(
+        "figures", description="what stays of a trial: its figures and record, or its photographs and model, too"
+    )
+    methods: tuple[str, ...] = Field(("dp", "wake-aware"), min_length=1, description="names, or package.module:make")
+    targets: tuple[str, ...] | dict[str, dict[str, Any]] = Field(
+        default=(), description="kinds or mesh files; or names, each with fields of `target` (kind, seed, size_m)"
+    )
+    worlds: tuple[str, ...] = Field(default=(), description="worlds by name; the scenario's own if not given")
+    vehicles: tuple[str, ...] = Field(default=(), description="library names or vehicle files; the scenario's own")
+    variations: dict[str, dict[str, Any]] = Field(
+        default={}, description="by name, fields of the scenario that a variation changes; {} changes nothing"
+    )
+    seeds: int | tuple[Seed, ...] = Field(3, description="seeds 1 to this, or a list of seeds")
+    timeout_s: float | None = Field(1800.0, gt=0.0, description="a trial that takes longer is ended; null: never")
+    memory_MB: float | None = Field(None, gt=0.0, description="a trial that takes more memory is ended; null: never")
+    retries: int = Field(
+        2, ge=0, le=100, description="how often a trial is tried again whose process died or was ended"
+    )
+
+    @field_validator("methods", "worlds", "vehicles", "targets", mode="before")
+    @classmethod
+    def _one_is_a_list(cls, value: Any) -> Any:
+        return (value,) if isinstance(value, str) else value
+
+    @field_validator("methods", "worlds", "vehicles", "targets")
+    @classmethod
+    def _none_twice(cls, value: Any) -> Any:
+        for one in value:
+            if list(value).count(one) > 1:
+                raise ValueError(f"'{one}' is named twice")
+        return value
+
+    @field_validator("seeds")
+    @classmethod
+    def _counts(cls, value: int | tuple[int, ...]) -> int | tuple[int, ...]:
+        if isinstance(value, int):
+            if not 1 <= value <= MOST_TRIALS:
+                raise ValueError(f"allowed are 1 to {MOST_TRIALS}, or a list of seeds")
+        elif not value or len(set(value)) < len(value):
+            raise ValueError("a list of seeds needs at least one, none twice")
+        return value
+
+    @field_validator("name")
+    @classmethod
+    def _names_a_folder(cls, value: str) -> str:
+        if fault := not_a_name(value):
+            raise ValueError(f"names a folder, so {fault}")
+        return value
+
+    @property
+    def all_seeds(self) -> tuple[int, ...]:
+        """The seeds of every combination."""
+        return tuple(range(1, self.seeds + 1)) if isinstance(self.seeds, int) else self.seeds
+
+
+@dataclass(frozen=True, kw_only=True)
+class Planned:
+    """A trial of a campaign: the task, and where in the campaign it stands (see `FACTORS`)."""
+
+    task: Task
+    factors: Mapping[str, str | int]
+
+
+def load_campaign(path: Path) -> Campaign:
+    """Read a campaign file.
+
+    Raises
+    ------
+    InputError
+        In one line: the file, the field, what was found and what would be right.
+    """
+    tree = yaml_file(path)
+    if not isinstance(tree, dict):
+        raise InputError(f"{path}: holds {type(tree).__name__}, must hold fields of a campaign such as 'methods: [dp]'")
+    return check_campaign(tree, str(path))
+
+
+def check_campaign(tree: Mapping[str, Any], source: str = "campaign") -> Campaign:
+    """Turn plain values into a campaign; raises as `load_campaign`."""
+    try:
+        return Campaign.model_validate(dict(tree))
+    except ValidationError as fault:
+        raise InputError(f"{source}: {describe_fault(fault, Campaign)}") from None
+
+
+def planned(campaign: Campaign, source: str = "campaign") -> list[Planned]:
+    """All trials of a campaign, seed by seed, so that one that is stopped has whole seeds of everything.
+
+    Raises
+    ------
+    InputError
+        If there are too many, or a combination is no scenario; the combination and the field are named.
+    """
+    cells = list(_cells(campaign))
+    seeds = campaign.all_seeds
+    count = len(cells) * len(seeds)
+    if count > MOST_TRIALS:
+        raise InputError(f"{source}: {count} trials, at most {MOST_TRIALS} in one campaign")
+    there: set[str] = set()
+    resolved = [(cell, *_resolved(campaign, cell, seeds[0], source, there)) for cell in cells]
+    return [_trial(campaign, cell, scenario, outside, seed) for seed in seeds for cell, scenario, outside in resolved]
+
+
+@dataclass(frozen=True)
+class _Cell:
+    """A combination, but for the seed: names of its factors, and the scenario's fields in the order they are laid."""
+
+    names: Mapping[str, str]
+    fields: Mapping[str, Any]
+
+
+def _cells(campaign: Campaign) -> Iterator[_Cell]:
+    own = load_scenario(campaign.preset, None, dict(campaign.scenario))
+    named = campaign.targets if isinstance(campaign.targets, dict) else {t: {"kind": t} for t in campaign.targets}
+    targets = dict(named) or {Path(own.target.kind).stem: {}}
+    worlds = campaign.worlds or (own.world,)
+    vehicles = campaign.vehicles or (own.vehicle,)
+    variations = campaign.variations or {AS_IS: {}}
+    for variation, target, world, vehicle, method in product(variations, targets, worlds, vehicles, campaign.methods):
+        names = {
+            "method": method,
+            "target": target,
+            "world": world,
+            "vehicle": vehicle,
+            "variation": variation,
+        }
+        told = {f"target.{key}": value for key, value in targets[target].items()}
+        fields = {**campaign.scenario, **told, "world": world, "vehicle": vehicle, "method": method}
+        yield _Cell(names, fields | variations[variation])
+
+
+def _resolved(
+    campaign: Campaign, cell: _Cell, seed: int, source: str, there: set[str]
+) -> tuple[Scenario, dict[str, str]]:
+    """The scenario of a combination, and what of it comes from outside the package; all of it can be found.
+
+    `there` holds vehicles with targets that have been loaded once.
+    """
+    where = ", ".join(f"{key} {name}" for key, name in cell.names.items() if key != "variation" or name != AS_IS)
+    try:
+        scenario = load_scenario(campaign.preset, None, dict(cell.fields) | {"seed": seed})
+        loaded = f"{scenario.vehicle} {scenario.ballast} {scenario.target}"
+        if loaded not in there:
+            check_there(scenario)
+            there.add(loaded)
+        return scenario, outside_of(scenario)
+    except InputError as fault:
+        raise InputError(f"{source}: {where}: {fault}") from None
+
+
+def _trial(campaign: Campaign, cell: _Cell, scenario: Scenario, outside: dict[str, str], seed: int) -> Planned:
+    factors: dict[str, str | int] = {**cell.names, "seed": seed}
+    settings: dict[str, Any] = {
+        "scenario": scenario.model_copy(update={"seed": seed, "name": campaign.name}).model_dump(mode="json"),
+        "keep": campaign.keep,
+    }
+    if outside:
+        settings["outside"] = outside
+    shown = [str(value) for key, value in factors.items() if _tells_apart(campaign, key)]
+    task = Task(name="/".join(shown), work=_WORK[campaign.stages], settings=settings, sources=_SOURCES[campaign.stages])
+    return Planned(task=task, factors=factors)
+
+
+def _tells_apart(campaign: Campaign, factor: str) -> bool:
+    """Whether a factor belongs into the names of trials."""
+    if factor in ("vehicle", "variation"):
+        return len(getattr(campaign, f"{factor}s")) > 1
+    return True
+
+
+def example() -> str:
+    """A campaign file to begin with."""
+    return _EXAMPLE.format(presets=" or ".join(PRESETS), corals=", ".join(coral_kinds()))
+
+
+_EXAMPLE = """\
+# A campaign: every method with every target in every world, each on the same seeds.
+# wakewise campaign run FILE makes what is missing, wakewise campaign table FOLDER shows what came of it.
+name: first-comparison
+preset: quick                     # {presets}
+stages: fly                       # fly: the flight and the water; model: photographs and the model, too
+methods: [dp, unaware, wake-aware]  # or package.module:make for a controller of your own
+targets: [branching, brain]       # {corals}, or mesh files
+worlds: [payload]                 # wakewise world list
+seeds: 3                          # seeds 1 to 3, or a list
+scenario:                         # fields of the scenario of all trials, by dotted names or nested (docs/scenario.md)
+  mission.clearance_m: 0.05
+  control: {{w_effort: 0.001}}
+variations:                       # fields of the scenario that a variation changes, in the same two ways
+  as-is: {{}}
+  closer: {{mission.standoff_m: 0.45}}
+timeout_s: 1800                   # a trial that takes longer is ended
+retries: 2                        # tries after a process that died or was ended
+"""
+
+
+def close_to(name: str, known: list[str]) -> str:
+    """A hint at the nearest of some names, for messages."""
+    close = difflib.get_close_matches(name, known, 1)
+    return f"did you mean {close[0]}? " if close else ""

@@ -1,0 +1,163 @@
+"""Methods compared at a glance: who won, by how much, how sure, at what price, where it failed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wakewise.experiments.campaigns.statistics import (
+    WORST,
+    paired_test,
+    probability_of_improvement,
+    stratified_bootstrap,
+)
+from wakewise.experiments.campaigns.statistics.intervals import ratio_of_sums
+
+Place = Mapping[str, Any]
+"""A trial: world, method, target, seed, folder below the store, figures, and reason if it failed."""
+
+
+FEWEST = 6
+"""Pairs from which on a difference can be sure: five all agree by chance alone once in sixteen times."""
+
+
+class Measure(NamedTuple):
+    """A figure that methods are judged by, its unit in words, the factor to that, and whether less is better."""
+
+    figure: str
+    words: str
+    scale: float
+    less: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Glance:
+    """Methods in one world in a few words.
+
+    `means` are in the unit of `words`, worst last; `less_pct` is how much better the winner is than `rival`, the best
+    of the others, with its interval; `energy_ratio` what it costs over the rival, `silt_ratio` the silt between camera
+    and target over the rival's; `failed` counts trials by method.
+    """
+
+    world: str
+    figure: str
+    words: str
+    means: dict[str, float]
+    winner: str
+    rival: str | None
+    less_pct: float | None
+    interval_pct: tuple[float, float] | None
+    p_t: float | None
+    improvement: float | None
+    energy_ratio: float | None
+    failed: dict[str, int]
+    trials: int
+    silt_ratio: float | None = None
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether the pairs are enough, and the interval of the difference holds no zero."""
+        return self.trials >= FEWEST and self.interval_pct is not None and self.interval_pct[0] > 0.0
+
+    @property
+    def sure(self) -> str:
+        """How sure the winner is, in words."""
+        if self.rival is None:
+            return "there was no other method"
+        if self.trials < 2:
+            return "one trial each: nobody knows"
+        if self.trials < FEWEST:
+            return f"{self.trials} pairs are too few to be sure"
+        if not self.is_sure:
+            return "undecided, the interval holds zero"
+        return "sure, the interval does not hold zero"
+
+
+def glance(measure: Measure, world: str, places: Sequence[Place]) -> Glance | None:
+    """Methods in one world; None where no seed was flown by all."""
+    figure, words, scale, less = measure
+    here = [place for place in places if place["world"] == world]
+    values: dict[str, dict[tuple[str, int], float]] = {}
+    failed: dict[str, int] = {}
+    for place in here:
+        method, known = place["method"], (place["target"], place["seed"])
+        value = place["figures"].get(figure)
+        failed.setdefault(method, 0)
+        if value is None:
+            failed[method] += 1
+            value = WORST.get(figure)
+        if value is not None:
+            values.setdefault(method, {})[known] = scale * float(value)
+    both = [known for known in next(iter(values.values()), {}) if all(known in own for own in values.values())]
+    if not both:
+        return None
+    means = {method: float(np.mean([own[known] for known in both])) for method, own in values.items()}
+    ranked = sorted(means, key=lambda method: means[method] if less else -means[method])
+    winner, rival = ranked[0], ranked[1] if len(ranked) > 1 else None
+    told: dict[str, Any] = dict.fromkeys(("less_pct", "interval_pct", "p_t", "improvement", "energy_ratio"))
+    if rival is not None:
+        ours, theirs = (np.array([values[who][known] for known in both]) for who in (winner, rival))
+        if theirs.sum() > 0.0:
+            ratio, ends = stratified_bootstrap(np.column_stack([ours, theirs]), [k[0] for k in both], ratio_of_sums)
+            sign = 1.0 if less else -1.0
+            told["less_pct"] = sign * 100.0 * (1.0 - ratio)
+            if ends is not None:
+                low, high = sorted(sign * 100.0 * (1.0 - end) for end in ends)
+                told["interval_pct"] = (low, high)
+        told["p_t"] = paired_test(ours, theirs).p_t
+        groups = [by_target(values[who], both) for who in (winner, rival)]
+        told["improvement"] = probability_of_improvement(*groups, less_is_better=less)[0]
+        told["energy_ratio"] = _ratio(here, "energy_kJ", winner, rival, both)
+        told["silt_ratio"] = _ratio(here, "ray_optical_depth", winner, rival, both)
+    return Glance(
+        world=world,
+        figure=figure,
+        words=words,
+        means={method: means[method] for method in ranked},
+        winner=winner,
+        rival=rival,
+        failed=failed,
+        trials=len(both),
+        **told,
+    )
+
+
+def _ratio(
+    places: Sequence[Place], figure: str, one: str, other: str, pairs: Sequence[tuple[str, int]]
+) -> float | None:
+    """Sum of a figure over pairs by one method over that by another; None where a trial lacks it or there is none."""
+    known = {(p["method"], p["target"], p["seed"]): p["figures"].get(figure) for p in places}
+    sums = []
+    for method in (one, other):
+        values = [known.get((method, *pair)) for pair in pairs]
+        if any(value is None for value in values):
+            return None
+        sums.append(sum(float(value) for value in values if value is not None))
+    return sums[0] / sums[1] if sums[1] > 0.0 else None
+
+
+def worst_trials(measure: Measure, world: str, places: Sequence[Place]) -> dict[str, Place]:
+    """The worst trial of each method in a world: one that failed, else the one with the worst figure."""
+    figure, _, _, less = measure
+
+    def badness(place: Place) -> float:
+        value = place["figures"].get(figure)
+        return float("inf") if value is None else (1.0 if less else -1.0) * float(value)
+
+    found: dict[str, Place] = {}
+    for place in (p for p in places if p["world"] == world):
+        method = place["method"]
+        if method not in found or badness(place) > badness(found[method]):
+            found[method] = place
+    return found
+
+
+def by_target(values: Mapping[tuple[str, int], float], which: Iterable[tuple[str, int]]) -> dict[str, list[float]]:
+    """Values by target, of those that are known by target and seed."""
+    found: dict[str, list[float]] = {}
+    for known in which:
+        found.setdefault(known[0], []).append(values[known])
+    return found

@@ -1,0 +1,140 @@
+"""All trials of a folder at a glance: a cache of what their own folders say, rebuilt wherever it does not fit them.
+
+One Parquet file holds a row per trial with the stamp of the files that it was read from. Stamps are compared for being
+equal, never for being older, so that no clock has to be right; a missing, old or damaged cache only costs time.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import polars as pl
+
+from wakewise.core.files import whole_file
+from wakewise.experiments.campaigns import attempts
+from wakewise.experiments.campaigns.attempts import ATTEMPTS, Attempts, read_attempts
+from wakewise.experiments.campaigns.store import FIGURES, Store, read_figures
+from wakewise.experiments.campaigns.task import Figure
+
+INDEX = "index.parquet"
+_SCHEMA = {
+    "key": pl.String,
+    "figures_ns": pl.Int64,
+    "figures_bytes": pl.Int64,
+    "attempts_bytes": pl.Int64,
+    "figures": pl.String,
+    "took_s": pl.Float64,
+    "begun": pl.Int64,
+    "failed": pl.Int64,
+    "how": pl.String,
+    "reason": pl.String,
+}
+_Stamp = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A trial of a folder: its figures, if it is finished, and its attempts."""
+
+    key: str
+    figures: dict[str, Figure] | None
+    took_s: float
+    attempts: Attempts
+
+
+def listing(store: Store) -> dict[str, Listed]:
+    """All trials that were ever begun, by key; what the cache lacks is read from the trials' folders and added."""
+    stamps = _stamps(store.trials)
+    known = _read(store.folder / INDEX)
+    found: dict[str, Listed] = {}
+    fresh = len(known) != len(stamps)
+    for key, stamp in stamps.items():
+        kept = known.get(key)
+        if kept is not None and kept[0] == stamp:
+            found[key] = kept[1]
+        else:
+            found[key], fresh = _look(store.place(key)), True
+    if fresh:
+        # A full disk, which polars tells in either way, or a folder of others: the cache only costs time.
+        with suppress(OSError, pl.exceptions.ComputeError):
+            _write(store.folder / INDEX, [(stamps[key], listed) for key, listed in found.items()])
+    return found
+
+
+def _stamps(trials: Path) -> dict[str, _Stamp]:
+    """Of each trial's folder, what changes with its files: when and how long figures are, how long attempts are."""
+    found: dict[str, _Stamp] = {}
+    with os.scandir(trials) as entries:
+        for entry in entries:
+            if entry.name.startswith("."):
+                continue
+            ns = size = -1
+            with suppress(OSError):
+                figures = os.stat(f"{entry.path}/{FIGURES}")  # noqa: PTH116  (ten thousand of them)
+                ns, size = figures.st_mtime_ns, figures.st_size
+            length = -1
+            with suppress(OSError):
+                length = os.stat(f"{entry.path}/{ATTEMPTS}").st_size  # noqa: PTH116
+            found[entry.name] = (ns, size, length)
+    return found
+
+
+def _look(place: Path) -> Listed:
+    kept = read_figures(place)
+    return Listed(place.name, None if kept is None else kept[0], 0.0 if kept is None else kept[1], read_attempts(place))
+
+
+def _read(path: Path) -> dict[str, tuple[_Stamp, Listed]]:
+    """What the cache holds; nothing if it cannot be read."""
+    try:
+        table = pl.read_parquet(path)
+        if table.schema != pl.Schema(_SCHEMA):
+            return {}
+        rows = table.rows(named=True)
+        return {row["key"]: (_stamp_of(row), _listed_of(row)) for row in rows}
+    except (OSError, pl.exceptions.PolarsError, ValueError):
+        return {}
+
+
+def _stamp_of(row: dict[str, object]) -> _Stamp:
+    return int(str(row["figures_ns"])), int(str(row["figures_bytes"])), int(str(row["attempts_bytes"]))
+
+
+def _listed_of(row: dict[str, object]) -> Listed:
+    figures, how = row["figures"], row["how"]
+    told = Attempts(
+        begun=int(str(row["begun"])),
+        failed=int(str(row["failed"])),
+        how=attempts.how_of(how),
+        reason=None if row["reason"] is None else str(row["reason"]),
+    )
+    return Listed(
+        str(row["key"]), None if figures is None else json.loads(str(figures)), float(str(row["took_s"])), told
+    )
+
+
+def _write(path: Path, rows: Iterable[tuple[_Stamp, Listed]]) -> None:
+    table = pl.DataFrame(
+        [
+            (
+                listed.key,
+                *stamp,
+                None if listed.figures is None else json.dumps(listed.figures),
+                listed.took_s,
+                listed.attempts.begun,
+                listed.attempts.failed,
+                listed.attempts.how,
+                listed.attempts.reason,
+            )
+            for stamp, listed in rows
+        ],
+        schema=_SCHEMA,
+        orient="row",
+    )
+    with whole_file(path) as temporary:
+        table.write_parquet(temporary)

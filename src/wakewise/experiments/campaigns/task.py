@@ -1,0 +1,125 @@
+"""One trial of a campaign as plain values, and what became of it.
+
+A trial is its configuration and seed, written as JSON: anyone can read it, any process or machine can take it up, and
+the same one has the same key.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from wakewise.core.errors import InputError
+from wakewise.experiments.campaigns.versions import FLIES, source_version
+
+Figure = float | None | str
+Figures = Mapping[str, Figure]
+WorkProgress = Callable[..., None]
+"""Called as `(done, total, note)`."""
+Work = Callable[[Mapping[str, Any], Path, WorkProgress], Figures]
+
+_KEY = 32  # characters of a key; half of SHA-256
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """One trial to make.
+
+    Parameters
+    ----------
+    name : str
+        For people, such as "wake-aware/coral-1/payload/3".
+    work : str
+        ``package.module:function``, a function `(settings, folder, progress) -> figures`.
+    settings : mapping
+        Plain values, as JSON knows them; all that the function is told, its seed with it.
+    sources : tuple of str
+        Parts of the package whose source can change the figures (see `wakewise.experiments.campaigns.versions`).
+
+    Raises
+    ------
+    InputError
+        If the settings are no plain values.
+    """
+
+    name: str
+    work: str
+    settings: Mapping[str, Any]
+    sources: tuple[str, ...] = FLIES
+
+    def __post_init__(self) -> None:
+        try:
+            told = json.dumps(self.settings, sort_keys=True, allow_nan=False)
+        except (TypeError, ValueError) as fault:
+            raise InputError(f"trial {self.name}: settings must be plain values, {fault}") from None
+        module, colon, function = self.work.partition(":")
+        if not (module and colon and function):
+            raise InputError(f"trial {self.name}: work '{self.work}', must be package.module:function")
+        object.__setattr__(self, "_told", told)
+
+    @property
+    def key(self) -> str:
+        """Hash of work, settings and the sources that matter: the name of the trial's folder."""
+        told: str = self.__dict__["_told"]
+        whole = f"{self.work}\n{told}\n{source_version(self.sources)}"
+        return hashlib.sha256(whole.encode()).hexdigest()[:_KEY]
+
+    def plain(self) -> dict[str, Any]:
+        """As JSON, to be handed to a worker and kept in the trial's folder."""
+        return {
+            "name": self.name,
+            "work": self.work,
+            "settings": dict(self.settings),
+            "sources": list(self.sources),
+            "key": self.key,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What became of a trial: its figures, or the reason that there are none.
+
+    Parameters
+    ----------
+    task : Task
+    figures : dict or None
+    reason : str or None
+        Why there are no figures, in one line.
+    attempts : int
+        How often it was begun, in all runs of the campaign.
+    took_s : float
+        Wall time of the attempt that counts; 0 where it never ended.
+    known : bool
+        It was finished before this run began.
+    how : str or None
+        How the last attempt ended (`attempts.How`); None if none has.
+    """
+
+    task: Task
+    figures: dict[str, Figure] | None
+    reason: str | None = None
+    attempts: int = 0
+    took_s: float = 0.0
+    known: bool = False
+    how: str | None = None
+
+
+def function_named(name: str) -> Callable[..., Any]:
+    """The function, or class, that ``package.module:function`` names.
+
+    Raises
+    ------
+    InputError
+        If it cannot be imported.
+    """
+    module, _, function = name.partition(":")
+    try:
+        found: Callable[..., Any] = getattr(import_module(module), function)
+    except (ImportError, AttributeError) as fault:
+        raise InputError(f"work '{name}': cannot be loaded, {fault}") from fault
+    return found

@@ -1,0 +1,129 @@
+"""Photographs with known poses as a COLMAP model: `sparse/0/*.bin`, the same in text, and `images/` beside them.
+
+Format: https://colmap.github.io/format.html. Poses there are world-to-camera; camera axes and pixel centres are ours,
+and the world stays NED. The binary model holds every number exactly.
+"""
+
+from __future__ import annotations
+
+import shutil
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from wakewise.core.arrays import Array, IntArray
+from wakewise.core.geometry import Pose
+from wakewise.experiments.exports.colmap_points import OBSERVATION
+from wakewise.experiments.exports.records import Cloud, Photographs
+
+_OPENCV = 4  # COLMAP's number of the camera model
+_NONE = (np.zeros((0, 2)), np.zeros(0, dtype=np.int64))
+
+
+@dataclass(frozen=True)
+class _Model:
+    """What both forms of the model say: poses, and of each photograph and each point what belongs together.
+
+    `pixels[k]` and `points[k]` are the observations of photograph k; `tracks[i]` the (photograph, observation) pairs of
+    point i, from 0; `errors_px[i]` its mean reprojection error with these poses, -1 (COLMAP: not known) without any.
+    """
+
+    poses: list[tuple[Array, Array]]
+    pixels: list[Array]
+    points: list[IntArray]
+    tracks: list[list[tuple[int, int]]]
+    errors_px: Array
+
+
+def write_colmap(folder: Path, photographs: Photographs, cloud: Cloud | None = None) -> int:
+    """Write images/, sparse/0/ (binary) and sparse_text/ into a folder that is there and empty.
+
+    Returns how many observations of points it holds. Errors of points are those of the poses and the camera written
+    here, not of the model that the points are from.
+    """
+    (folder / "images").mkdir()
+    for file in photographs.files:
+        shutil.copyfile(file, folder / "images" / file.name)
+    model = _model(photographs, cloud)
+    _write_binary(folder / "sparse" / "0", photographs, model, cloud)
+    _write_text(folder / "sparse_text", photographs, model, cloud)
+    return sum(map(len, model.points))
+
+
+def _model(photographs: Photographs, cloud: Cloud | None) -> _Model:
+    track = photographs.track
+    inverses = [Pose(p, q).inverse() for p, q in zip(track.p_W_m, track.q, strict=True)]
+    count = 0 if cloud is None else len(cloud.points_W_m)
+    tracks: list[list[tuple[int, int]]] = [[] for _ in range(count)]
+    sums, pixels, points = np.zeros(count), [], []
+    for k, (file, X_CW) in enumerate(zip(photographs.files, inverses, strict=True)):
+        at, which = _NONE if cloud is None else cloud.seen.get(file.name, _NONE)
+        if cloud is not None and len(which):
+            seen_C = X_CW.apply(cloud.points_W_m[which])
+            ahead = seen_C[:, 2] > 0.0
+            at, which = at[ahead], which[ahead]
+            np.add.at(sums, which, np.linalg.norm(_projected(seen_C[ahead], photographs.params) - at, axis=1))
+            for j, i in enumerate(which.tolist()):
+                tracks[i].append((k, j))
+        pixels.append(at)
+        points.append(which)
+    lengths = np.array([len(track) for track in tracks])
+    errors = np.where(lengths > 0, sums / np.maximum(lengths, 1), -1.0)
+    return _Model([(X_CW.q, X_CW.p_m) for X_CW in inverses], pixels, points, tracks, errors)
+
+
+def _projected(points_C_m: Array, params: Array) -> Array:
+    """Pixels, shape (n, 2), of points before a camera with OpenCV's distortion."""
+    fx, fy, cx, cy, k1, k2, p1, p2 = params
+    x, y = points_C_m[:, 0] / points_C_m[:, 2], points_C_m[:, 1] / points_C_m[:, 2]
+    square = x * x + y * y
+    radial = 1.0 + k1 * square + k2 * square * square
+    u = x * radial + 2.0 * p1 * x * y + p2 * (square + 2.0 * x * x)
+    v = y * radial + p1 * (square + 2.0 * y * y) + 2.0 * p2 * x * y
+    return np.column_stack([fx * u + cx, fy * v + cy])
+
+
+def _write_binary(folder: Path, photographs: Photographs, model: _Model, cloud: Cloud | None) -> None:
+    folder.mkdir(parents=True)
+    size = (photographs.width, photographs.height)
+    (folder / "cameras.bin").write_bytes(struct.pack("<QIiQQ8d", 1, 1, _OPENCV, *size, *photographs.params))
+    with (folder / "images.bin").open("wb") as file:
+        file.write(struct.pack("<Q", len(model.poses)))
+        for k, (q, t) in enumerate(model.poses):
+            name = photographs.files[k].name.encode("utf-8")
+            rows = np.empty(len(model.points[k]), OBSERVATION)
+            rows["pixel"], rows["point"] = model.pixels[k], model.points[k] + 1
+            head = struct.pack("<I7dI", k + 1, *q, *t, 1) + name + b"\0" + struct.pack("<Q", len(rows))
+            file.write(head + rows.tobytes())
+    with (folder / "points3D.bin").open("wb") as file:
+        file.write(struct.pack("<Q", 0 if cloud is None else len(cloud.points_W_m)))
+        if cloud is not None:
+            for i, (point, colour) in enumerate(zip(cloud.points_W_m, cloud.colours, strict=True)):
+                track = np.array(model.tracks[i], dtype="<u4").reshape(-1, 2) + np.array([1, 0], dtype="<u4")
+                head = struct.pack("<Q3d3BdQ", i + 1, *point, *colour.tolist(), model.errors_px[i], len(track))
+                file.write(head + track.tobytes())
+
+
+def _write_text(folder: Path, photographs: Photographs, model: _Model, cloud: Cloud | None) -> None:
+    folder.mkdir(parents=True)
+    camera = f"1 OPENCV {photographs.width} {photographs.height} {_numbers(photographs.params)}\n"
+    (folder / "cameras.txt").write_text(f"# CAMERA_ID MODEL WIDTH HEIGHT PARAMS\n{camera}", encoding="utf-8")
+    lines = ["# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then a line of X Y POINT3D_ID of what was seen in it"]
+    for k, (q, t) in enumerate(model.poses):
+        lines.append(f"{k + 1} {_numbers(q)} {_numbers(t)} 1 {photographs.files[k].name}")
+        seen = zip(model.pixels[k], model.points[k].tolist(), strict=True)
+        lines.append(" ".join(f"{_numbers(pixel)} {i + 1}" for pixel, i in seen))
+    (folder / "images.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    rows = ["# POINT3D_ID X Y Z R G B ERROR TRACK (IMAGE_ID POINT2D_IDX)"]
+    if cloud is not None:
+        for i, point in enumerate(cloud.points_W_m):
+            red, green, blue = cloud.colours[i].tolist()
+            track = "".join(f" {k + 1} {j}" for k, j in model.tracks[i])
+            rows.append(f"{i + 1} {_numbers(point)} {red} {green} {blue} {model.errors_px[i]:.17g}{track}")
+    (folder / "points3D.txt").write_text("\n".join(rows) + "\n", encoding="utf-8")
+
+
+def _numbers(values: Array) -> str:
+    return " ".join(f"{value:.17g}" for value in values)

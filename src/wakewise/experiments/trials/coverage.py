@@ -1,0 +1,207 @@
+"""What the coverage guide would have said of a trial's photographs before leaving, held against the model made of them.
+
+The guide gets what a pilot's would: the target as it was surveyed, the poses as the vehicle estimated them and how
+sharp each photograph is. The truth enters only where the two are compared, patch by patch.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+from scipy.spatial import KDTree
+
+from wakewise.core.arrays import Array, BoolArray, freeze
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose
+from wakewise.operation import Parts, read_scenario
+from wakewise.scene.missions import Coverage, patches_of
+from wakewise.scene.missions.coverage import HALF
+from wakewise.scene.missions.patches import NORMAL_SHARE, REACH_M
+from wakewise.scene.missions.sight import Lens
+from wakewise.scene.targets import Target
+from wakewise.vision.evaluation import Crop, compare_surface, sample_surface
+from wakewise.vision.reconstruction import read_cloud
+
+FROM_MODEL = ("coverage_agreement_pct", "coverage_trivial_pct")
+"""Figures of the guide that need a model to be held against."""
+Shot = tuple[Pose, float | None]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Agreement:
+    """Patches as the guide saw them and as the model has them.
+
+    Parameters
+    ----------
+    complete_share : ndarray, shape (patches,)
+        Share of each patch's true surface within 3 mm of the model; -1 where no sample of the truth fell on it.
+    complete, well : ndarray of bool, shape (patches,)
+        Complete over more than half of its area, and seen well over more than half.
+    predicted_pct, completeness_pct : float
+        By area: what the guide expects, and what came of it.
+    """
+
+    complete_share: Array
+    complete: BoolArray
+    well: BoolArray
+    predicted_pct: float
+    completeness_pct: float
+
+    def __post_init__(self) -> None:
+        freeze(self, complete_share=(None,))
+
+    @property
+    def agreement_pct(self) -> float:
+        """Share of the patches of which both say the same."""
+        judged = self.complete_share >= 0.0
+        return 100.0 * float((self.complete == self.well)[judged].mean())
+
+    @property
+    def trivial_pct(self) -> float:
+        """The same of the better of two guesses that need no guide: all is complete, or nothing is."""
+        share = float(self.complete[self.complete_share >= 0.0].mean())
+        return 100.0 * max(share, 1.0 - share)
+
+
+def shots_of(photos: pl.DataFrame) -> list[Shot]:
+    """Estimated camera pose and sharpness of each row of images.csv."""
+    places = photos.select("est_x_m", "est_y_m", "est_z_m").to_numpy()
+    turns = photos.select("est_qw", "est_qx", "est_qy", "est_qz").to_numpy()
+    return [(Pose(p, q), sharp) for p, q, sharp in zip(places, turns, photos["sharpness"].to_list(), strict=True)]
+
+
+def coverage_of(target: Target, lens: Lens, shots: Iterable[Shot], spent_ms: list[float] | None = None) -> Coverage:
+    """The guide after a flight's photographs, in their order.
+
+    Parameters
+    ----------
+    target : Target
+        As it was found, which is what the crew believes.
+    lens : Lens
+        The camera.
+    shots : iterable
+        Estimated X_WC of each photograph and its sharpness, None where that is not known.
+    spent_ms : list, optional
+        Takes the thread CPU time of each photograph, in ms.
+    """
+    coverage = Coverage.begin(patches_of(target.mesh, target.bed_z_m))
+    for X_WC, sharpness in shots:
+        began = time.thread_time()
+        coverage = coverage.seen(X_WC, lens, sharpness)
+        _ = coverage.share, coverage.score
+        if spent_ms is not None:
+            spent_ms.append(1e3 * (time.thread_time() - began))
+    return coverage
+
+
+def agreement_with(coverage: Coverage, parts: Parts, cloud_W_m: Array) -> Agreement:
+    """Patch by patch, what the guide saw well and what of the truth a model has within 3 mm.
+
+    Parameters
+    ----------
+    coverage : Coverage
+        Of patches of `parts.found_target`.
+    parts : Parts
+    cloud_W_m : ndarray, shape (n, 3)
+        The model's points in the truth's frame, as `compare_surface` leaves them.
+    """
+    patches, target = coverage.patches, parts.target
+    truth = sample_surface(target.mesh, Crop(bed_z_m=target.bed_z_m), np.random.default_rng(0))
+    there = np.asarray(KDTree(cloud_W_m).query(truth.points_m)[0]) < REACH_M
+    # The believed surface laid on the true one, so that what is compared is the same piece of it.
+    shift = parts.found_target.centre_W_m - target.centre_W_m
+    facing = NORMAL_SHARE * target.radius_m
+    own = np.concatenate([patches.points_W_m - shift, facing * patches.normals], axis=1)
+    asked = np.concatenate([truth.points_m, facing * truth.normals], axis=1)
+    patch = patches.patch[np.asarray(KDTree(own).query(asked)[1])]
+    held = np.bincount(patch, minlength=patches.count)
+    share = np.where(held > 0, np.bincount(patch, there, patches.count) / np.maximum(held, 1), -1.0)
+    return Agreement(
+        complete_share=share,
+        complete=share > HALF,
+        well=coverage.well,
+        predicted_pct=100.0 * coverage.share,
+        completeness_pct=100.0 * float(there.mean()),
+    )
+
+
+def coverage_figures(parts: Parts, photos: pl.DataFrame, cloud_W_m: Array | None) -> dict[str, float]:
+    """What the guide expects of the model, and where there is one, in the truth's frame, how far the two agree."""
+    coverage = coverage_of(parts.found_target, parts.camera, shots_of(photos))
+    figures = {"coverage_predicted_pct": 100.0 * coverage.share, "coverage_sure_pct": 100.0 * coverage.sure}
+    if cloud_W_m is None:
+        return figures
+    both = agreement_with(coverage, parts, cloud_W_m)
+    return figures | dict(zip(FROM_MODEL, (both.agreement_pct, both.trivial_pct), strict=True))
+
+
+def measure_coverage(folder: Path) -> dict[str, Any]:
+    """The guide on a finished trial, for benches: what it said, what came of it, what a photograph cost it.
+
+    Returns
+    -------
+    dict
+        coverage_predicted_pct, coverage_sure_pct, completeness_pct, coverage_agreement_pct, coverage_trivial_pct
+        (agreement of the better of "all" and "nothing"), coverage_ms_per_photo (thread CPU, median; the first
+        photograph, which loads kernels, left out), coverage_ms_per_photo_max, photos, blurred.
+
+    Raises
+    ------
+    InputError
+        If the folder is not one of a trial with a model.
+    """
+    for name in ("scenario.yaml", "images.csv", "dense.ply"):
+        if not (folder / name).is_file():
+            raise InputError(f"{folder}: has no {name}, a trial with a model is needed")
+    parts = read_scenario(folder / "scenario.yaml").parts()
+    photos = pl.read_csv(folder / "images.csv")
+    spent_ms: list[float] = []
+    coverage = coverage_of(parts.found_target, parts.camera, shots_of(photos), spent_ms)
+    crop = Crop(bed_z_m=parts.target.bed_z_m)
+    compared = compare_surface(read_cloud(folder / "dense.ply").points_m, parts.target.mesh, crop=crop)
+    both = agreement_with(coverage, parts, compared.points_W_m)
+    later_ms = spent_ms[1:] or spent_ms
+    return {
+        "coverage_predicted_pct": both.predicted_pct,
+        "coverage_sure_pct": 100.0 * coverage.sure,
+        "completeness_pct": both.completeness_pct,
+        "coverage_agreement_pct": both.agreement_pct,
+        "coverage_trivial_pct": both.trivial_pct,
+        "coverage_ms_per_photo": float(np.median(later_ms)),
+        "coverage_ms_per_photo_max": float(np.max(later_ms)),
+        "photos": coverage.photos,
+        "blurred": coverage.blurred,
+    }
+
+
+def measure_cost(parts: Parts) -> dict[str, float]:
+    """What the guide costs on a mission's own viewpoints, for benches without a trial: no flight, no photograph.
+
+    Returns
+    -------
+    dict
+        coverage_predicted_pct of the planned viewpoints, coverage_ms_per_photo and coverage_ms_per_photo_max (thread
+        CPU; the first, which loads kernels, left out).
+
+    Raises
+    ------
+    InputError
+        If the mission plans no photograph.
+    """
+    spent_ms: list[float] = []
+    shots: list[Shot] = [(X_WC, None) for X_WC in parts.route.X_WC_planned]
+    coverage = coverage_of(parts.found_target, parts.camera, shots, spent_ms)
+    later_ms = spent_ms[1:] or spent_ms
+    if not later_ms:
+        raise InputError("mission: plans no photograph, the guide needs at least one")
+    return {
+        "coverage_predicted_pct": 100.0 * coverage.share,
+        "coverage_ms_per_photo": float(np.median(later_ms)),
+        "coverage_ms_per_photo_max": float(np.max(later_ms)),
+    }

@@ -1,0 +1,83 @@
+"""How benches measure: thread CPU, median and p99 after warm-up."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wakewise.core.errors import InputError
+from wakewise.core.interfaces import Progress, no_progress
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchOptions:
+    """What every bench is given.
+
+    Parameters
+    ----------
+    data : Path or None
+        Folder of reference data that the package does not contain; None where there is none.
+    progress : Progress
+    seeds : int
+        Flights per method of a bench that flies; seeds 1 to this.
+    methods, scenarios : tuple of str or None
+        Which of them such a bench flies; None for all.
+    levers : tuple of str or None
+        Levers that such a bench switches, one by one; None for none of them.
+    worlds : tuple of str or None
+        Which worlds such a bench flies in; None for all.
+    w_tracks : tuple of float or None
+        Weights, on the paper's scale, that a bench of an operator's velocity flies; None for all.
+    models : int
+        Seeds, from 1, for which a bench of worlds also scans and makes a model.
+    judge : int
+        Seeds, from 1, that such a bench also flies in the lattice.
+    bound : int
+        Seeds, from 1, of whose flights such a bench works out the most that sharing thrusts out could gain.
+    fresh : bool
+        Fly anew what an earlier run has flown.
+    workers : int
+        Processes that fly side by side.
+    store : Path or None
+        Folder where flights are kept; None for the user's cache folder.
+    """
+
+    data: Path | None = None
+    progress: Progress = no_progress
+    seeds: int = 10
+    methods: tuple[str, ...] | None = None
+    scenarios: tuple[str, ...] | None = None
+    levers: tuple[str, ...] | None = None
+    worlds: tuple[str, ...] | None = None
+    w_tracks: tuple[float, ...] | None = None
+    models: int = 1
+    judge: int = 0
+    bound: int = 0
+    fresh: bool = False
+    workers: int = 2
+    store: Path | None = None
+
+    def __post_init__(self) -> None:
+        for name, value, most in (("seeds", self.seeds, 1000), ("workers", self.workers, 64)):
+            if not 1 <= value <= most:
+                raise InputError(f"{name}: {value}, allowed 1 to {most}")
+        for name, value in (("models", self.models), ("judge", self.judge), ("bound", self.bound)):
+            if not 0 <= value <= 1000:
+                raise InputError(f"{name}: {value}, allowed 0 to 1000")
+
+
+def timed_us(work: Callable[[], Any], repeats: int) -> dict[str, float]:
+    """Median and p99 of a call in microseconds of thread CPU, after a warm-up."""
+    for _ in range(max(3, repeats // 20)):
+        work()
+    spans = np.empty(repeats)
+    for k in range(repeats):
+        began = time.thread_time_ns()
+        work()
+        spans[k] = (time.thread_time_ns() - began) / 1e3
+    return {"median_us": float(np.median(spans)), "p99_us": float(np.percentile(spans, 99))}

@@ -1,0 +1,336 @@
+"""One trial in one folder: fly, photograph, reconstruct, evaluate. Each stage leaves files and is skipped when done."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError, StageError
+from wakewise.core.files import named, write_json
+from wakewise.core.geometry import matrix_from_quat
+from wakewise.core.jit.precompile import is_warm, warm
+from wakewise.core.optional_dependencies import need
+from wakewise.core.run_lock import alone
+from wakewise.experiments.trials.coverage import FROM_MODEL, coverage_figures
+from wakewise.experiments.trials.metrics import Figures, Gathering, comparison
+from wakewise.experiments.trials.size import SIZE_FIGURES, size_figures
+from wakewise.experiments.trials.stages import Ledger, Quiet, Watch, of_the_computer
+from wakewise.experiments.trials.surface import SurfaceMaker
+from wakewise.experiments.trials.yardstick import add_yardsticks
+from wakewise.operation import (
+    Darkroom,
+    Parts,
+    Scenario,
+    fly_trial,
+    photograph_flight,
+    read_exposures,
+)
+from wakewise.operation.flight_log import has_parts
+from wakewise.operation.flying import FLIGHT_JOBS, parts_of
+from wakewise.operation.teleop.live_folder import gather
+from wakewise.operation.teleop.replay import fly_hands
+from wakewise.operation.trial_folder import BY_HAND, as_flown, check_place, claim, write_plan
+from wakewise.scene.missions import SETTLING
+from wakewise.scene.targets import Mesh, MeshDistance, coral_kinds
+from wakewise.vision.evaluation import SWAY_FIGURES, Crop, compare_surface, evaluate_surface, flight_figures
+from wakewise.vision.reconstruction import read_cloud, read_lens, reconstruct
+
+JOBS = (*FLIGHT_JOBS, "photograph", "reconstruct")
+"""What is compiled before a trial, if it is not yet: photographs are rendered while the vehicle flies."""
+
+MAIN_SURFACE_FIGURES = (
+    "rmse_mm",
+    "rmse_cap_mm",
+    "accuracy_median_mm",
+    "completeness_pct",
+    "completeness_visible_pct",
+    "completeness_1mm_pct",
+    "completeness_2mm_pct",
+    "f_score",
+)
+"""Of a model against the truth, in the order of tables."""
+_SURFACE_FIGURES = (
+    *MAIN_SURFACE_FIGURES,
+    "accuracy_p90_mm",
+    "completeness_visible_1mm_pct",
+    "completeness_visible_2mm_pct",
+    "visible_pct",
+    "icp_displacement_mm",
+    "icp_matched_pct",
+    "outside_pct",
+)
+_MODEL_FIGURES = ("reprojection_px", "cameras_rmse_mm", "features_per_image", "inlier_matches", "mapping")
+
+FEWEST_PHOTOS = 3
+"""A model is put in its place by the estimates of at least as many cameras."""
+
+REGION_SHARE = 1.25
+"""What is reconstructed is a little more than the target: estimated cameras put it some millimetres off its place."""
+
+
+def run_trial(
+    flight: Parts | Scenario,
+    folder: Path,
+    watch: Watch | None = None,
+    told: Callable[[Figures], None] | None = None,
+    meanwhile: Callable[[str], None] | None = None,
+) -> Figures:
+    """Run what is left of a trial and return its figures, which are the content of metrics.json.
+
+    Parameters
+    ----------
+    told : callable, optional
+        Called with the figures as soon as they are known and written, before the mesh and its colours are made.
+    meanwhile : callable, optional
+        With it another process makes them: called with "mesh" while that makes the mesh, and with "colours" while it
+        makes its colours; not called where they are there already or there is no such process.
+
+    Raises
+    ------
+    InputError
+        If the scenario cannot be flown, or the folder holds another trial, or another run is at it.
+    MissingExtra
+        Without the extras `photos` and `logs`.
+    EnvironmentFailure
+        If the disk is full, or a file cannot be read or written; the stages before it are kept.
+    """
+    need("a trial", "photos", "logs")
+    watch = watch or Quiet()
+    parts = parts_of(flight)
+    scenario = as_flown(parts)
+    check_place(folder, scenario)
+    _ = parts.from_outside  # a name that leads nowhere is refused before a kernel is compiled or a folder made
+    if not is_warm(JOBS):
+        _ = parts.vehicle  # a file that cannot be used is refused before minutes of compiling
+        if scenario.target.kind not in coral_kinds():
+            _ = parts.target
+        with watch.stage("compile") as progress:
+            warm(JOBS, progress)
+    with Darkroom(parts, folder) as darkroom:
+        if not _is_flown(folder):
+            if not _by_hand(parts):
+                darkroom.ready()  # loads and makes its scene while this process looks through the parts
+            _ = parts.pilot, parts.preflight
+        claim(folder, scenario)
+        with alone(folder), SurfaceMaker(folder, scenario.reconstruction, parts.target.bed_z_m) as surface:
+            modelled = surface.begin if meanwhile is not None else lambda: None
+            result = _figures(parts, scenario, folder, watch, darkroom, modelled)
+            if told is not None:
+                told(result)
+            surface.make(watch, meanwhile)
+            return result
+
+
+def _figures(
+    parts: Parts, scenario: Scenario, folder: Path, watch: Watch, darkroom: Darkroom, modelled: Callable[[], None]
+) -> Figures:
+    """Run the stages that figures come from and write metrics.json; `modelled` is called when the model is there."""
+    ledger = Ledger(folder / "stages.json")
+
+    def stage(name: str, product: str, work: Callable[[Callable[..., None]], None]) -> None:
+        if (folder / product).exists():
+            watch.skipped(name)
+            return
+        with watch.stage(name) as progress, ledger.account(name):
+            work(progress)
+
+    _forget_what_was_not_measured(folder)
+    if not has_parts(folder):  # a flight by hand has no plan
+        stage("plan", "planned.csv", lambda _: write_plan(parts, folder))
+    stage("fly", "steps.parquet", lambda progress: _fly(parts, folder, darkroom, progress))
+    stage("photograph", "images.csv", lambda progress: _photograph(parts, folder, darkroom, progress))
+    stage("reconstruct", "model.json", lambda progress: reconstruct_trial(parts, folder, progress))
+    modelled()
+    stage("evaluate", "score.json", lambda _: write_json(folder / "score.json", evaluate_trial(parts, folder)))
+    figures = json.loads((folder / "score.json").read_text(encoding="utf-8"))
+    gathering = Gathering(figures=figures["figures"], reasons=figures["reasons"])
+    gathering.add({"method": scenario.method, "seed": scenario.seed})
+    gathering.add({"from_outside": parts.from_outside})
+    gathering.add({"wall_s": ledger.total("wall_s"), "cpu_s": ledger.total("cpu_s")})
+    result = gathering.finish()
+    write_json(folder / "metrics.json", result)
+    return result
+
+
+def _is_flown(folder: Path) -> bool:
+    """Whether a folder holds a flight, if only its parts."""
+    return (folder / "steps.parquet").exists() or has_parts(folder)
+
+
+def _by_hand(parts: Parts) -> bool:
+    return parts.scenario.pilot == BY_HAND and "pilot" not in parts.given
+
+
+def _fly(parts: Parts, folder: Path, darkroom: Darkroom, progress: Callable[..., None]) -> None:
+    """Fly, or put together what a flight by hand left that was cut off."""
+    if gather(parts, folder):
+        return
+    if _by_hand(parts):
+        fly_hands(parts, folder)
+    else:
+        darkroom.ready()
+        fly_trial(parts, folder, progress, darkroom.take)
+
+
+def _photograph(parts: Parts, folder: Path, darkroom: Darkroom, progress: Callable[..., None]) -> None:
+    """Wait for the photographs that were begun during the flight, and render the others."""
+    if not (folder / "exposures.npz").exists():
+        raise StageError(f"{folder}: no photograph was taken in its flight, so there is nothing to make a model of")
+    progress(0, 1, "photographs begun during the flight")
+    darkroom.finish()
+    photograph_flight(parts, folder, progress)
+
+
+def compare_methods(
+    flights: Mapping[str, Parts | Scenario],
+    folder: Path,
+    watch: Watch | None = None,
+    meanwhile: Callable[[str, str], None] | None = None,
+) -> Figures:
+    """Run one trial per method, each in its own folder, and set their figures side by side (comparison.json).
+
+    `meanwhile` is that of `run_trial`, with the method's name before.
+    """
+    for flight in flights.values():  # what does not fit is refused before the first of them flies
+        _ = parts_of(flight).preflight
+    result = comparison(
+        {
+            name: run_trial(
+                flight,
+                named(folder, name, "compare"),
+                watch,
+                None,
+                None if meanwhile is None else partial(meanwhile, name),
+            )
+            for name, flight in flights.items()
+        }
+    )
+    write_json(folder / "comparison.json", result)
+    return result
+
+
+def reconstruct_trial(parts: Parts, folder: Path, progress: Callable[..., None]) -> None:
+    """Reconstruct from the photographs and the vehicle's own estimates; model.json says how it went.
+
+    Nothing true goes in: pairs, scale and place come from the estimated camera poses, the region from where the target
+    was taken to be, the lens from the crew's calibration. A model
+    that does not come about is a result too, so its reason is kept instead of its figures. That the disk is full is no
+    result.
+
+    Raises
+    ------
+    EnvironmentFailure
+        If the disk is full, or a file cannot be read or written.
+    """
+    photos = pl.read_csv(folder / "images.csv")
+    names = photos["name"].to_list()
+    centres = photos.select("est_x_m", "est_y_m", "est_z_m").to_numpy()
+    if len(names) < FEWEST_PHOTOS:
+        failure = f"{len(names)} photographs were taken, at least {FEWEST_PHOTOS} are needed"
+        write_json(folder / "model.json", {"figures": {}, "failure": failure})
+        return
+    rotations = matrix_from_quat(photos.select("est_qw", "est_qx", "est_qy", "est_qz").to_numpy())
+    try:
+        model = reconstruct(
+            folder / "images",
+            folder,
+            # One camera took them all: whether they share a lens, which takes longer than all else, is no question.
+            parts.scenario.reconstruction.model_copy(update={"mesh": False, "lens_check": False}),
+            lens=read_lens(folder),
+            reference_positions=dict(zip(names, centres, strict=True)),
+            reference_rotations=dict(zip(names, rotations, strict=True)),
+            region=(parts.found_target.centre_W_m, REGION_SHARE * parts.found_target.radius_m),
+            progress=progress,
+        )
+        summary: dict[str, Any] = model.summary()
+        write_json(folder / "model.json", {"figures": summary, "failure": None})
+    except StageError as fault:
+        write_json(folder / "model.json", {"figures": {}, "failure": str(fault)})
+
+
+def _forget_what_was_not_measured(folder: Path) -> None:
+    """Have reconstruction and score done again where model.json holds a full disk as if it had been measured."""
+    path = folder / "model.json"
+    if path.exists() and of_the_computer(json.loads(path.read_text(encoding="utf-8"))["failure"]):
+        (folder / "score.json").unlink(missing_ok=True)
+        path.unlink()
+
+
+def evaluate_trial(parts: Parts, folder: Path) -> dict[str, Any]:
+    """Judge flight and model against the truth; what could not be computed gets a reason."""
+    gathering = Gathering()
+    steps = pl.read_parquet(folder / "steps.parquet")
+    flown = steps.filter(pl.col("leg") != SETTLING)
+    gathering.add(flight_figures(flown))
+    gathering.missing(("exceedance_ambient_pct",), "the water is still without the vehicle")
+    add_yardsticks(gathering, parts, flown)
+    solve_ms = pl.read_parquet(folder / "timings.parquet")["solve_ms"].to_numpy()
+    solve_ms = solve_ms[min(50, len(solve_ms) // 2) :]  # the first ones load what later ones find loaded
+    gathering.add({"solve_ms_median": float(np.median(solve_ms)), "solve_ms_p99": float(np.percentile(solve_ms, 99))})
+    photos = pl.read_csv(folder / "images.csv")
+    gathering.add({"images": len(photos)})
+    model = json.loads((folder / "model.json").read_text(encoding="utf-8"))
+    summary, failure = model["figures"], model["failure"]
+    gathering.add({"registered_images": summary.get("registered_images", 0)})
+    gathering.add({key: summary.get(key) for key in _MODEL_FIGURES})
+    if failure is None:
+        try:
+            cloud, mesh = read_cloud(folder / "dense.ply").points_m, parts.target.mesh
+            distance = MeshDistance(mesh.vertices_m, mesh.faces)
+            compared = compare_surface(
+                cloud,
+                mesh,
+                distance=distance,
+                crop=Crop(bed_z_m=parts.target.bed_z_m),
+                camera_centres_W_m=photos.select("true_x_m", "true_y_m", "true_z_m").to_numpy(),
+            )
+            gathering.add(coverage_figures(parts, photos, compared.points_W_m))
+            gathering.add({key: getattr(compared.score, key) for key in (*_SURFACE_FIGURES, "success")})
+            gathering.add({"rmse_mean_shape_mm": _rmse_mean_shape_mm(parts, folder, cloud)})
+            gathering.add(_size(parts, folder, photos, cloud, distance))
+        except StageError as fault:
+            failure = str(fault)
+    if parts.yielding is None:
+        gathering.missing((*SWAY_FIGURES, "rmse_mean_shape_mm"), "the target is rigid and held")
+    elif failure is not None:
+        gathering.missing(("rmse_mean_shape_mm",), f"no model: {failure}")
+    if failure is not None:
+        gathering.add({"success": False} | coverage_figures(parts, photos, None))
+        gathering.missing((*_SURFACE_FIGURES, *FROM_MODEL, *_MODEL_FIGURES, *SIZE_FIGURES), f"no model: {failure}")
+    return {"figures": gathering.figures, "reasons": gathering.reasons}
+
+
+def _rmse_mean_shape_mm(parts: Parts, folder: Path, cloud: Array) -> float | None:
+    """`rmse_mm` against the mean of the shapes that were photographed; None of a target that does not yield."""
+    if parts.yielding is None:
+        return None
+    from wakewise.operation.photography import moved_m
+
+    exposures = read_exposures(folder / "exposures.npz")
+    moved = np.mean([moved_m(parts, exposure) for exposure in exposures], axis=0)
+    mesh = parts.target.mesh
+    score = evaluate_surface(
+        cloud,
+        Mesh(mesh.vertices_m + moved, mesh.faces),
+        crop=Crop(bed_z_m=parts.target.bed_z_m),
+    )
+    return score.rmse_mm
+
+
+def _size(parts: Parts, folder: Path, photos: pl.DataFrame, cloud: Array, distance: MeshDistance) -> dict[str, float]:
+    """Figures of the model's size; that they could not be computed takes no other figure away."""
+    from wakewise.vision.reconstruction.views import camera_centres
+
+    true = dict(zip(photos["name"], photos.select("true_x_m", "true_y_m", "true_z_m").to_numpy(), strict=True))
+    crop = Crop(bed_z_m=parts.target.bed_z_m)
+    with suppress(StageError, InputError):
+        return size_figures(cloud, parts.target.mesh, crop, camera_centres(folder / "sparse"), true, distance)
+    return {}

@@ -1,0 +1,326 @@
+"""Assisted flight by hand: hands and desk become goals, which any method flies; and a controller that heeds the desk.
+
+The pilot holds one smooth `Motion`. Sticks ask for a velocity in the body's level frame, or along the sphere about the
+target; released, the motion brakes, and the place that is held lies ahead, where the vehicle can stop. The mission may
+take over and be left at any moment (see `scanning.py`). Whoever steers goes on from where the motion is, so goals never
+jump.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wakewise.control import make_controller, vehicle_layout
+from wakewise.control.firmness import allowed_stray
+from wakewise.control.intent import PAPER_W_TRACK
+from wakewise.control.switching import Switched
+from wakewise.core.arrays import Array
+from wakewise.core.interfaces import BodyState, Controller, Goal
+from wakewise.operation.teleop.desk import WAYS, Desk, DeskState
+from wakewise.operation.teleop.input import CENTRED, Controls, ControlSource
+from wakewise.operation.teleop.input.trace import TraceWriter
+from wakewise.operation.teleop.keep_off import KeepOff
+from wakewise.operation.teleop.motion import Motion
+from wakewise.operation.teleop.scanning import Mission, Scan
+from wakewise.operation.teleop.steering import BRAKING_M_S2, Sphere, steered, turned
+from wakewise.scene.missions import CameraAim
+
+if TYPE_CHECKING:
+    from wakewise.operation.parts import Parts
+
+DIAL_PER_S = 2.0
+"""How fast the obedience follows its dial, in natural logarithms a second: from end to end in 2.3 s."""
+MEAN_S, LEAST_M_S = 2.0, 0.01
+"""Time over which deviations are averaged, and the mean command below which there is nothing to deviate from."""
+SAID_EVERY_S = 3.0
+"""What is in the way is said no more often."""
+KEPT = 200
+"""Most actions and notes that are kept for somebody to take."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Note:
+    """Something to say: "info", "warn" or "error", in words, and when."""
+
+    level: str
+    text: str
+    time_s: float
+
+
+@dataclass(kw_only=True, eq=False)
+class AssistedPilot:
+    """A `Pilot` whose goals come from hands, a desk and a mission; begins afresh at time zero.
+
+    Parameters
+    ----------
+    source : ControlSource
+    desk : Desk
+    mission : Mission
+    target_W_m : ndarray, shape (3,)
+        What the camera is kept on, and the middle of orbits.
+    dt_s : float
+        Time between two goals.
+    begin : DeskState, optional
+        What the desk is set to at time zero, for flights that are to be flown again; None: it stays as it is.
+    keep_off : KeepOff, optional
+        What the sticks do not run into.
+
+    Attributes
+    ----------
+    controls : Controls or None
+        As last read.
+    velocity_W_m_s : ndarray, shape (3,)
+        Asked for, as shaped.
+    deviation_pct : float or None
+        Of the estimated velocity from the one asked for, rms over the last seconds; None while none is asked for.
+    trace : TraceWriter
+        Hands and desk of the whole flight, to be written beside its record.
+    state : DeskState
+        What was set at the last step: the controller goes by it, so that a change from another thread in the middle of
+        a step counts for the next one, and the record of a flight gives the same flight.
+    motion : Motion
+    """
+
+    source: ControlSource
+    desk: Desk
+    mission: Mission
+    target_W_m: Array
+    dt_s: float
+    begin: DeskState | None = None
+    keep_off: KeepOff | None = None
+    controls: Controls | None = None
+    trace: TraceWriter = field(default_factory=TraceWriter)
+    state: DeskState = field(init=False)
+    motion: Motion = field(init=False)
+    _scan: Scan = field(init=False)
+    _mode: str = "hold"
+    _dial: float = 0.0
+    _sphere: Sphere = field(default_factory=Sphere)
+    _asked: float = 0.0
+    _missed: float = 0.0
+    _there: bool = True
+    _blocked_s: float = -math.inf
+    _actions: deque[str] = field(default_factory=lambda: deque(maxlen=KEPT))
+    _notes: deque[Note] = field(default_factory=lambda: deque(maxlen=KEPT))
+
+    def __post_init__(self) -> None:
+        self.state = self.desk.state
+        self.motion, self._scan = Motion.at(self.mission.route.body(0.0, self.aim)), Scan()
+
+    @property
+    def aim(self) -> CameraAim:
+        """What the camera is aimed with."""
+        return self.mission.aim
+
+    @property
+    def velocity_W_m_s(self) -> Array:
+        """Asked for, as shaped, shape (3,)."""
+        return self.motion.velocity_W_m_s
+
+    @property
+    def deviation_pct(self) -> float | None:
+        """Root mean square of the estimated less the commanded velocity over that of the commanded, in percent."""
+        return None if self._asked < LEAST_M_S**2 else 100.0 * math.sqrt(self._missed / self._asked)
+
+    @property
+    def mission_s(self) -> float:
+        """How much of the mission is flown, on its own clock."""
+        return self._scan.mission_s
+
+    @property
+    def scan_phase(self) -> str | None:
+        """What the scan does ("stopping", "returning", "flying"); None in other modes."""
+        return self._scan.phase if self._mode == "scan" else None
+
+    def taken(self) -> tuple[str, ...]:
+        """Photographs ("capture") and the end ("stop") asked for since the last call, in order."""
+        return _emptied(self._actions)
+
+    def notes(self) -> tuple[Note, ...]:
+        """What there was to say since the last call."""
+        return _emptied(self._notes)
+
+    def goal(self, time_s: float, estimate: BodyState) -> Goal:
+        """Where hands, desk and mission lead, a step on."""
+        first = time_s <= 0.0
+        if first:
+            self._begin(estimate)
+        controls = self._read(time_s, estimate)
+        for action in () if controls is None else controls.pressed:
+            if action in ("capture", "stop"):
+                self._actions.append(action)
+            else:
+                self.desk.press(action)
+        state = self.state = self._set(time_s)
+        self.trace.take(time_s, controls, vars(state))
+        self._enter(state.mode, time_s, first)
+        if not first:
+            self._move(state, CENTRED if controls is None else controls, time_s, estimate)
+        self._weigh(estimate)
+        wished = math.log(state.w_track / PAPER_W_TRACK)
+        most = math.inf if first else DIAL_PER_S * self.dt_s
+        self._dial += min(max(wished - self._dial, -most), most)
+        obedience = math.exp(self._dial)
+        return self.motion.goal(obedience=obedience, stray=allowed_stray(PAPER_W_TRACK * obedience))
+
+    @property
+    def leg(self) -> str:
+        """What is flown now, as the record calls it."""
+        if self._mode != "scan":
+            return {"operator": "by hand", "hold": "hold"}[self._mode]
+        flying = self._scan.phase == "flying"
+        return self.mission.route.leg_name(self._scan.mission_s) if flying else "back to the mission"
+
+    def _set(self, time_s: float) -> DeskState:
+        """What is set on the desk; where hands are played back, as it was set then."""
+        recorded = getattr(self.source, "desk_at", None)
+        played = None if recorded is None else recorded(time_s)
+        return self.desk.state if played is None else self.desk.set(**played)
+
+    def _begin(self, estimate: BodyState) -> None:
+        if self.begin is not None:
+            self.desk.set(**vars(self.begin))
+        self.motion = Motion.at(estimate, self.mission.route.tilt(0.0, self.aim)[0])
+        self._scan, self._mode = Scan(), "hold"
+        self._sphere, self._asked, self._missed, self._there = Sphere(), 0.0, 0.0, True
+        self._blocked_s = -math.inf
+        self._dial = math.log(self.desk.state.w_track / PAPER_W_TRACK)
+        self.trace = TraceWriter()
+        self._actions.clear()
+        self._notes.clear()
+
+    def _read(self, time_s: float, estimate: BodyState) -> Controls | None:
+        """The hands; a source that fails counts as nobody there, and both are said."""
+        try:
+            look = getattr(self.source, "look", None)
+            if look is not None:
+                look(time_s, estimate, self.desk.state.share)
+            self.controls, why = self.source.read(time_s), "nobody at the sticks"
+        except Exception as fault:  # a device that goes away must not end the flight
+            self.controls, why = None, f"sticks cannot be read ({type(fault).__name__}: {fault})"
+        there = self.controls is not None
+        if there != self._there:
+            if there:
+                self._say("info", "hands at the sticks again", time_s)
+            else:
+                self._say("warn", f"{why}: stopping, then holding the place", time_s)
+            self._there = there
+        return self.controls
+
+    def _enter(self, mode: str, time_s: float, first: bool) -> None:
+        """Change of who steers; what was there goes on from where it is."""
+        if mode == "scan" and not self.mission.flies:
+            self._say("warn", "no mission to fly: holding the place", time_s)
+            mode = self.desk.press("hold").mode
+        if mode == self._mode:
+            return
+        if mode == "scan":
+            self._scan = replace(self._scan, phase="stopping", pace=0.0, back=None)
+            if first:
+                self._scan, self.motion = self.mission.begun()
+        elif self._mode == "scan":
+            self._sphere = Sphere()
+        words = {"operator": "operator flies", "hold": "holding the place", "scan": "the mission flies"}
+        self._say("info", words[mode], time_s)
+        self._mode = mode
+
+    def _move(self, state: DeskState, controls: Controls, time_s: float, estimate: BodyState) -> None:
+        if self._mode != "scan":
+            axes = controls.axes if self._mode == "operator" else CENTRED.axes
+            motion = turned(self.motion, state, axes, self.target_W_m, self.aim, self.dt_s)
+            free = self._sphere.blocked_by is None
+            self.motion, self._sphere = steered(
+                motion, self._sphere, state, axes, self.target_W_m, self.aim, estimate, self.dt_s, self.keep_off
+            )
+            blocks = self._sphere.blocked_by
+            if blocks is not None and free and time_s > self._blocked_s + SAID_EVERY_S:
+                self._say("warn", f"{blocks} is in the way: stopping short of it", time_s)
+                self._blocked_s = time_s
+            return
+        before = self._scan.mission_s
+        self._scan, self.motion = self.mission.step(self._scan, self.motion, self.dt_s)
+        opens_s = self.mission.route.exposures_s
+        due = int(np.count_nonzero((opens_s > before) & (opens_s <= self._scan.mission_s)))
+        self._actions.extend(["capture"] * due)
+        if self._scan.mission_s >= self.mission.route.duration_s:
+            self._say("info", "the mission is flown", time_s)
+            self._enter(self.desk.press("hold").mode, time_s, False)
+
+    def _weigh(self, estimate: BodyState) -> None:
+        share = self.dt_s / MEAN_S
+        asked = self.motion.velocity_W_m_s
+        missed = estimate.X_WB.R @ estimate.nu_B[:3] - asked
+        self._asked += share * (float(asked @ asked) - self._asked)
+        more = float(missed @ missed)
+        self._missed += share * (more - self._missed) if math.isfinite(more) else 0.0
+
+    def _say(self, level: str, text: str, time_s: float) -> None:
+        self._notes.append(Note(level=level, text=text, time_s=time_s))
+
+
+def assisted(parts: Parts, source: ControlSource, desk: Desk, begin: DeskState | None = None) -> Parts:
+    """Parts that hands and a desk fly: the pilot is the assisted one, the controller heeds the desk at each step.
+
+    Parameters
+    ----------
+    parts : Parts
+        Their route is the mission that the mode `scan` flies.
+    source : ControlSource
+    desk : Desk
+    begin : DeskState, optional
+        What the desk is set to at time zero of each flight; None: it stays as it is.
+
+    Returns
+    -------
+    Parts
+        `pilot` and `controller` replaced; the body's attitude is the pilot's, so the method does not lean it.
+    """
+    pilot = assisted_pilot(parts, source, desk, begin)
+    flown = parts.replace(pilot=pilot)
+    return flown.replace(controller=heeding(flown, lambda: pilot.state.method))
+
+
+def assisted_pilot(parts: Parts, source: ControlSource, desk: Desk, begin: DeskState | None = None) -> AssistedPilot:
+    """The pilot of `assisted`."""
+    mission = parts.scenario.mission
+    return AssistedPilot(
+        source=source,
+        desk=desk,
+        mission=Mission(
+            route=parts.route,
+            aim=parts.aim,
+            speed_m_s=mission.speed_m_s,
+            acceleration_m_s2=mission.acceleration_m_s2,
+            braking_m_s2=BRAKING_M_S2,
+        ),
+        target_W_m=parts.found_target.centre_W_m,
+        dt_s=1.0 / parts.control.rate_hz,
+        begin=begin,
+        keep_off=KeepOff(
+            around=parts.surroundings, half_m=0.5 * np.array(parts.vehicle.size_m), braking_m_s2=BRAKING_M_S2
+        ),
+    )
+
+
+def heeding(parts: Parts, wanted: Callable[[], str]) -> Controller[Any]:
+    """A controller that is `wake-aware` or direct (`dp`), as is wanted at each step."""
+    gentle = parts.scenario.method if parts.scenario.method not in ("dp", "manual", "ardusub") else WAYS[0]
+    made: dict[str, Controller[Any]] = {
+        way: make_controller(method, parts.vehicle, parts.region, parts.wake, parts.control, parts.surroundings)
+        for way, method in ((WAYS[0], gentle), (WAYS[1], "dp"))
+    }
+    return Switched(name="operator", methods=made, wanted=wanted, layout=vehicle_layout(parts.vehicle))
+
+
+def _emptied(queue: deque[Any]) -> tuple[Any, ...]:
+    """What is in a queue, which another thread may fill meanwhile."""
+    found = []
+    while queue:
+        found.append(queue.popleft())
+    return tuple(found)

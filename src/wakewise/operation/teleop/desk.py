@@ -1,0 +1,171 @@
+"""The desk: what an operator has set, which may change at any moment of a flight.
+
+One holder, read by the control loop at each step and written from any thread (a page, a gamepad, a script). What is set
+is checked when it is set, so that the loop never meets nonsense.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from wakewise.core.errors import InputError
+
+Mode = Literal["operator", "hold", "scan"]
+MODES: tuple[Mode, ...] = ("operator", "hold", "scan")
+Way = Literal["wake-aware", "direct"]
+WAYS: tuple[Way, ...] = ("wake-aware", "direct")
+RANGES = {"w_track": (0.5, 50.0), "gain": (0.1, 1.0)}
+"""Least and largest of the dials."""
+GAIN_STEP = 0.1
+"""What the buttons `gain_up` and `gain_down` do."""
+PRECISE_SHARE = 0.3
+"""Share of the gain's speeds in precise mode; estimate: 7 cm/s at full stick and the gain of the start, less than a
+mission's pace."""
+TRANSIT, DELICATE = 10.0, 2.0
+"""The paper's regimes on its scale of w_track: above, and below."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeskState:
+    """What is set.
+
+    Parameters
+    ----------
+    mode : "operator", "hold" or "scan"
+        Who says where to go: the sticks, nobody, or the mission.
+    method : "wake-aware" or "direct"
+        How thrusts are chosen; direct is `dp`, the least thrusts.
+    w_track : float
+        How closely the command is obeyed, on the paper's scale (see `wakewise.control.intent`), 0.5 to 50.
+    gain : float
+        Share of the fastest speed that full stick asks for, 0.1 to 1.
+    precise : bool
+        Slower by `PRECISE_SHARE`.
+    watch_target : bool
+        The camera is kept on the target: by its tilt joint first, then by the body.
+    orbit : bool
+        The sticks move the camera along the sphere about the target; forward changes its radius.
+
+    Raises
+    ------
+    InputError
+        If a value is none of these, naming field, value and range.
+    """
+
+    mode: Mode = "hold"
+    method: Way = "wake-aware"
+    w_track: float = 5.0
+    gain: float = 0.5
+    precise: bool = False
+    watch_target: bool = True
+    orbit: bool = False
+
+    def __post_init__(self) -> None:
+        for name, allowed in (("mode", MODES), ("method", WAYS)):
+            if getattr(self, name) not in allowed:
+                raise InputError(f"{name}: {getattr(self, name)!r}, allowed are {', '.join(allowed)}")
+        for name, (least, most) in RANGES.items():
+            value = getattr(self, name)
+            number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+            if not number or not least <= value <= most:
+                raise InputError(f"{name}: {value!r}, must be a number from {least:g} to {most:g}")
+        for name in ("precise", "watch_target", "orbit"):
+            if not isinstance(getattr(self, name), bool):
+                raise InputError(f"{name}: {getattr(self, name)!r}, must be true or false")
+
+    @property
+    def share(self) -> float:
+        """Share of the fastest speeds that full stick asks for."""
+        return self.gain * (PRECISE_SHARE if self.precise else 1.0)
+
+
+FIELDS: tuple[str, ...] = tuple(field.name for field in fields(DeskState))
+"""What can be set."""
+
+
+class Desk:
+    """Holds what is set; safe to read and to write from any thread."""
+
+    def __init__(self, state: DeskState | None = None) -> None:
+        self._lock = threading.Lock()
+        self._state = state or DeskState()
+
+    @property
+    def state(self) -> DeskState:
+        """What is set now."""
+        return self._state
+
+    def set(self, **changes: Any) -> DeskState:
+        """Change some fields; returns what is set then.
+
+        Raises
+        ------
+        InputError
+            Naming field, value and range; nothing is changed then.
+        """
+        for name in changes:
+            if name not in FIELDS:
+                raise InputError(f"{name}: not on the desk, allowed are {', '.join(FIELDS)}")
+        with self._lock:
+            self._state = replace(self._state, **changes)
+            return self._state
+
+    def press(self, action: str) -> DeskState:
+        """What a button does to what is set; one that does nothing to it changes nothing."""
+        with self._lock:
+            self._state = pressed(self._state, action)
+            return self._state
+
+
+def pressed(state: DeskState, action: str) -> DeskState:
+    """What is set after a button (see `wakewise.operation.teleop.input.ACTIONS`)."""
+    if action in MODES:
+        return replace(state, mode=action)
+    if action == "precise":
+        return replace(state, precise=not state.precise)
+    if action in ("gain_up", "gain_down"):
+        least, most = RANGES["gain"]
+        step = GAIN_STEP if action == "gain_up" else -GAIN_STEP
+        return replace(state, gain=min(max(round(state.gain + step, 3), least), most))
+    return state
+
+
+def regime(w_track: float) -> str:
+    """What a `w_track` is for, in the paper's words: transit above 10, delicate below 2, work between."""
+    return "transit" if w_track > TRANSIT else "delicate" if w_track < DELICATE else "work"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Meaning:
+    """What a `w_track` means: its regime, and in percent how far the vehicle deviates and how much wash it saves.
+
+    The percentages are None where nobody has measured them.
+    """
+
+    regime: str
+    deviation_pct: float | None = None
+    saved_pct: float | None = None
+
+
+def meaning(w_track: float, measured: Mapping[float, tuple[float, float]] | None = None) -> Meaning:
+    """What a `w_track` means, from what was measured.
+
+    Parameters
+    ----------
+    w_track : float
+    measured : mapping, optional
+        By w_track: velocity deviation and disturbance saved against direct allocation, in percent. In between they are
+        interpolated over the logarithm, beyond they stay as at the end.
+    """
+    if not measured:
+        return Meaning(regime=regime(w_track))
+    at = sorted(measured)
+    where = np.log(at)
+    deviation, saved = (float(np.interp(math.log(w_track), where, [measured[w][k] for w in at])) for k in (0, 1))
+    return Meaning(regime=regime(w_track), deviation_pct=deviation, saved_pct=saved)

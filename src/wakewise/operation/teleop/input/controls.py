@@ -1,0 +1,79 @@
+"""What a pilot's hands do at one instant, whatever they hold: gamepad, keyboard, a page in the browser, a script.
+
+Axes are shares of full stick in the vehicle's level frame: forward along its heading, right, down, turn clockwise as
+seen from above, tilt of the camera upwards. What full stick means is the desk's doing (gain, precise mode), and what
+comes of it that of `wakewise.operation`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.errors import InputError
+
+CONTROL_AXES = ("forward", "right", "down", "turn", "tilt")
+ACTIONS = ("capture", "hold", "scan", "operator", "stop", "precise", "gain_up", "gain_down")
+"""What buttons ask for: a photograph; hold the place; let the mission fly; take over; end the flight; the finer sticks
+on or off; the gain a step up or down."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Controls:
+    """Axes as shares of full stick, -1 to 1, in the order of `CONTROL_AXES`, shape (5,), and what was pressed since.
+
+    Raises
+    ------
+    InputError
+        If an axis is not a number within -1 to 1, or nobody knows what was pressed.
+    """
+
+    axes: Array
+    pressed: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        freeze(self, axes=(len(CONTROL_AXES),))
+        if not np.all(np.abs(self.axes) <= 1.0):  # also refuses what is not a number
+            raise InputError(f"axes: {np.round(self.axes, 3).tolist()}, must be numbers from -1 to 1")
+        unknown = [name for name in self.pressed if name not in ACTIONS]
+        if unknown:
+            raise InputError(f"pressed: {unknown[0]!r} is not one of {', '.join(ACTIONS)}")
+
+    @property
+    def centred(self) -> bool:
+        """Whether no axis asks for anything."""
+        return not self.axes.any()
+
+
+CENTRED = Controls(axes=np.zeros(len(CONTROL_AXES)))
+"""Hands off."""
+
+
+class ControlSource(Protocol):
+    """Where a pilot's hands are read.
+
+    One that sees may have a method `look(time_s, estimate, share)`, called before each read: where the vehicle is, and
+    what share of the fastest speeds full stick asks for. One that plays back may have `desk_at(time_s)`: what was set
+    on the desk then, by field.
+    """
+
+    def read(self, time_s: float) -> Controls | None:
+        """Read them at `time_s` of the flight, at most once a control step; None: nobody is there, so stop and hold."""
+        ...
+
+
+def shaped(raw: Iterable[float], dead_zone: float = 0.05) -> Array:
+    """Axes as a device gives them, made harmless: shape (5,), dead zone taken out, the rest stretched to full.
+
+    What is not a number counts as centred, what is larger than full as full.
+    """
+    out = np.zeros(len(CONTROL_AXES))
+    for k, value in enumerate(raw):
+        if k < len(out) and math.isfinite(value) and abs(value) > dead_zone:
+            out[k] = math.copysign(min((abs(value) - dead_zone) / (1.0 - dead_zone), 1.0), value)
+    return out

@@ -1,0 +1,120 @@
+"""Hands by a script: a list of times with what the sticks do from then on.
+
+As YAML, each entry with `at_s` and any of the axes (those not named are centred), what is `pressed` at that moment, or
+`gone: true` where nobody is at the sticks until the next entry:
+
+    - {at_s: 2, right: 0.6}
+    - {at_s: 5, pressed: [capture]}
+    - {at_s: 8, gone: true}
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wakewise.core.errors import InputError
+from wakewise.core.safe_yaml import yaml_file
+from wakewise.operation.teleop.input.controls import CENTRED, CONTROL_AXES, Controls
+
+LONGEST = 100_000
+"""Most entries of a script."""
+_KEYS = ("at_s", *CONTROL_AXES, "pressed", "gone")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Moment:
+    """From `at_s` on the hands do this, None: nobody is there; what is pressed is pressed once."""
+
+    at_s: float
+    controls: Controls | None
+
+
+@dataclass(eq=False)
+class Script:
+    """A `ControlSource` that reads off moments in order; before the first the sticks are centred.
+
+    Raises
+    ------
+    InputError
+        If the times do not increase.
+    """
+
+    moments: tuple[Moment, ...]
+    _read: int = field(default=0, init=False)
+    _until_s: float = field(default=-1.0, init=False)
+
+    def __post_init__(self) -> None:
+        for number, (one, other) in enumerate(zip(self.moments, self.moments[1:], strict=False), 2):
+            if not one.at_s < other.at_s:
+                raise InputError(f"script: entry {number} at {other.at_s:g} s, must be later than {one.at_s:g} s")
+
+    def read(self, time_s: float) -> Controls | None:
+        """What the hands do at `time_s`; a time before the last one begins afresh."""
+        if time_s < self._until_s:
+            self._read = 0
+        self._until_s, pressed = time_s, list[str]()
+        while self._read < len(self.moments) and self.moments[self._read].at_s <= time_s + 1e-9:
+            controls = self.moments[self._read].controls
+            pressed += () if controls is None else controls.pressed
+            self._read += 1
+        held = CENTRED if self._read == 0 else self.moments[self._read - 1].controls
+        return None if held is None else Controls(axes=held.axes, pressed=tuple(pressed))
+
+
+def script_of(entries: Any, what: str = "script") -> Script:
+    """Script of entries as in the file (see the top); `what` names them in messages.
+
+    Raises
+    ------
+    InputError
+        Naming the entry, what was found and what is allowed.
+    """
+    if not isinstance(entries, list | tuple) or not entries:
+        raise InputError(f"{what}: must be a list of entries, such as - {{at_s: 2, right: 0.6}}")
+    if len(entries) > LONGEST:
+        raise InputError(f"{what}: {len(entries)} entries, at most {LONGEST} are allowed")
+    return Script(tuple(_moment(entry, f"{what}, entry {k}") for k, entry in enumerate(entries, 1)))
+
+
+def load_script(path: Path) -> Script:
+    """Script from a YAML file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or see `script_of`.
+    """
+    return script_of(yaml_file(path), str(path))
+
+
+def _moment(entry: Mapping[str, Any], what: str) -> Moment:
+    if not isinstance(entry, Mapping) or "at_s" not in entry:
+        raise InputError(f"{what}: must be a mapping with at_s, such as {{at_s: 2, right: 0.6}}")
+    for key in entry:
+        if key not in _KEYS:
+            raise InputError(f"{what}: {key!r} is unknown, allowed are {', '.join(_KEYS)}")
+    at_s = _number(entry["at_s"], f"{what}, at_s")
+    if at_s < 0.0:
+        raise InputError(f"{what}: at_s {at_s:g}, must be 0 or more")
+    gone, pressed = entry.get("gone", False), entry.get("pressed", [])
+    if not isinstance(gone, bool):
+        raise InputError(f"{what}: gone {gone!r}, must be true or false")
+    if not isinstance(pressed, list) or not all(isinstance(name, str) for name in pressed):
+        raise InputError(f"{what}: pressed {pressed!r}, must be a list of names")
+    axes = [_number(entry.get(name, 0.0), f"{what}, {name}") for name in CONTROL_AXES]
+    try:
+        controls = Controls(axes=np.array(axes), pressed=tuple(pressed))
+    except InputError as fault:
+        raise InputError(f"{what}: {fault}") from fault
+    return Moment(at_s=at_s, controls=None if gone else controls)
+
+
+def _number(value: Any, what: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        raise InputError(f"{what}: {value!r}, must be a finite number")
+    return float(value)

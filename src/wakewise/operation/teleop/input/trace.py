@@ -1,0 +1,162 @@
+"""A record of hands: what the sticks did in a flight, to be read, plotted, and flown again.
+
+A table with the columns `time_s`, the five axes, `pressed` (names, separated by commas) and `desk` (what was set, as
+JSON, whatever the desk knows). It has a row wherever something changed, which holds until the next one, and a last one
+at the end. Where nobody was at the sticks the axes are null. As a file it is Parquet or CSV; a flight by hand leaves
+`controls.parquet` in its folder.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from array import array
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from wakewise.core.errors import InputError
+from wakewise.core.files import whole_file
+from wakewise.operation.teleop.input.controls import CONTROL_AXES, Controls
+
+TRACE_FILE = "controls.parquet"
+"""What a flight by hand leaves in its folder."""
+_NOBODY = (math.nan,) * len(CONTROL_AXES)
+
+
+@dataclass(eq=False)
+class TraceWriter:
+    """Collects hands and desk as they are read; what does not change takes no room."""
+
+    _rows: array[float] = field(default_factory=lambda: array("d"), init=False)
+    _pressed: dict[int, str] = field(default_factory=dict, init=False)
+    _desks: dict[int, str] = field(default_factory=dict, init=False)
+    _axes: tuple[float, ...] | None = field(default=None, init=False)
+    _desk: Mapping[str, Any] | None = field(default=None, init=False)
+    _last_s: float = field(default=0.0, init=False)
+
+    def take(self, time_s: float, controls: Controls | None, desk: Mapping[str, Any]) -> None:
+        """Take in what the hands did at a step, and what was set then."""
+        axes = _NOBODY if controls is None else tuple(controls.axes.tolist())
+        pressed = () if controls is None else controls.pressed
+        same = self._axes is axes or (axes is not _NOBODY and self._axes == axes)
+        if not same or pressed or desk != self._desk:
+            row = len(self._rows) // (1 + len(CONTROL_AXES))
+            if pressed:
+                self._pressed[row] = ",".join(pressed)
+            if desk != self._desk:
+                self._desks[row] = json.dumps(dict(desk))
+            self._rows.extend((time_s, *axes))
+            self._axes, self._desk = axes, desk
+        self._last_s = time_s
+
+    def frame(self) -> pl.DataFrame:
+        """The table, with its last row."""
+        wide = np.array(self._rows).reshape(-1, 1 + len(CONTROL_AXES))
+        n = len(wide)
+        if n and self._last_s > wide[-1, 0]:
+            wide = np.vstack([wide, [self._last_s, *wide[-1, 1:]]])
+        columns = {name: wide[:, k] for k, name in enumerate(("time_s", *CONTROL_AXES))}
+        words = {
+            name: [said.get(k) for k in range(len(wide))]
+            for name, said in (("pressed", self._pressed), ("desk", self._desks))
+        }
+        frame = pl.DataFrame({**columns, **words}, schema_overrides={"pressed": pl.String, "desk": pl.String})
+        return frame.with_columns(pl.col(CONTROL_AXES).fill_nan(None))
+
+    def write(self, path: Path) -> None:
+        """Write the table, whole or not at all; its ending says whether as CSV or Parquet."""
+        with whole_file(path) as temporary:
+            if path.suffix == ".csv":
+                self.frame().write_csv(temporary)
+            else:
+                self.frame().write_parquet(temporary)
+
+
+class Trace:
+    """A `ControlSource` that reads off a record; after its end nobody is there.
+
+    Raises
+    ------
+    InputError
+        If the table lacks a column, times do not increase, or a row is nonsense; the row is named.
+    """
+
+    def __init__(self, frame: pl.DataFrame, what: str = "trace") -> None:
+        self._times_s, self._rows, self._desks = _checked(frame, what)
+        self._next, self._until_s = 0, -1.0
+
+    @property
+    def end_s(self) -> float:
+        """When the record ends."""
+        return float(self._times_s[-1])
+
+    def read(self, time_s: float) -> Controls | None:
+        """What the hands did at `time_s`; a time before the last one begins afresh."""
+        if time_s < self._until_s:
+            self._next = 0
+        self._until_s, pressed = time_s, list[str]()
+        while self._next < len(self._rows) and self._times_s[self._next] <= time_s + 1e-9:
+            held = self._rows[self._next]
+            pressed += () if held is None else held.pressed
+            self._next += 1
+        if self._next == 0 or time_s > self.end_s + 1e-9:
+            return None
+        held = self._rows[self._next - 1]
+        return None if held is None else Controls(axes=held.axes, pressed=tuple(pressed))
+
+    def desk_at(self, time_s: float) -> Mapping[str, Any] | None:
+        """What was set at `time_s`; None where the record does not say."""
+        at = int(np.searchsorted(self._times_s, time_s + 1e-9, side="right")) - 1
+        return self._desks[at] if at >= 0 else None
+
+
+def read_trace(path: Path) -> Trace:
+    """Trace from a Parquet or CSV file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or see `Trace`.
+    """
+    try:
+        frame = pl.read_csv(path) if path.suffix == ".csv" else pl.read_parquet(path)
+    except (OSError, pl.exceptions.PolarsError) as fault:
+        raise InputError(f"{path}: cannot be read as a table ({' '.join(str(fault).split())})") from fault
+    return Trace(frame, str(path))
+
+
+def _checked(
+    frame: pl.DataFrame, what: str
+) -> tuple[np.ndarray, list[Controls | None], list[Mapping[str, Any] | None]]:
+    missing = [name for name in ("time_s", *CONTROL_AXES) if name not in frame.columns]
+    if missing or not frame.height:
+        raise InputError(f"{what}: {'no column ' + missing[0] if missing else 'no rows'}, needed: time_s, the axes")
+    try:
+        wide = frame.select(pl.col("time_s", *CONTROL_AXES).cast(pl.Float64)).to_numpy()
+    except pl.exceptions.PolarsError as fault:
+        raise InputError(f"{what}: time_s and the axes must be numbers") from fault
+    times_s = np.array(wide[:, 0])
+    if not (np.isfinite(times_s).all() and np.all(np.diff(times_s) > 0.0) and times_s[0] >= 0.0):
+        raise InputError(f"{what}: time_s must increase from 0 or more")
+    words = {
+        name: frame[name].to_list() if name in frame.columns else [None] * frame.height for name in ("pressed", "desk")
+    }
+    rows: list[Controls | None] = []
+    desks: list[Mapping[str, Any] | None] = []
+    desk: Mapping[str, Any] | None = None
+    for k, (axes, pressed, said) in enumerate(zip(wide[:, 1:], words["pressed"], words["desk"], strict=True), 1):
+        try:
+            names = tuple(str(pressed).split(",")) if pressed else ()
+            rows.append(None if np.isnan(axes).all() and not names else Controls(axes=axes, pressed=names))
+            desk = json.loads(said) if said else desk
+        except (InputError, ValueError) as fault:
+            raise InputError(f"{what}: row {k}: {fault}") from fault
+        if desk is not None and not isinstance(desk, dict):
+            raise InputError(f"{what}: row {k}: desk must be an object of JSON")
+        desks.append(desk)
+    return times_s, rows, desks

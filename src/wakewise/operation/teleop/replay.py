@@ -1,0 +1,108 @@
+"""A flight by hand flown again, from the record of its hands: in the same world the same flight, to the byte."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from wakewise.core.errors import InputError
+from wakewise.operation.parts import Parts
+from wakewise.operation.scenario import Scenario, read_scenario
+from wakewise.operation.teleop.assisted import assisted
+from wakewise.operation.teleop.desk import Desk
+from wakewise.operation.teleop.input.script import Script
+from wakewise.operation.teleop.input.sources import hands_from
+from wakewise.operation.teleop.input.trace import TRACE_FILE, Trace, read_trace
+from wakewise.operation.teleop.live import LiveFlight
+from wakewise.operation.teleop.shutter import Shutter
+
+AFTER_S = 3.0
+"""How long a flight goes on after the last entry of a script; estimate: from full stick to rest takes 1.5 s."""
+
+
+class RecordedShutter(Shutter):
+    """Opens when it did in a flight before, whatever hands ask for, and ends with it.
+
+    Parameters
+    ----------
+    parts : Parts
+    steps : polars.DataFrame
+        The columns `time_s` and `exposing` of the flight's steps.parquet.
+    """
+
+    def __init__(self, parts: Parts, steps: pl.DataFrame) -> None:
+        super().__init__(parts)
+        self._opened_s = steps.filter("exposing")["time_s"].to_numpy()
+        self._end_s = float(steps["time_s"][-1])
+
+    def shutter_s(self, number: int, time_s: float, dt_s: float) -> float | None:
+        """Now, if it was opened in this step of the flight before."""
+        self.heed()
+        self.over = time_s >= self._end_s - 0.5 * dt_s
+        if number >= len(self._opened_s) or not np.isclose(self._opened_s[number], time_s, rtol=0.0, atol=0.5 * dt_s):
+            return None
+        return time_s
+
+
+class UntilShutter(Shutter):
+    """One that ends a flight at `end_s`, if hands did not before."""
+
+    def __init__(self, parts: Parts, end_s: float) -> None:
+        super().__init__(parts)
+        self._end_s = end_s
+
+    def heed(self) -> None:
+        """Take in what hands asked for since, and look at the clock."""
+        super().heed()
+        self.over |= self.time_s >= self._end_s - 1e-9
+
+
+def fly_hands(parts: Parts, folder: Path) -> None:
+    """Fly the hands that a scenario of the pilot `operator` names, as fast as it goes, into the folder of a trial.
+
+    A record ends with its flight, a script `AFTER_S` after its last entry, unless "stop" is pressed before.
+
+    Raises
+    ------
+    InputError
+        If it names none, or they cannot be read.
+    """
+    if parts.scenario.controls is None:
+        _ = parts.pilot  # which says so
+        return
+    hands = hands_from(Path(parts.scenario.controls))
+    end_s = hands.end_s if isinstance(hands, Trace) else 0.0
+    if isinstance(hands, Script):
+        end_s = hands.moments[-1].at_s + AFTER_S
+    flown = assisted(parts, hands, Desk())
+    LiveFlight(flown, folder=folder, paced=False, shutter=UntilShutter(flown, end_s)).run()
+
+
+def replay_of(folder: Path, out: Path | None, parts: Parts | Scenario | None = None) -> LiveFlight:
+    """A flight that flies again what a folder's hands did, as fast as it goes; begin it with `start`.
+
+    Parameters
+    ----------
+    folder : Path
+        Of a flight by hand.
+    out : Path or None
+        What the flight leaves goes there.
+    parts : Parts or Scenario, optional
+        Where it is flown; by default where it was, which gives the same flight. Hands see nothing: elsewhere, or with
+        another method, they do the same and the vehicle is somewhere else.
+
+    Raises
+    ------
+    InputError
+        If the folder holds no flight by hand, or `out` holds another trial.
+    """
+    for name in ("scenario.yaml", TRACE_FILE, "steps.parquet"):
+        if not (folder / name).exists():
+            raise InputError(f"{folder}: has no {name}, the folder of a flight by hand is needed")
+    parts = read_scenario(folder / "scenario.yaml") if parts is None else parts
+    parts = parts if isinstance(parts, Parts) else parts.parts()
+    flown = assisted(parts, read_trace(folder / TRACE_FILE), Desk())
+    steps = pl.read_parquet(folder / "steps.parquet", columns=["time_s", "exposing"])
+    return LiveFlight(flown, folder=out, paced=False, shutter=RecordedShutter(flown, steps))

@@ -1,0 +1,326 @@
+"""The second judge: a flight in the lattice's water, which shares no law with the tank.
+
+Thruster disks push moving cells, the hull takes from the water what the vehicle's drag gives it (spread over its box,
+so that a vehicle that hovers leaves no momentum), target and bed are solid, and the current comes in by the sides: each
+flight is a large-eddy simulation with the loop closed. Vehicle, sensors and the places at which water is judged are
+those of the tank.
+
+What it has not: silt, waves, a pump, turbulence of the water's own; the hull lets jets through. Cells of 2.5 cm are
+three to a thruster's diameter: a jet's speed times distance is then 20 % low at 0.4 m and 20 % high at 0.9 m (cells of
+2 cm come nearer, at 2.4 times the work), and sheets on the bed and the thin water at the target's surface are coarser
+still. The target's excess speed is what the tank's is: this water less the same water without a vehicle, which goes on
+beside it where there is a current (a current that goes round a target takes longer to settle than a hover lasts, and
+sheds eddies then).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from wakewise.core.arrays import Array, BoolArray
+from wakewise.core.errors import InputError
+from wakewise.core.interfaces import BodyState, Measurement, Plant, ScalarGrid, Truth, WaterTruth, Witness
+from wakewise.robot.thrusters import electrical_power_W
+from wakewise.robot.vehicles import Vehicle
+from wakewise.scene.targets import Target
+from wakewise.simulation.lattice.live import LiveBox, disk_points
+from wakewise.simulation.tank import Sensors, TankSettings, VehiclePlant
+from wakewise.simulation.tank.camera_joint import CameraJoint
+from wakewise.simulation.tank.measuring import TargetProbes
+from wakewise.simulation.tank.sediment import SiltLaws
+from wakewise.simulation.tank.settings import PLANT_STEP_S
+from wakewise.simulation.water import AmbientSum, SteadyCurrent
+
+CELL_M = 0.025
+STRONGEST_N = 5.0
+"""Thrust of the fastest jet that the time step is made for; stronger ones of short duration still run."""
+SPIN_UP_M, SPIN_UP_S = 1.0, 10.0
+"""Way that the current goes past the target before the thrusters start, or for how long if that is less."""
+_DISK_POINTS, _HULL_SPACING = 32, 0.04
+_UNSTEADINESS = 0.15  # rms of a disk's load over its mean, as in the cases (see `lattice.cases.Case`)
+_LOAD_LIFE = 0.5  # exit diameters over exit speed
+_TOLERANCE_S = 1e-9
+_MARGIN_M = 0.25  # the side takes the water's motion out over 0.2 m
+
+
+class _Water:
+    """The box as `TargetProbes` looks at it: what is more than in the same box without a vehicle, None if at rest."""
+
+    def __init__(self, water: LiveBox, alone: LiveBox | None) -> None:
+        self._water, self._alone = water, alone
+        self.steady = alone is None
+
+    def velocity(self, points_W_m: Array) -> Array:
+        return self._water.velocity(points_W_m)
+
+    def ambient_velocity(self, points_W_m: Array) -> Array:
+        return np.zeros(np.shape(points_W_m)) if self._alone is None else self._alone.velocity(points_W_m)
+
+    def excess_velocity(self, points_W_m: Array) -> Array:
+        return self.velocity(points_W_m) - self.ambient_velocity(points_W_m)
+
+
+class LatticeWater:
+    """A `Plant` and its own `Witness`: vehicle and sensors of the tank in the lattice's water.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        True parameters.
+    target : Target
+        Standing on the bed; it is rigid here.
+    settings : TankSettings
+    start : BodyState
+    rng : numpy Generator
+        Its children serve sensors, probes and the disks' loads.
+    half_size_m : float
+        The box reaches this far to each side of the target.
+    cell_m : float
+    tilt_rad : float
+        Where the joint of the camera, if it has one, stands at the start.
+
+    Raises
+    ------
+    InputError
+        If the settings ask for water that this is not, or the vehicle starts outside the box.
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        target: Target,
+        settings: TankSettings,
+        start: BodyState,
+        rng: np.random.Generator,
+        half_size_m: float,
+        cell_m: float = CELL_M,
+        tilt_rad: float = 0.0,
+    ) -> None:
+        _check(settings)
+        sensor_rng, probe_rng, self._load_rng = rng.spawn(3)
+        self.settings, self.target = settings, target
+        density, current = settings.density_kg_m3, np.array(settings.current.velocity_m_s)
+        ambient = AmbientSum(parts=(SteadyCurrent(velocity_W_m_s=current),) if current.any() else ())
+        self._plant = VehiclePlant(
+            vehicle,
+            start,
+            density_kg_m3=density,
+            ambient=ambient,
+            size_m=settings.size_m,
+            target_W_m=target.mesh.vertices_m,
+        )
+        depth = settings.size_m[2]
+        across = 2 * math.ceil(half_size_m / cell_m)
+        cells = (across, across, round(depth / cell_m))
+        low = np.array([*(target.centre_W_m[:2] - 0.5 * across * cell_m), depth - cells[2] * cell_m])
+        exit_m_s = math.sqrt(STRONGEST_N / (density * float(vehicle.disk_areas_m2.min())))
+        diameter = math.sqrt(4.0 * float(vehicle.disk_areas_m2.mean()) / math.pi)
+        self._box = LiveBox(
+            low,
+            cells,
+            cell_m,
+            fastest_m_s=exit_m_s,
+            jet_m=diameter,
+            current_W_m_s=current,
+            solid=solid_cells(target, low, cells, cell_m),
+            density_kg_m3=density,
+        )
+        # An open disk of twice the exit's area sends out the ducted jet (see `lattice.cases`).
+        self._disks_m = np.stack([disk_points(_DISK_POINTS, math.sqrt(2.0) * d) for d in _diameters(vehicle)])
+        self._loads = self._load_rng.standard_normal((len(vehicle.thrusters), _DISK_POINTS, 3))
+        self._hull_B_m = _hull_points(vehicle)
+        self._sensors = Sensors(settings.sensors, sensor_rng)
+        self._joint = CameraJoint(vehicle.tilt, tilt_rad, settings.sensors, sensor_rng.spawn(1)[0])
+        self._probes = TargetProbes(target, probe_rng)
+        self._laws = SiltLaws.of(
+            settings.silt.grain_m, settings.silt.grain_density_kg_m3, density, settings.silt.erosion_kg_m2_s
+        )
+        self._time = 0.0
+        speed = float(np.linalg.norm(current))
+        nothing = np.zeros((0, 3))
+        spin_up_s = min(SPIN_UP_M / speed, SPIN_UP_S) if speed > 0.0 else 0.0
+        for _ in range(round(spin_up_s / self._box.step_s)):
+            self._box.advance(nothing, nothing)
+        self._began_s = self._box.time_s
+        self._alone = self._box.copy() if speed > 0.0 else None
+        self._water = _Water(self._box, self._alone)
+
+    @property
+    def state(self) -> BodyState:
+        """True pose and twist."""
+        return self._plant.state
+
+    @property
+    def box(self) -> LiveBox:
+        """The water."""
+        return self._box
+
+    def step(self, thrusts_N: Array, dt_s: float) -> tuple[Measurement, ...]:
+        """Hold commanded thrusts, shape (n,), for dt_s; return what the sensors handed over."""
+        end = self._time + dt_s
+        while end - self._time > _TOLERANCE_S:
+            stop = min(self._time + PLANT_STEP_S, end, self._sensors.next_due_s())
+            self._plant.step(thrusts_N, max(stop - self._time, 0.0))
+            self._time = max(stop, self._time)
+            if self._sensors.next_due_s() - self._time < _TOLERANCE_S:
+                self._sensors.sample(self._time, self._plant.vector, self._plant.force_B_m_s2)
+        nothing = np.zeros((0, 3))
+        while self._box.time_s - self._began_s < self._time - 0.5 * self._box.step_s:
+            self._box.advance(*self._pushes())
+            if self._alone is not None:
+                self._alone.advance(nothing, nothing)
+        return self._sensors.collect(self._time) + self._joint.turn(self._time, dt_s)
+
+    def push(self, wrench_B: Array) -> None:
+        """A wrench from outside the water that acts until the next call; see `wakewise.core.interfaces.Plant`."""
+        self._plant.push_B = np.array(wrench_B, dtype=np.float64)
+
+    def aim(self, tilt_rad: float) -> None:
+        """Wish an angle of the camera's joint; a fixed camera does not mind."""
+        self._joint.aim(tilt_rad)
+
+    def _pushes(self) -> tuple[Array, Array]:
+        """Where the vehicle pushes the water now, and with what, both shape (k, 3)."""
+        plant, vehicle = self._plant, self._plant.vehicle
+        origins, axes = plant.disks()
+        if not self._box.holds(origins):
+            where = ", ".join(f"{v:.2f}" for v in plant.state.X_WB.p_m)
+            raise InputError(f"flow lattice: the vehicle at ({where}) m has left the box of water about the target")
+        thrusts = plant.thrusts_N
+        exit_m_s = np.sqrt(np.abs(thrusts) / (self.settings.density_kg_m3 * vehicle.disk_areas_m2)) + 1e-6
+        keep = np.exp(-self._box.step_s * exit_m_s / (_LOAD_LIFE * _diameters(vehicle)))[:, None, None]
+        noise = self._load_rng.standard_normal(self._loads.shape)
+        self._loads = keep * self._loads + np.sqrt(1.0 - keep**2) * noise
+        uneven = _UNSTEADINESS * (self._loads - self._loads.mean(axis=1, keepdims=True))
+        sides = _across(axes)
+        points = origins[:, None] + np.einsum("tpk,tkx->tpx", self._disks_m, sides)
+        each = (thrusts / _DISK_POINTS)[:, None, None]
+        forces = -each * axes[:, None] + np.abs(each) * uneven
+        X_WB = plant.state.X_WB
+        hull = X_WB.apply(self._hull_B_m)
+        given = np.broadcast_to(plant.drag()[1] / len(hull), hull.shape)
+        return np.concatenate([points.reshape(-1, 3), hull]), np.concatenate([forces.reshape(-1, 3), given])
+
+    def observe(self) -> Truth:
+        """Vehicle, thrusters and collisions now."""
+        plant, thrusts = self._plant, self._plant.thrusts_N
+        power = electrical_power_W(
+            thrusts, plant.vehicle.disk_areas_m2, water_density_kg_m3=self.settings.density_kg_m3
+        )
+        return Truth(
+            state=plant.state,
+            thrusts_N=thrusts,
+            power_W=float(power.sum()),
+            collision=bool(plant.contact),
+            tilt_rad=self._joint.tilt_rad,
+        )
+
+    def water(self) -> WaterTruth:
+        """Water at the target now."""
+        camera = (self._plant.state.X_WB @ self._plant.vehicle.X_BC_at(self._joint.tilt_rad)).p_m
+        return self._probes.measure(self._water, self._laws, None, camera, self.settings.density_kg_m3)
+
+    def excess_velocity(self, points_W_m: Array) -> Array:
+        """Velocity less that of the same water without a vehicle, both shape (n, 3), now."""
+        return self._water.excess_velocity(points_W_m)
+
+    def silt(self) -> ScalarGrid:
+        """None: the water is clear."""
+        return ScalarGrid(origin_W_m=np.zeros(3), spacing_m=1.0, values=np.zeros((1, 1, 1)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LatticeWorld:
+    """`LatticeWater` that begins alike each time; implements `wakewise.core.interfaces.World`.
+
+    Parameters as of `LatticeWater`; `draw` gives a fresh generator of the same seed at each call.
+    """
+
+    vehicle: Vehicle
+    target: Target
+    settings: TankSettings
+    start: BodyState
+    half_size_m: float
+    draw: Callable[[], np.random.Generator]
+    cell_m: float = CELL_M
+    tilt_rad: float = 0.0
+    name: str = "lattice"
+
+    def begin(self) -> tuple[Plant, Witness | None]:
+        """Fresh water at its start, which is plant and witness in one."""
+        water = LatticeWater(
+            self.vehicle,
+            self.target,
+            self.settings,
+            self.start,
+            self.draw(),
+            self.half_size_m,
+            self.cell_m,
+            self.tilt_rad,
+        )
+        return water, water
+
+
+def box_half_size_m(places_W_m: Array, centre_W_m: Array, vehicle: Vehicle) -> float:
+    """How far a box about a target must reach so that the vehicle stays in it at all places, shape (n, 3)."""
+    away = np.abs(places_W_m[:, :2] - centre_W_m[:2]).max()
+    return float(away) + 0.5 * float(np.linalg.norm(vehicle.size_m)) + _MARGIN_M
+
+
+def solid_cells(target: Target, low_W_m: Array, cells: tuple[int, int, int], cell_m: float) -> BoolArray:
+    """Cells of a box that a target fills: those that its surface passes near the middle of, and those within."""
+    from scipy.ndimage import binary_fill_holes
+
+    from wakewise.scene.targets.distance import MeshDistance
+
+    solid = np.zeros(cells, dtype=np.bool_)
+    lowest, highest = target.mesh.vertices_m.min(axis=0), target.mesh.vertices_m.max(axis=0)
+    first = np.maximum(np.floor((lowest - low_W_m) / cell_m).astype(int) - 1, 0)
+    last = np.minimum(np.ceil((highest - low_W_m) / cell_m).astype(int) + 1, cells)
+    axes = [low_W_m[k] + (np.arange(first[k], last[k]) + 0.5) * cell_m for k in range(3)]
+    middles = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    near = MeshDistance(target.mesh.vertices_m, target.mesh.faces)(middles.reshape(-1, 3)) < 0.5 * cell_m
+    body = near.reshape(middles.shape[:3])
+    # What stands on the bed is closed by it.
+    closed = np.concatenate([body, np.ones((*body.shape[:2], 1), dtype=np.bool_)], axis=2)
+    solid[first[0] : last[0], first[1] : last[1], first[2] : last[2]] = binary_fill_holes(closed)[:, :, :-1]
+    return solid
+
+
+def _diameters(vehicle: Vehicle) -> Array:
+    found: Array = np.sqrt(4.0 * vehicle.disk_areas_m2 / math.pi)
+    return found
+
+
+def _hull_points(vehicle: Vehicle) -> Array:
+    """Points evenly over the hull's box, shape (k, 3), in the body frame."""
+    axes = []
+    for size in vehicle.size_m:
+        count = max(round(size / _HULL_SPACING), 1)
+        axes.append(((np.arange(count) + 0.5) / count - 0.5) * size)
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def _across(axes: Array) -> Array:
+    """Two directions across each axis, shape (n, 2, 3), from unit vectors, shape (n, 3)."""
+    other = np.where(np.abs(axes[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    one = np.cross(axes, other)
+    one /= np.linalg.norm(one, axis=1, keepdims=True)
+    return np.stack([one, np.cross(axes, one)], axis=1)
+
+
+def _check(settings: TankSettings) -> None:
+    """Refuse what this water does not have; silt and turbulence are left out, which the trial's figures show."""
+    for wrong, words in (
+        (settings.waves.amplitude_m > 0.0, "tank.waves.amplitude_m: the lattice has no waves"),
+        (settings.pump.speed_m_s > 0.0, "tank.pump.speed_m_s: the lattice has no pump"),
+        (settings.current.file is not None, "tank.current.file: the lattice has a steady current only"),
+        (settings.tether.diameter_m > 0.0, "tank.tether.diameter_m: the lattice has no cable"),
+        (bool(settings.failures), "tank.failures: thrusters do not fail in the lattice"),
+    ):
+        if wrong:
+            raise InputError(f"{words}; take flow tank, or leave it out")

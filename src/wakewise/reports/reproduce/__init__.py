@@ -1,9 +1,0 @@
-"""The paper's tables beside ours: one page with pictures (`page.py`), or Markdown and small plots (`results.py`).
-
-`words.py` says in both what was found, `plots.py` redraws the paper's figures from our data.
-"""
-
-from wakewise.reports.reproduce.page import write_pages
-from wakewise.reports.reproduce.results import write_results
-
-__all__ = ["write_pages", "write_results"]

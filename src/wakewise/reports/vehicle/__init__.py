@@ -1,9 +1,0 @@
-"""Drawings and the one-file page of a vehicle, and of a thruster's curve."""
-
-from wakewise.reports.vehicle.drawing import drawing_svg
-from wakewise.reports.vehicle.page import vehicle_page
-
-__all__ = [
-    "drawing_svg",
-    "vehicle_page",
-]

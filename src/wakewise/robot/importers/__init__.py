@@ -1,0 +1,26 @@
+"""Vehicles from other projects' files: URDF and xacro, SDF, Stonefish, allocation matrices.
+
+Nothing of a file is executed, and nothing outside what it names is read. What could not be found is missing and said,
+never guessed.
+
+Start reading in `read.py` (`import_vehicle`: which reader takes a file) and `find.py` (a vehicle by library name, by
+path, by format). Readers: `urdf.py`, `sdf.py`, `stonefish.py` with `stonefish_thrusters.py`, `matrices.py` and
+`yamls.py` with `yaml_parameters.py`; formats from outside are found through the entry points
+`wakewise.vehicle_formats`. Their helpers: `layouts.py` and `thruster_lists.py` (thrusters in lists, with
+`angles.py`), `wrench_rows.py` (what the rows of a matrix are), `names.py` (what thrusters' names say), `unread.py`
+(keys that no reader took) and `plausible.py` (what any vehicle must fulfil), `xacro*.py`, `expressions.py` and
+`scopes.py` expand macros, `xml.py` and `packages.py` find files, `bodies.py`, `plugins.py` with `thruster_forms.py`,
+`water.py`, `outline.py` and `found.py` put a vehicle together, `stated_matrix.py` reads the matrix that a file
+states, to be held against its geometry.
+"""
+
+from wakewise.robot.importers.find import any_vehicle, compare_with, find_vehicle
+from wakewise.robot.importers.read import import_vehicle, read_matrix
+
+__all__ = [
+    "any_vehicle",
+    "compare_with",
+    "find_vehicle",
+    "import_vehicle",
+    "read_matrix",
+]

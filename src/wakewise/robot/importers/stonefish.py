@@ -1,0 +1,292 @@
+"""Stonefish scenarios (`.scn`): the robot with the most thrusters; axes are FRD, thrust goes along +x of a thruster."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose
+from wakewise.robot.importers.bodies import Bodies, Joint, Link, checked_mass, read_mass
+from wakewise.robot.importers.expressions import evaluate
+from wakewise.robot.importers.found import Found
+from wakewise.robot.importers.packages import Folders
+from wakewise.robot.importers.stonefish_thrusters import count, read_thrusters
+from wakewise.robot.importers.urdf import origin
+from wakewise.robot.importers.xml import Element, Place, PlacedError, number, numbers, parse_xml, read_text
+
+MAX_INCLUDES = 60
+_DEEPEST = 8
+_SUBSTITUTION = re.compile(r"\$\((arg|find|param)\s+([^)\s]+)\s*\)")
+_EXPRESSION = re.compile(r"\$\{([^}]*)\}")
+_CENTRED = frozenset({"box", "cylinder", "sphere", "torus"})
+"""Shapes whose centre of mass is their origin."""
+_SMALL = 0.02
+"""Share of the mass whose centre or inertia may be unknown."""
+
+
+class Scenario:
+    """Reads a scenario and its includes; what is not there is left out with a note: scenery is often elsewhere."""
+
+    def __init__(self, folders: Folders, arguments: Mapping[str, str], notes: list[str]) -> None:
+        self.folders = folders
+        self.arguments = dict(arguments)
+        self.notes = notes
+        self.includes = 0
+
+    def robots(self, root: Element, arguments: Mapping[str, str], depth: int = 0) -> list[Element]:
+        """All robots of a scenario element, arguments put in."""
+        found: list[Element] = []
+        if depth > 8:
+            raise PlacedError(f"{root.place}: includes within one another more than 8 deep")
+        for element in root.children:
+            if element.tag == "robot":
+                found.append(self._filled(element, arguments))
+            elif element.tag == "include":
+                found += self._included(element, arguments, depth)
+        return found
+
+    def _included(self, element: Element, arguments: Mapping[str, str], depth: int) -> list[Element]:
+        self.includes += 1
+        if self.includes > MAX_INCLUDES:
+            raise PlacedError(f"{element.place}: more than {MAX_INCLUDES} includes")
+        name = self._text(element.attributes.get("file", ""), arguments)
+        unknown = _SUBSTITUTION.search(name)
+        if unknown is not None:
+            self.notes.append(f"include left out: {unknown[0]} has no value; give --arg {unknown[2]}:=VALUE")
+            return []
+        try:
+            path = self.folders.locate(name, element.place.file.parent, element.place)
+        except PlacedError as fault:
+            if "climbs out" in str(fault):
+                raise
+            self.notes.append(f"include left out: {fault}")
+            return []
+        if not path.is_file():
+            self.notes.append(
+                f"include left out, not found: {name[:80]} ({element.place.file.name}:{element.place.line})"
+            )
+            return []
+        inner = {
+            arg.attributes.get("name", ""): self._text(arg.attributes.get("value", ""), arguments)
+            for arg in element.all("arg")
+        }
+        root = parse_xml(read_text(path), path)
+        return self.robots(root, {**inner, **self.arguments}, depth + 1)
+
+    def _filled(self, element: Element, arguments: Mapping[str, str]) -> Element:
+        attributes = {k: self._text(v, arguments) for k, v in element.attributes.items()}
+        children = [self._filled(child, arguments) for child in element.children]
+        return Element(element.tag, attributes, element.place, children, self._text(element.text, arguments))
+
+    def _text(self, text: str, arguments: Mapping[str, str]) -> str:
+        def put(match: re.Match[str]) -> str:
+            word, name = match[1], match[2]
+            if word == "find":
+                folder = self.folders.package(name)
+                return f"package://{name}" if folder is None else str(folder)
+            value = arguments.get(name, self.arguments.get(name))
+            # What has no value stays as it is: it matters only where it is needed.
+            return match[0] if value is None else value
+
+        return _EXPRESSION.sub(_evaluated, _SUBSTITUTION.sub(put, text))
+
+
+def _evaluated(match: re.Match[str]) -> str:
+    def nothing(name: str) -> str:
+        raise KeyError(name)
+
+    try:
+        return str(evaluate(match[1], nothing))
+    except InputError:
+        return match[0]
+
+
+def read_stonefish(
+    root: Element, folders: Folders, arguments: Mapping[str, str], macros: list[str], found: Found
+) -> None:
+    """Fill in what a scenario says about its robot; `macros` are those of xacro that the file defines.
+
+    Raises
+    ------
+    InputError
+        If there is no robot, or a number is not one.
+    """
+    scenario = Scenario(folders, arguments, found.notes)
+    whole = Element("scenario", {}, root.place, [root]) if root.tag == "robot" else root
+    robots = scenario.robots(whole, dict(arguments))
+    if not robots:
+        why = next((note for note in found.notes if note.startswith("include left out")), "")
+        if macros:
+            why = f"it defines the macros {', '.join(macros)[:120]} and calls none with one; import the file that does"
+        raise PlacedError(f"{root.place}: scenario holds no robot" + (f" ({why})" if why else ""))
+    robot = max(robots, key=count)
+    if len(robots) > 1:
+        found.notes.append(f"robot {robot.attributes.get('name')}: taken out of {len(robots)} in the scenario")
+    found.name = robot.attributes.get("name", "") or found.name
+    weights: dict[str, _Weight] = {}
+    bodies = _bodies(robot, weights)
+    _mass(bodies, weights, found)
+    _hydrodynamics(robot, found)
+    read_thrusters(robot, bodies, _density(root), found)
+    _camera(robot, bodies, found)
+    if found.mass_kg is not None and found.inertia_kg_m2 is None:
+        found.notes.append("inertia: left to Stonefish, which computes it from meshes; not in the file")
+
+
+def _density(root: Element) -> float | None:
+    """Density of the scenario's water, kg/m^3."""
+    water = next((e for e in root.walk() if e.tag == "water" and "density" in e.attributes), None)
+    return None if water is None else number(water.attributes["density"], water.place, "density of the water")
+
+
+def _bodies(robot: Element, weights: dict[str, _Weight]) -> Bodies:
+    base_element = robot.first("base_link")
+    elements = [e for e in robot.children if e.tag in {"base_link", "link"}]
+    if not elements:
+        raise PlacedError(f"{robot.place}: robot holds no link")
+    base = (base_element or elements[0]).attributes.get("name", "base_link")
+    links: dict[str, Link] = {}
+    for i, element in enumerate(elements):
+        name = element.attributes.get("name", f"link{i}")
+        links[name] = Link(element.attributes.get("name", ""), element.place)
+        weights[name] = _weight(element, name)
+    steps: dict[str, tuple[str, Pose]] = {}
+    joints: dict[str, Joint] = {}
+    for i, joint in enumerate(robot.all("joint")):
+        ends = joint.first("parent"), joint.first("child")
+        if ends[0] is None or ends[1] is None:
+            continue
+        parent, child = (end.attributes.get("name", "") for end in ends if end is not None)
+        steps[child] = (parent, origin(joint.first("origin")))
+        name, kind = joint.attributes.get("name", f"joint{i}"), joint.attributes.get("type", "")
+        joints[name] = Joint(name, kind, child, Pose(np.zeros(3)), None, joint.place, parent)
+    for name, link in links.items():
+        X, here = Pose(np.zeros(3)), name
+        for _ in range(len(links)):
+            if here == base or here not in steps:
+                break
+            here, step = steps[here]
+            X = step @ X
+        link.X_BL = X
+    return Bodies(robot.attributes.get("name", "robot"), base, links, joints, [], [])
+
+
+@dataclass(eq=False)
+class _Weight:
+    """What a body or a part of it weighs, in its own frame; None where Stonefish computes it from shape and material.
+
+    `open_kg` is the part of the mass whose centre is not known, `spread_kg` that whose inertia is not, and `unstated`
+    names the parts that state no mass.
+    """
+
+    place: Place
+    mass_kg: float = 0.0
+    centre_m: Array = field(default_factory=lambda: np.zeros(3))
+    inertia_kg_m2: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    open_kg: float = 0.0
+    spread_kg: float = 0.0
+    unstated: list[str] = field(default_factory=list)
+
+
+def _weight(element: Element, name: str, depth: int = 0) -> _Weight:
+    """Weight of one solid; a compound is the sum of its parts, each at its transform, and has no mass of its own."""
+    if element.attributes.get("type") == "compound" and depth < _DEEPEST:
+        return _compound(element, name, depth)
+    mass, inertia, centre = element.first("mass"), element.first("inertia"), element.first("cg")
+    weight = _Weight(element.place if mass is None else mass.place)
+    value = 0.0 if mass is None else checked_mass(mass.attributes.get("value"), mass.place, name)
+    if value == 0.0:
+        weight.unstated.append(name)
+        return weight
+    weight.mass_kg = value
+    if centre is None and element.attributes.get("type") not in _CENTRED:
+        weight.open_kg = value
+    at = origin(element.first("origin") if centre is None and weight.open_kg == 0.0 else centre)
+    weight.centre_m = at.p_m
+    if inertia is not None and "xyz" in inertia.attributes:
+        moments = numbers(inertia.attributes["xyz"], inertia.place, "inertia", 3)
+        weight.inertia_kg_m2 = at.R @ np.diag(moments) @ at.R.T
+    else:
+        weight.spread_kg = value
+    return weight
+
+
+def _compound(element: Element, name: str, depth: int) -> _Weight:
+    whole = _Weight(element.place)
+    parts: list[tuple[_Weight, Pose]] = []
+    for i, part in enumerate(e for e in element.children if e.tag in {"external_part", "internal_part"}):
+        one = _weight(part, f"{name}/{part.attributes.get('name', f'part{i}')}", depth + 1)
+        parts.append((one, origin(part.first("compound_transform"))))
+        whole.mass_kg += one.mass_kg
+        whole.open_kg += one.open_kg
+        whole.spread_kg += one.spread_kg
+        whole.unstated += one.unstated
+    if not parts:
+        whole.unstated.append(name)
+    if whole.mass_kg > 0.0:
+        whole.centre_m = sum((w.mass_kg * X.apply(w.centre_m) for w, X in parts), np.zeros(3)) / whole.mass_kg
+    for w, X in parts:
+        arm = X.apply(w.centre_m) - whole.centre_m
+        whole.inertia_kg_m2 += X.R @ w.inertia_kg_m2 @ X.R.T
+        whole.inertia_kg_m2 += w.mass_kg * (float(arm @ arm) * np.eye(3) - np.outer(arm, arm))
+    return whole
+
+
+def _mass(bodies: Bodies, weights: dict[str, _Weight], found: Found) -> None:
+    """Mass of all links, if all state one: what Stonefish computes from meshes is not guessed from what is stated."""
+    unstated = [part for weight in weights.values() for part in weight.unstated]
+    total = sum(weight.mass_kg for weight in weights.values())
+    if unstated:
+        stated = f"; what is stated adds up to {total:.6g} kg, which is not the vehicle's" if total else ""
+        found.notes.append(
+            f"mass: {', '.join(unstated[:6])}{' ...' if len(unstated) > 6 else ''} states none, Stonefish computes it "
+            f"from volume and material{stated}"
+        )
+        return
+    for name, weight in weights.items():
+        link = bodies.links[name]
+        link.place, link.mass_kg, link.p_LG_m = weight.place, weight.mass_kg, weight.centre_m
+        if weight.spread_kg <= _SMALL * weight.mass_kg:
+            link.inertia_kg_m2 = weight.inertia_kg_m2
+    read_mass(bodies, found)
+    unknown = sum(weight.open_kg for weight in weights.values())
+    if unknown > _SMALL * total and found.p_G_m is not None:
+        found.p_G_m = found.inertia_kg_m2 = None
+        found.derived.pop("inertia", None)
+        found.notes.append(
+            f"centre of gravity: {unknown:.6g} kg of {total:.6g} kg state no cg, Stonefish computes it from meshes"
+        )
+
+
+def _hydrodynamics(robot: Element, found: Found) -> None:
+    base = robot.first("base_link")
+    if base is not None and base.first("hydrodynamics") is not None:
+        found.notes.append(
+            "hydrodynamics: viscous and quadratic drag of Stonefish are factors on forces from the mesh, "
+            "not coefficients of the whole vehicle, so they are not taken"
+        )
+    found.notes.append("added mass, damping and buoyancy: Stonefish computes them from meshes; not in the file")
+
+
+def _camera(robot: Element, bodies: Bodies, found: Found) -> None:
+    """First camera; Stonefish gives camera frames OpenCV axes, so the mount needs no turn."""
+    for sensor in robot.all("sensor"):
+        if "camera" in sensor.attributes.get("type", ""):
+            link_element = sensor.first("link")
+            link = bodies.link(link_element.attributes.get("name", "")) if link_element is not None else None
+            if link is None:
+                continue
+            found.X_BC = link.X_BL @ origin(sensor.first("origin"))
+            specs = sensor.first("specs")
+            if specs is not None and "horizontal_fov" in specs.attributes:
+                degrees = number(specs.attributes["horizontal_fov"], specs.place, "horizontal_fov")
+                found.camera_fov_rad = math.radians(degrees)
+            found.notes.append(f"camera: {sensor.attributes.get('name', 'camera')}")
+            found.derived["camera_mount"] = f"{found.kind} {found.file.name}: sensor"
+            return

@@ -1,0 +1,160 @@
+"""Text in a xacro document: `${...}` and `$(...)` replaced by values, within limits on depth and length."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import yaml
+
+from wakewise.core.errors import InputError
+from wakewise.robot.importers.expressions import MAX_TEXT, evaluate
+from wakewise.robot.importers.packages import Folders
+from wakewise.robot.importers.scopes import Scope, literal
+from wakewise.robot.importers.xml import Place, PlacedError, read_text
+
+MAX_CALLS = 60
+"""Macros, includes and properties within one another."""
+MAX_TOTAL_TEXT = 20_000_000
+
+_PIECES = re.compile(r"\$\$+(?=[{(])|\$\{(?:[^{}]|\{[^{}]*\})*\}|\$\([^)]*\)|\$|[^$]+", re.DOTALL)
+
+
+class Texts:
+    """Puts values into the text of one document, and counts how deep and how long that gets.
+
+    Parameters
+    ----------
+    folders : Folders
+        Finds packages, and keeps `load_yaml` inside.
+    arguments : mapping of str to str
+        Values of `$(arg NAME)`; the document adds its defaults.
+    """
+
+    def __init__(self, folders: Folders, arguments: Mapping[str, str]) -> None:
+        self.folders = folders
+        self.arguments: dict[str, str] = dict(arguments)
+        self._depth = 0
+        self._length = 0
+
+    @contextmanager
+    def deeper(self, place: Place) -> Iterator[None]:
+        """Count one more level while the block runs.
+
+        Raises
+        ------
+        InputError
+            Beyond `MAX_CALLS` levels.
+        """
+        if self._depth >= MAX_CALLS:
+            raise PlacedError(f"{place}: macros, includes and properties within one another more than {MAX_CALLS} deep")
+        self._depth += 1
+        try:
+            yield
+        finally:
+            self._depth -= 1
+
+    def string(self, text: str, scope: Scope, place: Place) -> str:
+        """Text with its values put in."""
+        return text if "$" not in text else _as_text(self.value(text, scope, place))
+
+    def value(self, text: str, scope: Scope, place: Place) -> Any:
+        """Value of a text with `${...}` and `$(...)` in it; a lone `${...}` keeps its type."""
+        if "$" not in text:
+            return text
+        parts: list[Any] = []
+        for piece in _PIECES.findall(text):
+            if piece.startswith("$$"):
+                parts.append(piece[1:])
+            elif piece.startswith("${"):
+                parts.append(self._expression(piece[2:-1], scope, place))
+            elif piece.startswith("$("):
+                parts.append(self._substitution(piece[2:-1], scope, place))
+            else:
+                parts.append(piece)
+        if len(parts) == 1:
+            return parts[0]
+        joined = "".join(_as_text(part) for part in parts)
+        self._length += len(joined)
+        if len(joined) > MAX_TEXT + len(text) or self._length > MAX_TOTAL_TEXT:
+            raise PlacedError(f"{place}: expands to more text than is read")
+        return joined
+
+    def _expression(self, text: str, scope: Scope, place: Place) -> Any:
+        if "$(" in text:
+            text = self.string(text, scope, place)
+        functions = {
+            "load_yaml": lambda name: self._load_yaml(name, place),
+            "arg": lambda name: literal(self._named_argument(name, place)),
+        }
+        with self.deeper(place):
+            try:
+                return evaluate(text, lambda name: self.lookup(name, scope), functions)
+            except PlacedError:
+                raise
+            except InputError as fault:
+                raise PlacedError(f"{place}: {fault}") from fault
+
+    def lookup(self, name: str, scope: Scope) -> Any:
+        """Value of a property; its text is evaluated on first use. Raises KeyError if there is none."""
+        owner = scope.owner(name)
+        if owner is None:
+            raise KeyError(name)
+        if name in owner.values:
+            return owner.values[name]
+        raw, where = owner.raws[name]
+        if name in owner.pending:
+            raise InputError(f"property {name} refers to itself")
+        owner.pending.add(name)
+        try:
+            value = literal(self.value(raw, owner, where))
+        except KeyError as fault:
+            raise PlacedError(f"{where}: {fault.args[0]} is not defined") from fault
+        finally:
+            owner.pending.discard(name)
+        owner.values[name] = value
+        return value
+
+    def _substitution(self, text: str, scope: Scope, place: Place) -> Any:
+        word, _, rest = text.strip().partition(" ")
+        rest = self.string(rest.strip(), scope, place)
+        match word:
+            case "arg":
+                return self._named_argument(rest, place)
+            case "find" | "find-pkg-share":
+                folder = self.folders.package(rest)
+                return f"package://{rest}" if folder is None else str(folder)
+            case "dirname" | "cwd":
+                return str(place.file.parent)
+            case "env":
+                # The environment is nobody's vehicle: the text stays as it is, and opens no file.
+                return f"$(env {rest})"
+            case "optenv":
+                return rest.partition(" ")[2].strip()
+            case "eval":
+                return self._expression(rest, scope, place)
+            case _:
+                raise PlacedError(f"{place}: $({text[:40]}) is not read; arg, find, dirname, optenv and eval are")
+
+    def _named_argument(self, name: str, place: Place) -> str:
+        if name not in self.arguments:
+            raise PlacedError(f"{place}: argument {name} has no value; give --arg {name}:=VALUE")
+        return self.arguments[name]
+
+    def _load_yaml(self, name: str, place: Place) -> Any:
+        path = self.folders.locate(name, place.file.parent, place)
+        try:
+            return yaml.safe_load(read_text(path))
+        except (yaml.YAMLError, ValueError, RecursionError) as fault:
+            raise PlacedError(f"{path}: not readable YAML ({type(fault).__name__})") from fault
+
+
+def _as_text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    text = str(value)
+    if len(text) > MAX_TEXT * 10:
+        raise InputError("a text too long")
+    return text

@@ -1,0 +1,237 @@
+"""What one thruster makes of a pulse at a supply voltage: thrust, speed, power, and the pulse for a wish."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.errors import InputError
+
+NEUTRAL_US = 1500.0
+"""The stick's middle by the convention of radio-control speed controllers; taken where the table is silent there."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CurveSide:
+    """One direction of a thruster at v voltages, on k knots that sit at the same share of the way at every voltage.
+
+    Share 0 is the slowest running pulse, share 1 the outermost pulse of the table. Sharing them lets two voltages be
+    mixed although they start to run at different pulses: mixing at equal pulses would smear the start.
+
+    Parameters
+    ----------
+    share : ndarray, shape (k,)
+        From 0 to 1, increasing.
+    silent_us, first_us, last_us : ndarray, shape (v,)
+        Outermost pulse without thrust, the slowest running pulse and the outermost pulse of the table.
+    thrust_N : ndarray, shape (v, k)
+        Magnitudes, never falling along k.
+    rpm, power_W : ndarray, shape (v, k), or None
+        Magnitudes; None if the table has none.
+    """
+
+    share: Array
+    silent_us: Array
+    first_us: Array
+    last_us: Array
+    thrust_N: Array
+    rpm: Array | None = None
+    power_W: Array | None = None
+
+    def __post_init__(self) -> None:
+        freeze(self, share=(None,), silent_us=(None,))
+        voltages, knots = self.silent_us.size, self.share.size
+        freeze(self, first_us=(voltages,), last_us=(voltages,), thrust_N=(voltages, knots))
+        for field in ("rpm", "power_W"):
+            if getattr(self, field) is not None:
+                freeze(self, **{field: (voltages, knots)})
+        if knots < 2 or self.share[0] != 0.0 or self.share[-1] != 1.0 or not np.all(np.diff(self.share) > 0.0):
+            raise InputError("thrust curve: shares must increase from 0 to 1, at least two of them")
+        if np.any(self.thrust_N < 0.0) or np.any(np.diff(self.thrust_N, axis=1) < 0.0):
+            raise InputError("thrust curve: thrust must be a magnitude that never falls away from neutral")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ThrustCurve:
+    """A thruster's static map at one or several supply voltages, straight between knots and between voltages.
+
+    Thrust is positive forward; a pulse is the servo pulse in microseconds. Every method takes arrays of any shape, and
+    one supply voltage, which may be left out where the table has only one. A pulse beyond the table counts as its
+    outermost pulse and a thrust beyond the limits as the limit: that is how a thruster saturates.
+
+    Between `silent_us` and `first_us` (4 us apart in a fine table) the thruster is taken to run at its slowest. A
+    wished thrust below the first one that can be held is rounded to none or to that first step, whichever is nearer.
+
+    Parameters
+    ----------
+    name, source : str
+    supply_V : ndarray, shape (v,)
+        Increasing.
+    neutral_us : float
+        The pulse that is sent for no thrust.
+    forward, reverse : CurveSide
+    notes : tuple of str
+        What was found and done when the table was read, one sentence each.
+
+    Raises
+    ------
+    InputError
+        From every method: if a pulse or thrust is not finite, or the voltage lies outside the table.
+    """
+
+    name: str
+    source: str
+    supply_V: Array
+    neutral_us: float
+    forward: CurveSide
+    reverse: CurveSide
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        freeze(self, supply_V=(None,))
+        if self.supply_V.size == 0 or not np.all(np.diff(self.supply_V) > 0.0) or self.supply_V[0] <= 0.0:
+            raise InputError(f"thrust curve {self.name}: voltages must be positive and increase")
+        for side in (self.forward, self.reverse):
+            if side.silent_us.size != self.supply_V.size:
+                raise InputError(f"thrust curve {self.name}: needs as many rows as voltages")
+
+    def thrust_N(self, pwm_us: ArrayLike, supply_V: float | None = None) -> Array:
+        """Thrust at pulses of any shape; zero in the deadband."""
+        pulse = _finite(pwm_us, "pulse")
+        mix = self._mix(supply_V)
+        thrust = np.zeros_like(pulse)
+        for sign, side in self._sides():
+            silent, first, last = mix(side.silent_us), mix(side.first_us), mix(side.last_us)
+            running = sign * (pulse - silent) > 0.0
+            share = (pulse - first) / (last - first)
+            # `interp` holds its ends: the slowest running thrust below share 0, saturation above 1.
+            thrust = np.where(running, sign * np.interp(share, side.share, mix(side.thrust_N)), thrust)
+        return thrust
+
+    def pwm_us(self, thrust_N: ArrayLike, supply_V: float | None = None) -> Array:
+        """Pulse for wished thrusts of any shape; where a thrust has several, the one nearest to neutral."""
+        return self._along(
+            thrust_N,
+            supply_V,
+            lambda _, side, share, mix: mix(side.first_us) + share * (mix(side.last_us) - mix(side.first_us)),
+            at_rest=self.neutral_us,
+        )
+
+    def delivered_N(self, thrust_N: ArrayLike, supply_V: float | None = None) -> Array:
+        """Thrust that a wished thrust turns into: limited, and rounded below the first step; any shape."""
+        return self._along(
+            thrust_N,
+            supply_V,
+            lambda sign, side, share, mix: sign * np.interp(share, side.share, mix(side.thrust_N)),
+            at_rest=0.0,
+        )
+
+    def rpm(self, thrust_N: ArrayLike, supply_V: float | None = None) -> Array:
+        """Rotor speed in revolutions per minute at delivered thrusts of any shape; negative in reverse."""
+        self._require("rpm", self.forward.rpm, self.reverse.rpm)
+        return self._along(
+            thrust_N,
+            supply_V,
+            lambda sign, side, share, mix: sign * np.interp(share, side.share, mix(side.rpm)),
+            at_rest=0.0,
+        )
+
+    def power_W(self, thrust_N: ArrayLike, supply_V: float | None = None) -> Array:
+        """Electrical power at delivered thrusts of any shape; none at rest, since tables leave standby out."""
+        self._require("power_W", self.forward.power_W, self.reverse.power_W)
+        return self._along(
+            thrust_N,
+            supply_V,
+            lambda _, side, share, mix: np.interp(share, side.share, mix(side.power_W)),
+            at_rest=0.0,
+        )
+
+    def limits_N(self, supply_V: float | None = None) -> tuple[float, float]:
+        """Lowest (negative) and highest thrust at a voltage."""
+        mix = self._mix(supply_V)
+        return -float(mix(self.reverse.thrust_N)[-1]), float(mix(self.forward.thrust_N)[-1])
+
+    def first_step_N(self, supply_V: float | None = None) -> tuple[float, float]:
+        """Smallest thrusts that can be held: reverse (negative) and forward."""
+        mix = self._mix(supply_V)
+        return -float(mix(self.reverse.thrust_N)[0]), float(mix(self.forward.thrust_N)[0])
+
+    def deadband_us(self, supply_V: float | None = None) -> tuple[float, float]:
+        """Outermost pulses that give no thrust, both included."""
+        mix = self._mix(supply_V)
+        return float(mix(self.reverse.silent_us)), float(mix(self.forward.silent_us))
+
+    def pulse_limits_us(self, supply_V: float | None = None) -> tuple[float, float]:
+        """Outermost pulses of the table."""
+        mix = self._mix(supply_V)
+        return float(mix(self.reverse.last_us)), float(mix(self.forward.last_us))
+
+    def voltage(self, supply_V: float | None = None) -> float:
+        """Check a supply voltage; left out, it is the table's only one."""
+        low, high = float(self.supply_V[0]), float(self.supply_V[-1])
+        if supply_V is None:
+            if low != high:
+                raise InputError(f"thrust curve {self.name}: which supply voltage? It holds {low:g} to {high:g} V")
+            return low
+        if not low <= supply_V <= high:
+            raise InputError(
+                f"thrust curve {self.name}: supply_V = {supply_V:g}, the table holds {low:g} to {high:g} V"
+            )
+        return float(supply_V)
+
+    def _sides(self) -> tuple[tuple[float, CurveSide], tuple[float, CurveSide]]:
+        return (1.0, self.forward), (-1.0, self.reverse)
+
+    def _mix(self, supply_V: float | None) -> Mix:
+        at = self.voltage(supply_V)
+        upper = min(max(int(np.searchsorted(self.supply_V, at)), 1), self.supply_V.size - 1)
+        if self.supply_V.size == 1:
+            return lambda rows: np.asarray(rows)[0]
+        below, above = float(self.supply_V[upper - 1]), float(self.supply_V[upper])
+        weight = (at - below) / (above - below)
+
+        def mix(rows: Array | None) -> Array:
+            values = np.asarray(rows)
+            return np.asarray((1.0 - weight) * values[upper - 1] + weight * values[upper])
+
+        return mix
+
+    def _along(self, thrust_N: ArrayLike, supply_V: float | None, value: Along, *, at_rest: float) -> Array:
+        """Read `value` off each side where the wished thrust lies on it."""
+        wished = _finite(thrust_N, "thrust")
+        mix = self._mix(supply_V)
+        result = np.full_like(wished, at_rest)
+        for sign, side in self._sides():
+            thrusts = mix(side.thrust_N)
+            target = np.clip(sign * wished, thrusts[0], thrusts[-1])
+            # Half the first step is where it is as near as nothing; a curve that starts at zero has no step.
+            runs = (sign * wished > 0.0) & (sign * wished >= 0.5 * thrusts[0]) & (thrusts[-1] > 0.0)
+            result = np.where(runs, value(sign, side, _shares(target, thrusts, side.share), mix), result)
+        return result
+
+    def _require(self, field: str, *tables: Array | None) -> None:
+        if any(table is None for table in tables):
+            raise InputError(f"thrust curve {self.name}: its table has no column {field}")
+
+
+Mix = Callable[[Array | None], Array]
+Along = Callable[[float, CurveSide, Array, Mix], Array]
+
+
+def _shares(target: Array, thrusts: Array, share: Array) -> Array:
+    """Share where a never-falling curve first reaches each target; on a flat `interp` would leave that open."""
+    above = np.clip(np.searchsorted(thrusts, target, side="left"), 1, thrusts.size - 1)
+    low, rise = thrusts[above - 1], thrusts[above] - thrusts[above - 1]
+    part = np.divide(target - low, rise, out=np.zeros_like(target), where=rise > 0.0)
+    return np.asarray(share[above - 1] + part * (share[above] - share[above - 1]))
+
+
+def _finite(value: ArrayLike, what: str) -> Array:
+    array = np.asarray(value, dtype=np.float64)
+    if not np.all(np.isfinite(array)):
+        raise InputError(f"thrust curve: {what} holds NaN or infinity, every element must be finite")
+    return array

@@ -1,0 +1,116 @@
+"""One thruster: where it sits, which way it pushes, how hard and how fast."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from wakewise.core.arrays import Array, frozen
+from wakewise.core.checks import finite_number, instance_of
+from wakewise.core.errors import InputError
+
+REACH_M = 10.0
+"""Furthest a thruster may sit from the body origin; beyond it a file most likely holds millimetres."""
+
+
+_ZERO_ALLOWED = frozenset({"max_forward_N", "max_reverse_N", "time_constant_s"})
+
+
+class Mounted(Protocol):
+    """Anything with a thruster's name, place and axis."""
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+
+    @property
+    def p_BT_m(self) -> Array:
+        """Centre of the disk, shape (3,)."""
+
+    @property
+    def axis_B(self) -> Array:
+        """Direction of the force, shape (3,)."""
+
+
+def mount(record: Mounted) -> None:
+    """Check and freeze place and axis of a frozen record, and give the axis unit length (call in `__post_init__`).
+
+    Raises
+    ------
+    InputError
+        If a number is not finite, the axis has no length, or the place is more than 10 m away.
+    """
+    where = f"thruster {instance_of(record.name, str, 'thruster: name')}"
+    place = frozen(record.p_BT_m, (3,), f"{where}: p_BT_m")
+    axis = frozen(record.axis_B, (3,), f"{where}: axis_B")
+    length = float(np.linalg.norm(axis))
+    if length < 1e-6:
+        raise InputError(f"{where}: axis {axis.tolist()} has length {length:g}, it must not be zero")
+    # A unit axis is kept to the last bit, so that a copy of a thruster is the same thruster.
+    if abs(length - 1.0) > 1e-14:
+        axis = frozen(axis / length, (3,), f"{where}: axis_B")
+    distance = float(np.linalg.norm(place))
+    if distance > REACH_M:
+        raise InputError(f"{where}: {distance:g} m from the body origin, at most {REACH_M:g} m (are these metres?)")
+    object.__setattr__(record, "p_BT_m", place)
+    object.__setattr__(record, "axis_B", axis)
+
+
+def require_limit(where: str, field: str, value: float) -> None:
+    """Refuse a limit, area, lag or gain of a thruster that is not finite or out of range."""
+    if field in _ZERO_ALLOWED:
+        finite_number(value, f"{where}: {field}", least=0.0)
+    else:
+        finite_number(value, f"{where}: {field}", above=0.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Thruster:
+    """Mounting and limits of one thruster T on body B.
+
+    A thrust T > 0 pushes the vehicle along `axis_B` and sends the jet along `-axis_B`; T < 0 does the opposite.
+
+    Parameters
+    ----------
+    name : str
+    p_BT_m : ndarray, shape (3,)
+        Centre of the disk from the origin of B, expressed in B.
+    axis_B : ndarray, shape (3,)
+        Direction of the force for positive thrust, normalised here.
+    max_forward_N, max_reverse_N : float
+        Largest thrust along `axis_B` and against it, both as magnitudes.
+    disk_area_m2 : float
+        Area that the propeller sweeps.
+    time_constant_s : float
+        First-order lag from commanded to delivered thrust; 0 means at once.
+    gain : float
+        Newton delivered per newton commanded. 1 unless the parameters are a plant's (see `perturbed`).
+
+    Raises
+    ------
+    InputError
+        If the axis has no length, a number is not finite or out of range, or the thruster is more than 10 m away.
+    """
+
+    name: str
+    p_BT_m: Array
+    axis_B: Array
+    max_forward_N: float
+    max_reverse_N: float
+    disk_area_m2: float
+    time_constant_s: float
+    gain: float = 1.0
+
+    def __post_init__(self) -> None:
+        mount(self)
+        where = f"thruster {self.name}"
+        for field in ("max_forward_N", "max_reverse_N", "disk_area_m2", "time_constant_s"):
+            require_limit(where, field, getattr(self, field))
+        require_limit(where, "gain", self.gain)
+
+    @property
+    def wrench_per_newton_B(self) -> Array:
+        """Force and moment about the body origin that one newton of thrust makes, shape (6,)."""
+        return np.concatenate([self.axis_B, np.cross(self.p_BT_m, self.axis_B)])

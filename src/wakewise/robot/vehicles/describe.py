@@ -1,0 +1,225 @@
+"""A vehicle in plain words and numbers, ready for JSON: what it is, what its thrusters can do, what its file lacks."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.core.physics import GRAVITY_M_S2, TRIM_WATER_KG_M3
+from wakewise.robot.vehicles.check import (
+    WRENCH_AXES,
+    AnyVehicle,
+    actuation,
+    allocation_rank,
+    directions,
+    effective_null_space,
+    failures,
+    free_wrench,
+    null_space_names,
+    null_space_words,
+    pure_wrench,
+)
+from wakewise.robot.vehicles.draft import VehicleDraft
+from wakewise.robot.vehicles.mixing import ARDUSUB_FRAMES, Comparison, compare_matrix, compare_with_ardusub
+from wakewise.robot.vehicles.vehicle import Vehicle
+
+
+def check_report(vehicle: AnyVehicle, comparison: Comparison | None = None) -> dict[str, Any]:
+    """Say what the geometry allows, what each failure takes, and where a stated matrix disagrees.
+
+    Without a `comparison` the matrix that the vehicle's own file ships is compared, if it ships one beside its
+    geometry; else the signs of ArduSub's frame, if they agree throughout.
+    """
+    draft = as_draft(vehicle)
+    matrix, limits = draft.allocation_matrix, draft.thrust_limits_N
+    able = directions(matrix)
+    why: dict[str, str] = {}
+    wrench: dict[str, Any] | None = None
+    if limits is None:
+        why["achievable_wrench"] = "the thrust limits are not stated"
+    else:
+        pure, free = pure_wrench(matrix, able, *limits), free_wrench(matrix, *limits)
+        wrench = {
+            axis: {
+                "unit": "N" if i < 3 else "N m",
+                "lowest": float(pure[i, 0]),
+                "highest": float(pure[i, 1]),
+                "lowest_others_free": float(free[i, 0]),
+                "highest_others_free": float(free[i, 1]),
+            }
+            for i, axis in enumerate(WRENCH_AXES)
+        }
+    lost = failures(draft)
+    found = comparison or _own_comparison(draft)
+    return {
+        "name": draft.name,
+        "title": draft.title,
+        "thrusters": matrix.shape[1],
+        "thruster_names": list(draft.thruster_names),
+        "rank": able.rank,
+        "under_actuated": able.rank < 6,
+        "actuation": actuation(draft),
+        "null_space": _null_space(draft),
+        "achievable_wrench": wrench,
+        "failure_rank": [f.rank for f in lost],
+        "failures": [
+            {
+                "thruster": f.thruster,
+                "name": draft.thruster_names[f.thruster - 1],
+                "rank": f.rank,
+                "lost": list(f.lost),
+                "left_pct": None if f.left_pct is None else _percentages(f.left_pct),
+                "words": _failure_words(f.lost, f.left_pct),
+            }
+            for f in lost
+        ],
+        "mixing_disagreements": [
+            {
+                "row": d.row,
+                "thruster": d.thruster,
+                "name": d.name,
+                "stated": d.stated,
+                "geometry": d.geometry,
+                "fault": d.fault,
+                "text": d.text,
+            }
+            for d in (found.disagreements if found else ())
+        ],
+        "mixing": None
+        if found is None
+        else {
+            "stated_by": found.stated_by,
+            "compared": found.compared,
+            "agree": found.agree,
+            "notes": list(found.notes),
+            "commands": list(found.commands),
+        },
+        "missing": list(draft.missing),
+        "notes": list(draft.notes),
+        "why": why,
+    }
+
+
+def describe(vehicle: AnyVehicle) -> dict[str, Any]:
+    """Say what a vehicle is and can do: thrusters, rank, null space, limits, achievable wrench, sources.
+
+    The achievable wrench is pure: the largest along one axis with every other component zero. Trim is for fresh water
+    of 1000 kg/m3 and standard gravity, positive when the vehicle floats. What a draft lacks is None and listed under
+    `missing`.
+    """
+    draft = as_draft(vehicle)
+    report = check_report(draft)
+    limits = draft.thrust_limits_N
+    trim_N = None
+    if draft.displaced_volume_m3 is not None and draft.mass_kg is not None:
+        trim_N = round((TRIM_WATER_KG_M3 * draft.displaced_volume_m3 - draft.mass_kg) * GRAVITY_M_S2, 9)
+    return {
+        "name": draft.name,
+        "title": draft.title,
+        "source": draft.source,
+        "does_not_claim": draft.does_not_claim,
+        "size_m": _list(draft.size_m),
+        "mass_kg": draft.mass_kg,
+        "inertia_kg_m2": _list(draft.inertia_kg_m2),
+        "displaced_volume_m3": draft.displaced_volume_m3,
+        "centre_of_gravity_m": _list(draft.p_BG_m),
+        "centre_of_buoyancy_m": _list(draft.p_BB_m),
+        "trim_N": trim_N,
+        "added_mass": _list(draft.added_mass),
+        "linear_damping": _list(draft.linear_damping),
+        "quadratic_damping": _list(draft.quadratic_damping),
+        "camera_fov_deg": None if draft.camera_fov_rad is None else math.degrees(draft.camera_fov_rad),
+        "thrusters": [
+            {
+                "number": number,
+                "name": t.name,
+                "position_m": t.p_BT_m.tolist(),
+                "axis": t.axis_B.tolist(),
+                "max_forward_N": t.max_forward_N,
+                "max_reverse_N": t.max_reverse_N,
+                "disk_area_m2": t.disk_area_m2,
+                "time_constant_s": t.time_constant_s,
+                "rank_without": rank,
+            }
+            for number, (t, rank) in enumerate(zip(draft.thrusters, report["failure_rank"], strict=False), start=1)
+        ],
+        "allocation_matrix": draft.allocation_matrix.tolist(),
+        "limits_N": None if limits is None else {"lower": limits[0].tolist(), "upper": limits[1].tolist()},
+        "provenance": [{"group": p.group, "source": p.source, "estimate": p.estimate} for p in draft.provenance],
+        **{key: report[key] for key in _SHARED},
+    }
+
+
+_SHARED = (
+    "rank",
+    "under_actuated",
+    "actuation",
+    "null_space",
+    "achievable_wrench",
+    "failures",
+    "mixing_disagreements",
+    "mixing",
+    "missing",
+    "notes",
+    "why",
+)
+
+
+def summary_line(draft: VehicleDraft) -> str:
+    """One line for a list: thrusters, rank, and whether it can fly or what its file lacks."""
+    n, rank = len(draft.thruster_names), allocation_rank(draft)
+    state = "can fly" if not draft.missing else f"cannot fly, lacks {', '.join(draft.missing)}"
+    return f"{n} thrusters, rank {rank}{', under-actuated' if rank < 6 else ''}; {state}"
+
+
+def as_draft(vehicle: AnyVehicle) -> VehicleDraft:
+    """The draft itself, or the draft of a whole vehicle."""
+    return VehicleDraft.of(vehicle) if isinstance(vehicle, Vehicle) else vehicle
+
+
+def _own_comparison(draft: VehicleDraft) -> Comparison | None:
+    if not draft.thrusters:
+        return None
+    if draft.shipped_matrix is not None:
+        return compare_matrix(draft, draft.shipped_matrix, "the matrix its own source ships")
+    if len(draft.thrusters) in ARDUSUB_FRAMES:
+        found = compare_with_ardusub(draft)
+        return None if found.disagreements else found
+    return None
+
+
+def _null_space(draft: VehicleDraft) -> list[dict[str, Any]]:
+    basis = effective_null_space(draft)
+    return [
+        {"name": name, "thrusts": column.round(12).tolist(), "words": words}
+        for name, column, words in zip(null_space_names(draft), basis.T, null_space_words(draft), strict=True)
+    ]
+
+
+def _percentages(left_pct: Array) -> dict[str, list[float | None]]:
+    return {
+        axis: [None if math.isnan(value) else round(float(value), 6) + 0.0 for value in left_pct[i]]
+        for i, axis in enumerate(WRENCH_AXES)
+    }
+
+
+def _failure_words(lost: tuple[str, ...], left_pct: Array | None) -> str:
+    said = f"loses {' and '.join(lost)}" if lost else "loses no axis"
+    if left_pct is None:
+        return said
+    worst = np.where(np.isnan(left_pct), np.inf, left_pct).min(axis=1)
+    reduced = [
+        f"{axis} {value:.0f} %"
+        for axis, value in zip(WRENCH_AXES, worst, strict=True)
+        if axis not in lost and value < 99.95
+    ]
+    if reduced:
+        return f"{said}, keeps {', '.join(reduced)}"
+    return f"{said}, every other axis as strong as before" if lost else f"{said}, every axis as strong as before"
+
+
+def _list(array: Array | None) -> Any:
+    return None if array is None else array.tolist()

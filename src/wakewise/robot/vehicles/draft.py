@@ -1,0 +1,395 @@
+"""What a file says about a vehicle: like `Vehicle`, but None wherever the file says nothing, so nothing is invented."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from wakewise.core.arrays import Array, frozen
+from wakewise.core.checks import instance_of
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose
+from wakewise.core.settings import Faults
+from wakewise.robot.thrusters.thruster import Thruster, mount, require_limit
+from wakewise.robot.vehicles.hydrodynamics import (
+    DragCase,
+    Hydrodynamics,
+    require_added_mass,
+    require_linear_damping,
+    require_quadratic_damping,
+)
+from wakewise.robot.vehicles.needs import THRUSTER_FIELDS, THRUSTER_WORDS, VEHICLE_WORDS, stated
+from wakewise.robot.vehicles.tilt import TiltJoint
+from wakewise.robot.vehicles.vehicle import (
+    CurveChoice,
+    LeastThrust,
+    Provenance,
+    Vehicle,
+    readable_null_space,
+    require_different_names,
+    require_fov,
+    require_inertia,
+    require_kinds,
+    require_positive,
+    require_size,
+    thrust_steps,
+    tuple_of,
+)
+
+ROUNDING = 1e-3
+"""Largest asymmetry of an added mass, relative to its largest element, that passes as rounding in the file."""
+
+MAX_THRUSTERS = 64
+"""More than any vehicle has; beyond it a file is a mistake, and the checks of single failures take for ever."""
+
+_CHECKS: dict[str, Callable[[Array], None]] = {
+    "size_m": require_size,
+    "inertia_kg_m2": require_inertia,
+    "added_mass": require_added_mass,
+    "linear_damping": require_linear_damping,
+    "quadratic_damping": require_quadratic_damping,
+}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ThrusterDraft:
+    """What a file says about one thruster.
+
+    Parameters
+    ----------
+    name : str
+    p_BT_m : ndarray, shape (3,)
+        Centre of the disk from the body origin, FRD.
+    axis_B : ndarray, shape (3,)
+        Direction of the force on the vehicle for positive thrust, FRD; normalised here.
+    max_forward_N, max_reverse_N, disk_area_m2, time_constant_s : float or None
+        As in `Thruster`; None where the file says nothing.
+
+    Raises
+    ------
+    InputError
+        Where `Thruster` would refuse the value.
+    """
+
+    name: str
+    p_BT_m: Array
+    axis_B: Array
+    max_forward_N: float | None = None
+    max_reverse_N: float | None = None
+    disk_area_m2: float | None = None
+    time_constant_s: float | None = None
+
+    def __post_init__(self) -> None:
+        mount(self)
+        for field in THRUSTER_WORDS:
+            value = getattr(self, field)
+            if value is not None:
+                require_limit(f"thruster {self.name}", field, value)
+
+    @property
+    def wrench_per_newton_B(self) -> Array:
+        """Force and moment about the body origin that one newton of thrust makes, shape (6,)."""
+        return np.concatenate([self.axis_B, np.cross(self.p_BT_m, self.axis_B)])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class VehicleDraft:
+    """What a file says about a vehicle, in the units and the body frame (FRD) of `Vehicle`.
+
+    Parameters
+    ----------
+    name, title, source, does_not_claim : str
+    size_m : ndarray, shape (3,), or None
+    mass_kg, displaced_volume_m3, camera_fov_rad : float or None
+    inertia_kg_m2 : ndarray, shape (3, 3), or None
+        About the centre of gravity.
+    p_BG_m, p_BB_m : ndarray, shape (3,), or None
+        Centre of gravity and centre of buoyancy.
+    added_mass, linear_damping, quadratic_damping : ndarray, shape (6, 6), or None
+        Positive magnitudes in Fossen's order, as in `Hydrodynamics`.
+    thrusters : tuple of ThrusterDraft
+        May be empty where the file holds only a matrix.
+    shipped_matrix : ndarray, shape (6, n), or None
+        Allocation matrix as the file states it, turned to FRD.
+    curve : CurveChoice or None
+        Table of thrust against pulse width, if the file names one.
+    least_thrust : LeastThrust or None
+        Least thrusts, if the file states them.
+    X_BC : Pose or None
+    tilt : TiltJoint or None
+        The camera's joint, if the file states one.
+    drag_cases : tuple of DragCase
+    provenance : tuple of Provenance
+    notes : tuple of str
+        What was detected, inferred or found odd while reading.
+
+    Raises
+    ------
+    InputError
+        Where `Vehicle`, `Thruster` or `Hydrodynamics` would refuse a value that is there.
+
+    Notes
+    -----
+    An added mass whose halves differ by no more than rounding (a thousandth of its largest element) is replaced by the
+    mean of the two, and a note says so.
+    """
+
+    name: str
+    title: str
+    source: str
+    does_not_claim: str
+    size_m: Array | None = None
+    mass_kg: float | None = None
+    inertia_kg_m2: Array | None = None
+    displaced_volume_m3: float | None = None
+    p_BG_m: Array | None = None
+    p_BB_m: Array | None = None
+    added_mass: Array | None = None
+    linear_damping: Array | None = None
+    quadratic_damping: Array | None = None
+    thrusters: tuple[ThrusterDraft, ...] = ()
+    shipped_matrix: Array | None = None
+    curve: CurveChoice | None = None
+    least_thrust: LeastThrust | None = None
+    drag_cases: tuple[DragCase, ...] = ()
+    X_BC: Pose | None = None
+    tilt: TiltJoint | None = None
+    camera_fov_rad: float | None = None
+    provenance: tuple[Provenance, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        require_kinds(self)
+        tuple_of(self.thrusters, ThrusterDraft, "thrusters")
+        if self.X_BC is not None:
+            instance_of(self.X_BC, Pose, "X_BC")
+        faults = Faults()
+        for field, shape in (
+            ("size_m", (3,)),
+            ("inertia_kg_m2", (3, 3)),
+            ("p_BG_m", (3,)),
+            ("p_BB_m", (3,)),
+            ("added_mass", (6, 6)),
+            ("linear_damping", (6, 6)),
+            ("quadratic_damping", (6, 6)),
+            ("shipped_matrix", (6, None)),
+        ):
+            with faults.gathered():
+                self._freeze(field, shape)
+        for field in ("mass_kg", "displaced_volume_m3"):
+            with faults.gathered():
+                if getattr(self, field) is not None:
+                    require_positive(field, getattr(self, field))
+        with faults.gathered():
+            if self.camera_fov_rad is not None:
+                require_fov(self.camera_fov_rad)
+        with faults.gathered():
+            thrust_steps(self.curve, self.least_thrust)
+        with faults.gathered():
+            require_different_names([t.name for t in self.thrusters])
+        with faults.gathered():
+            self._check_count()
+        faults.tell()
+
+    def _freeze(self, field: str, shape: tuple[int | None, ...]) -> None:
+        """Check an array, if there is one, as `Vehicle` and `Hydrodynamics` do."""
+        if getattr(self, field) is None:
+            return
+        object.__setattr__(self, field, frozen(getattr(self, field), shape, field))
+        if field == "added_mass":
+            self._round_added_mass()
+        if field in _CHECKS:
+            _CHECKS[field](getattr(self, field))
+
+    def _check_count(self) -> None:
+        n = len(self.thrusters)
+        if n > MAX_THRUSTERS:
+            raise InputError(f"{n} thrusters, at most {MAX_THRUSTERS} are read")
+        shape = np.shape(self.shipped_matrix) if isinstance(self.shipped_matrix, np.ndarray) else ()
+        if len(shape) == 2 and n and shape[1] != n:
+            raise InputError(f"shipped_matrix: shape {shape}, allowed (6, {n}), one per thruster")
+
+    @classmethod
+    def of(cls, vehicle: Vehicle) -> VehicleDraft:
+        """Say what a whole vehicle says, as a draft with nothing missing."""
+        water = vehicle.hydrodynamics
+        return cls(
+            name=vehicle.name,
+            title=vehicle.title,
+            source=vehicle.source,
+            does_not_claim=vehicle.does_not_claim,
+            size_m=vehicle.size_m,
+            mass_kg=vehicle.mass_kg,
+            inertia_kg_m2=vehicle.inertia_kg_m2,
+            displaced_volume_m3=vehicle.displaced_volume_m3,
+            p_BG_m=vehicle.p_BG_m,
+            p_BB_m=vehicle.p_BB_m,
+            added_mass=water.added_mass,
+            linear_damping=water.linear_damping,
+            quadratic_damping=water.quadratic_damping,
+            thrusters=tuple(
+                ThrusterDraft(
+                    name=t.name,
+                    p_BT_m=t.p_BT_m,
+                    axis_B=t.axis_B,
+                    max_forward_N=t.max_forward_N,
+                    max_reverse_N=t.max_reverse_N,
+                    disk_area_m2=t.disk_area_m2,
+                    time_constant_s=t.time_constant_s,
+                )
+                for t in vehicle.thrusters
+            ),
+            curve=vehicle.curve,
+            least_thrust=vehicle.least_thrust,
+            drag_cases=vehicle.drag_cases,
+            X_BC=vehicle.X_BC,
+            tilt=vehicle.tilt,
+            camera_fov_rad=vehicle.camera_fov_rad,
+            provenance=vehicle.provenance,
+        )
+
+    def _round_added_mass(self) -> None:
+        """Take the mean of two halves that differ by no more than rounding, and say so."""
+        if self.added_mass is None:
+            return
+        skew = float(np.abs(self.added_mass - self.added_mass.T).max())
+        if 0.0 < skew <= ROUNDING * float(np.abs(self.added_mass).max()):
+            mean = frozen(0.5 * (self.added_mass + self.added_mass.T), (6, 6), "added_mass")
+            object.__setattr__(self, "added_mass", mean)
+            note = f"added mass: entries differ from their mirror image by up to {skew:.3g}, the mean is taken"
+            object.__setattr__(self, "notes", (*self.notes, note))
+
+    @cached_property
+    def missing(self) -> tuple[str, ...]:
+        """What the file would have to hold for the vehicle to fly, in words; empty if it is all there."""
+        found = [word for field, (word, _) in VEHICLE_WORDS.items() if getattr(self, field) is None]
+        if not self.thrusters:
+            return (*found, "thruster places and axes", *(f"thruster {word}" for word in THRUSTER_WORDS.values()))
+        for field, word in THRUSTER_WORDS.items():
+            lacking = [str(i) for i, t in enumerate(self.thrusters, start=1) if getattr(t, field) is None]
+            if len(lacking) == len(self.thrusters):
+                found.append(f"thruster {word}")
+            elif lacking:
+                found.append(f"thruster {word} (of thruster {', '.join(lacking)})")
+        return tuple(found)
+
+    @property
+    def missing_fields(self) -> tuple[str, ...]:
+        """The same as dotted names of fields of a vehicle file."""
+        found = [name for field, (_, names) in VEHICLE_WORDS.items() if getattr(self, field) is None for name in names]
+        if not self.thrusters:
+            return (*found, "thruster_layout.mounts", *THRUSTER_FIELDS.values())
+        lacking = (field for field in THRUSTER_FIELDS if any(getattr(t, field) is None for t in self.thrusters))
+        return (*found, *(THRUSTER_FIELDS[field] for field in lacking))
+
+    def require_whole(self, called: str | None = None) -> None:
+        """Refuse to fly what is incomplete.
+
+        Parameters
+        ----------
+        called : str, optional
+            What the user calls the vehicle: a path; its name if not given.
+
+        Raises
+        ------
+        InputError
+            Naming all that is missing, and how it is filled in.
+        """
+        if self.missing:
+            raise InputError(
+                f"vehicle {called or self.name}: cannot fly, its file does not hold {', '.join(self.missing)}; "
+                f"fill in {', '.join(self.missing_fields)} (docs/vehicle-file.md), or let "
+                f"`wakewise vehicle import {called or self.name} --like NAME --out FILE` estimate them"
+            )
+
+    @cached_property
+    def allocation_matrix(self) -> Array:
+        """Wrench about the body origin per newton, shape (6, n): from the geometry, else the one the file ships.
+
+        Raises
+        ------
+        InputError
+            If the file holds neither.
+        """
+        if self.thrusters:
+            return frozen(np.stack([t.wrench_per_newton_B for t in self.thrusters], axis=1), (6, None), "matrix")
+        if self.shipped_matrix is None:
+            doubts = [note.partition(": ")[2] for note in self.notes if note.startswith("QUESTIONED: ")]
+            why = f" ({'; '.join(doubts[:3])})" if doubts else ""
+            raise InputError(f"vehicle {self.name}: neither thrusters nor an allocation matrix{why}")
+        return self.shipped_matrix
+
+    @cached_property
+    def null_space(self) -> Array:
+        """Thrusts that make no wrench, as orthonormal columns, shape (n, k)."""
+        return frozen(readable_null_space(self.allocation_matrix), (None, None), "null_space")
+
+    @property
+    def thruster_names(self) -> tuple[str, ...]:
+        """One name per column of the allocation matrix; numbers from 1 where the file names none."""
+        if self.thrusters:
+            return tuple(t.name for t in self.thrusters)
+        return tuple(str(number) for number in range(1, self.allocation_matrix.shape[1] + 1))
+
+    @property
+    def thrust_limits_N(self) -> tuple[Array, Array] | None:
+        """Lowest and highest thrusts, each of shape (n,); None where a thruster has no stated limits."""
+        if not self.thrusters:
+            return None
+        low, high = [], []
+        for thruster in self.thrusters:
+            if thruster.max_forward_N is None or thruster.max_reverse_N is None:
+                return None
+            low.append(-thruster.max_reverse_N)
+            high.append(thruster.max_forward_N)
+        return np.array(low), np.array(high)
+
+    def vehicle(self) -> Vehicle:
+        """Turn a complete draft into a vehicle that can fly.
+
+        Raises
+        ------
+        InputError
+            If something is missing; the message lists it.
+        """
+        self.require_whole()
+        return Vehicle(
+            name=self.name,
+            title=self.title,
+            source=self.source,
+            does_not_claim=self.does_not_claim,
+            size_m=stated(self.size_m),
+            mass_kg=stated(self.mass_kg),
+            inertia_kg_m2=stated(self.inertia_kg_m2),
+            displaced_volume_m3=stated(self.displaced_volume_m3),
+            p_BG_m=stated(self.p_BG_m),
+            p_BB_m=stated(self.p_BB_m),
+            hydrodynamics=Hydrodynamics(
+                added_mass=stated(self.added_mass),
+                linear_damping=stated(self.linear_damping),
+                quadratic_damping=stated(self.quadratic_damping),
+            ),
+            thrusters=tuple(_whole(t) for t in self.thrusters),
+            X_BC=stated(self.X_BC),
+            tilt=self.tilt,
+            curve=self.curve,
+            least_thrust=self.least_thrust,
+            drag_cases=self.drag_cases,
+            camera_fov_rad=stated(self.camera_fov_rad),
+            provenance=self.provenance,
+        )
+
+
+def _whole(draft: ThrusterDraft) -> Thruster:
+    return Thruster(
+        name=draft.name,
+        p_BT_m=draft.p_BT_m,
+        axis_B=draft.axis_B,
+        max_forward_N=stated(draft.max_forward_N),
+        max_reverse_N=stated(draft.max_reverse_N),
+        disk_area_m2=stated(draft.disk_area_m2),
+        time_constant_s=stated(draft.time_constant_s),
+    )

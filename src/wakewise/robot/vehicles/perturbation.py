@@ -1,0 +1,77 @@
+"""A plant's own parameters: near those that the controller believes, but not the same."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from wakewise.core.errors import InputError
+from wakewise.core.physics import GRAVITY_M_S2, TRIM_WATER_KG_M3
+from wakewise.robot.vehicles.hydrodynamics import Hydrodynamics
+from wakewise.robot.vehicles.vehicle import Vehicle
+
+
+def perturbed(
+    vehicle: Vehicle,
+    rng: np.random.Generator,
+    *,
+    mass_pct: float = 0.0,
+    damping_pct: float = 0.0,
+    added_mass_pct: float = 0.0,
+    thrust_pct: float = 0.0,
+    trim_N: float = 0.0,
+    water_density_kg_m3: float = TRIM_WATER_KG_M3,
+    gravity_m_s2: float = GRAVITY_M_S2,
+) -> Vehicle:
+    """Draw a vehicle whose parameters differ from the nominal by factors uniform in 1 +- pct/100.
+
+    Mass and inertia share one factor; damping and added mass have one factor per degree of freedom (for added mass
+    and linear damping F A F with F the square roots, which keeps symmetry and definiteness); each thruster has its
+    own gain (`Vehicle.thrust_gains`: newton delivered per newton commanded). A vehicle is ballasted in the water, so
+    an error in its mass leaves its trim alone: the displaced volume follows the mass, and `trim_N` alone shifts the
+    buoyancy, positive = floats more than the nominal.
+
+    The number of draws does not depend on the arguments, so one seed gives one vehicle however much is perturbed.
+
+    Raises
+    ------
+    InputError
+        If a percentage is outside [0, 90] or the trim leaves no displaced volume.
+    """
+    percentages = {
+        "mass_pct": mass_pct,
+        "damping_pct": damping_pct,
+        "added_mass_pct": added_mass_pct,
+        "thrust_pct": thrust_pct,
+    }
+    for name, value in percentages.items():
+        if not 0.0 <= value <= 90.0:
+            raise InputError(f"{name}: {value:g}, must be from 0 to 90")
+    n = len(vehicle.thrusters)
+    draws = rng.uniform(-0.01, 0.01, size=1 + 6 + 6 + n)
+    mass_factor = 1.0 + mass_pct * draws[0]
+    damping_factors = 1.0 + damping_pct * draws[1:7]
+    added_factors = 1.0 + added_mass_pct * draws[7:13]
+    gains = 1.0 + thrust_pct * draws[13:]
+
+    mass_kg = vehicle.mass_kg * mass_factor
+    volume_m3 = vehicle.displaced_volume_m3 + (mass_kg - vehicle.mass_kg) / water_density_kg_m3
+    volume_m3 += trim_N / (water_density_kg_m3 * gravity_m_s2)
+    if not volume_m3 > 0.0:
+        raise InputError(f"trim_N: {trim_N:g} leaves a displaced volume of {volume_m3:g} m3, it must stay positive")
+    water = vehicle.hydrodynamics
+    added_root = np.diag(np.sqrt(added_factors))
+    damping_root = np.diag(np.sqrt(damping_factors))
+    return replace(
+        vehicle,
+        mass_kg=mass_kg,
+        inertia_kg_m2=vehicle.inertia_kg_m2 * mass_factor,
+        displaced_volume_m3=volume_m3,
+        hydrodynamics=Hydrodynamics(
+            added_mass=added_root @ water.added_mass @ added_root,
+            linear_damping=damping_root @ water.linear_damping @ damping_root,
+            quadratic_damping=np.diag(damping_factors * np.diag(water.quadratic_damping)),
+        ),
+        thrusters=tuple(replace(t, gain=t.gain * float(g)) for t, g in zip(vehicle.thrusters, gains, strict=True)),
+    )

@@ -1,0 +1,1 @@
+"""Scene: targets (`targets/`), missions and coverage (`missions/`)."""

@@ -1,0 +1,261 @@
+"""The coverage guide: which parts of a target photographs have seen well enough to be in the model.
+
+A place on the surface is seen well when three photographs show it well (`sight.py`), one of which makes a stereo pair
+with each of the other two. That is what our dense stage needs of it: a depth from one pair, and another pair that
+agrees (`agreeing_views` 2; COLMAP's fusion has the same 2 in `filter_min_num_consistent`). What is kept of a
+photograph is its place and which samples it shows well.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wakewise.core.arrays import Array, BoolArray
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose
+from wakewise.core.jit.compiled import njit
+from wakewise.scene.missions.patches import Patches
+from wakewise.scene.missions.sight import Lens, Need, well_shown
+from wakewise.scene.missions.within_reach import Views, way_words
+
+Counts = NDArray[np.uint8]
+
+SHOWN, PAIRED, WELL = 1, 2, 3
+"""How far a sample has come: shown by one photograph, by a pair, by three that hang together."""
+LEAST_GAIN = 0.002
+"""A view is not worth going to for less: a five-hundredth of the surface."""
+PHOTO_WAY_M = 0.15
+"""A photograph costs as much as this much way: half the distance of two views that make a good pair at 0.5 m."""
+HALF = 0.5
+"""A patch is seen well when more than half of it is, as it is complete when more than half of it is in the model."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Coverage:
+    """What has been seen so far; each photograph makes a new one, at least as good.
+
+    Parameters
+    ----------
+    patches : Patches
+    need : Need
+    centres_W_m : ndarray, shape (k, 3)
+        Where the photographs that count were taken from.
+    shows : ndarray of bool, shape (k, n)
+        Which samples each of them shows well.
+    partners : ndarray of uint8, shape (k, n)
+        With how many others it makes a pair at each sample.
+    level : ndarray of uint8, shape (n,)
+        How far each sample has come: 0, `SHOWN`, `PAIRED` or `WELL`.
+    views : Views
+        From where the next photographs could be taken.
+    joins : ndarray of uint8, shape (c, n)
+        With how many photographs each of them would make a pair at each sample.
+    photos, blurred : int
+        Photographs taken, and those of them that were not sharp enough to count.
+    sharpest : float
+        Sharpness of the sharpest so far.
+    """
+
+    patches: Patches
+    need: Need = field(default_factory=Need)
+    centres_W_m: Array
+    shows: BoolArray
+    partners: Counts
+    level: Counts
+    views: Views
+    joins: Counts
+    photos: int = 0
+    blurred: int = 0
+    sharpest: float = 0.0
+
+    @classmethod
+    def begin(cls, patches: Patches, views: Views | None = None, need: Need | None = None) -> Coverage:
+        """Nothing seen yet; without views (`reachable_views`) nothing can be said of where to go next."""
+        n = len(patches.points_W_m)
+        views = views or Views.none(patches)
+        return cls(
+            patches=patches,
+            need=need or Need(),
+            centres_W_m=np.empty((0, 3)),
+            shows=np.empty((0, n), dtype=np.bool_),
+            partners=np.empty((0, n), dtype=np.uint8),
+            level=np.zeros(n, dtype=np.uint8),
+            views=views,
+            joins=np.zeros((len(views.places), n), dtype=np.uint8),
+        )
+
+    def seen(self, X_WC: Pose, camera: Lens, sharpness: float | None = None) -> Coverage:
+        """The coverage with one photograph more.
+
+        Parameters
+        ----------
+        X_WC : Pose
+            Where it was taken from, as it is believed.
+        camera : Lens
+        sharpness : float, optional
+            In any unit that is higher for sharper ones and the same for all of a flight. A photograph less than
+            `Need.sharp` times as sharp as the sharpest before it does not count. None: it is sharp.
+
+        Raises
+        ------
+        InputError
+            If the sharpness is negative or not finite.
+        """
+        if sharpness is not None and not (math.isfinite(sharpness) and sharpness >= 0.0):
+            raise InputError(f"sharpness: {sharpness!r}, allowed 0 or more, or None where it is not known")
+        if sharpness is not None and sharpness < self.need.sharp * self.sharpest:
+            return replace(self, photos=self.photos + 1, blurred=self.blurred + 1)
+        shown = well_shown(self.patches, X_WC, camera, self.need)
+        if not shown.any():
+            return replace(self, photos=self.photos + 1)
+        level, partners, own = _with_one_more(
+            self.patches.points_W_m,
+            self.centres_W_m,
+            self.shows,
+            self.partners,
+            self.level,
+            X_WC.p_m,
+            shown,
+            np.cos(self.need.apart_rad),
+        )
+        joins = _joined(
+            self.patches.points_W_m,
+            self.views.points_W_m(),
+            self.views.shows,
+            self.joins,
+            X_WC.p_m,
+            shown,
+            np.cos(self.need.apart_rad),
+        )
+        return replace(
+            self,
+            centres_W_m=np.concatenate([self.centres_W_m, X_WC.p_m[None]]),
+            shows=np.concatenate([self.shows, shown[None]]),
+            partners=np.concatenate([partners, own[None]]),
+            level=level,
+            joins=joins,
+            photos=self.photos + 1,
+            sharpest=max(self.sharpest, sharpness or 0.0),
+        )
+
+    @cached_property
+    def score(self) -> Array:
+        """How far each patch has come, 0 (never shown) to 1 (all of it seen well), shape (patches,)."""
+        return self.patches.mean(np.maximum(self.level / WELL, self.covered))
+
+    @cached_property
+    def well(self) -> BoolArray:
+        """Which patches are seen well, over more than half of their area; shape (patches,)."""
+        return np.asarray(self.patches.mean(self.covered) > HALF)
+
+    @property
+    def share(self) -> float:
+        """Share of the surface that is seen well, 0 to 1: the completeness that the model is expected to have."""
+        return float(self.covered.mean())
+
+    @property
+    def sure(self) -> float:
+        """Share that is seen well with a photograph to spare, 0 to 1, at most `share`.
+
+        Where photographs overlap no more than they must, thin or rough parts may come out worse than expected: of ten
+        models, each had what lies between the two, to two points (docs/decisions/0046).
+        """
+        if len(self.partners) == 0:
+            return 0.0
+        return float(self.patches.spread(self.partners.max(axis=0) >= WELL).mean())
+
+    @cached_property
+    def covered(self) -> BoolArray:
+        """Samples that are seen well or lie so near to one that is that the model will reach them, shape (n,)."""
+        return self.patches.spread(self.level == WELL)
+
+    @cached_property
+    def gains(self) -> Array:
+        """By how much a sharp photograph from each view would raise the mean score, shape (c,)."""
+        shows, level, joins = self.views.shows, self.level[None], self.joins
+        after = np.where(joins >= 2, WELL, np.where(joins == 1, np.minimum(level + 1, WELL), SHOWN))
+        after = np.where((joins == 1) & (level < PAIRED), PAIRED, after)
+        return np.asarray((shows * (np.maximum(after, level) - level.astype(np.int64))).mean(axis=1) / WELL)
+
+    def best_view(self, X_WC: Pose) -> int | None:
+        """Number of the view that raises the score most per metre of way from here; None where none is worth going."""
+        if len(self.gains) == 0 or self.gains.max() < LEAST_GAIN:
+            return None
+        worth = np.where(self.gains >= LEAST_GAIN, self.gains, 0.0) / (self.views.ways_m(X_WC.p_m) + PHOTO_WAY_M)
+        return int(np.argmax(worth))
+
+    def next_view(self, X_WC: Pose) -> Pose | None:
+        """Where to go next from a camera's place now, looking at the target; None where all within reach is seen."""
+        best = self.best_view(X_WC)
+        return None if best is None else self.views.pose(best)
+
+    def words(self, X_WC: Pose) -> str:
+        """The way to the next view, as it is said to a person who looks at the target from here."""
+        view = self.next_view(X_WC)
+        if view is None:
+            return f"{100.0 * self.share:.0f} % is seen well, nothing within reach adds to it"
+        return way_words(X_WC, view, self.views.centre_W_m)
+
+
+@njit
+def _joined(
+    points: Array, places: Array, shows: BoolArray, joins: Counts, centre: Array, shown: BoolArray, cosines: Array
+) -> Counts:
+    """Pairs that each view would make at each sample, now that a photograph from `centre` shows some; shape (c, n)."""
+    joins = joins.copy()
+    for i in range(len(points)):
+        if not shown[i]:
+            continue
+        x, y, z = centre[0] - points[i, 0], centre[1] - points[i, 1], centre[2] - points[i, 2]
+        squared = x * x + y * y + z * z
+        for j in range(len(places)):
+            if not shows[j, i] or joins[j, i] == 255:
+                continue
+            a, b, c = places[j, 0] - points[i, 0], places[j, 1] - points[i, 1], places[j, 2] - points[i, 2]
+            dot, lengths = x * a + y * b + z * c, math.sqrt(squared * (a * a + b * b + c * c))
+            if cosines[1] * lengths <= dot <= cosines[0] * lengths:
+                joins[j, i] += 1
+    return joins
+
+
+@njit
+def _with_one_more(
+    points: Array,
+    centres: Array,
+    shows: BoolArray,
+    partners: Counts,
+    level: Counts,
+    centre: Array,
+    shown: BoolArray,
+    cosines: Array,
+) -> tuple[Counts, Counts, Counts]:
+    """Levels and partners with another photograph, and that one's own partners, shape (n,).
+
+    `cosines` are those of the least and the largest angle of a pair.
+    """
+    k, n = shows.shape
+    level, partners, own = level.copy(), partners.copy(), np.zeros(n, np.uint8)
+    for i in range(n):
+        if not shown[i]:
+            continue
+        x, y, z = centre[0] - points[i, 0], centre[1] - points[i, 1], centre[2] - points[i, 2]
+        squared, most = x * x + y * y + z * z, 0
+        for j in range(k):
+            if not shows[j, i]:
+                continue
+            a, b, c = centres[j, 0] - points[i, 0], centres[j, 1] - points[i, 1], centres[j, 2] - points[i, 2]
+            dot, lengths = x * a + y * b + z * c, math.sqrt(squared * (a * a + b * b + c * c))
+            if cosines[1] * lengths <= dot <= cosines[0] * lengths:
+                if own[i] < 255:
+                    own[i] += 1
+                if partners[j, i] < 255:
+                    partners[j, i] += 1
+                most = max(most, int(partners[j, i]))
+        most = max(most, int(own[i]))
+        level[i] = max(int(level[i]), min(most, 2) + 1)
+    return level, partners, own

@@ -1,0 +1,86 @@
+"""Orbits on a hemisphere about a target: the camera keeps its standoff and looks at the centre.
+
+A camera place is given by azimuth (from north towards east), elevation (above the horizontal) and range:
+p_WC = centre + range * (cos el cos az, cos el sin az, -sin el), NED. The view axis points at the centre without roll,
+so as Euler angles of a forward-right-down frame: roll 0, pitch -el, yaw az + pi.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.geometry import Pose, quat_from_euler, quat_from_matrix, quat_multiply
+from wakewise.scene.missions.settings import MissionSettings
+
+# Axes of the camera C (right, down, forward) as seen from a forward-right-down frame at the same place.
+R_FC = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+_Q_FC = quat_from_matrix(R_FC)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Orbit:
+    """One circle of constant elevation with evenly spread photographs.
+
+    `azimuths_rad`, shape (n,), are increasing; the first of the next orbit continues where this one ended.
+    """
+
+    name: str
+    elevation_rad: float
+    azimuths_rad: Array
+
+    def __post_init__(self) -> None:
+        freeze(self, azimuths_rad=(None,))
+
+
+def layered_orbits(settings: MissionSettings) -> tuple[Orbit, ...]:
+    """Lay the orbits from the lowest listed to the last; each starts half a step on, so that views interleave."""
+    orbits = []
+    start_rad = 0.0
+    for elevation_deg, count in zip(settings.elevations_deg, settings.views, strict=True):
+        step_rad = 2 * math.pi / count
+        azimuths = start_rad + step_rad * np.arange(count, dtype=np.float64)
+        orbits.append(
+            Orbit(name=f"orbit {elevation_deg:g} deg", elevation_rad=math.radians(elevation_deg), azimuths_rad=azimuths)
+        )
+        start_rad = float(azimuths[-1] + 0.5 * step_rad)
+    return tuple(orbits)
+
+
+def camera_pose(centre_W_m: Array, azimuth_rad: float, elevation_rad: float, range_m: float) -> Pose:
+    """X_WC of a camera on the sphere, looking at the centre, image level with the horizon."""
+    ca, sa = math.cos(azimuth_rad), math.sin(azimuth_rad)
+    ce, se = math.cos(elevation_rad), math.sin(elevation_rad)
+    p_WC = centre_W_m + range_m * np.array([ce * ca, ce * sa, -se])
+    return Pose(p_WC, quat_multiply(quat_from_euler(0.0, -elevation_rad, azimuth_rad + math.pi), _Q_FC))
+
+
+def camera_twist(
+    azimuth_rad: float,
+    elevation_rad: float,
+    range_m: float,
+    azimuth_rate_rad_s: float,
+    elevation_rate_rad_s: float,
+    range_rate_m_s: float,
+) -> tuple[Array, Array]:
+    """Velocity of the camera and its angular velocity, both shape (3,) and expressed in W (time derivative of above).
+
+    The angular velocity is yaw rate about the world's down axis plus pitch rate about the level right axis.
+    """
+    ca, sa = math.cos(azimuth_rad), math.sin(azimuth_rad)
+    ce, se = math.cos(elevation_rad), math.sin(elevation_rad)
+    # Along the view's radius, towards growing azimuth (-sin az, cos az, 0), and towards growing elevation.
+    out, turning, rising = range_rate_m_s, range_m * azimuth_rate_rad_s * ce, range_m * elevation_rate_rad_s
+    v_W = np.array(
+        [
+            out * ce * ca - turning * sa - rising * se * ca,
+            out * ce * sa + turning * ca - rising * se * sa,
+            -out * se - rising * ce,
+        ]
+    )
+    # Right axis of the level view frame with yaw az + pi: (-sin yaw, cos yaw, 0) = (sin az, -cos az, 0).
+    omega_W = np.array([-elevation_rate_rad_s * sa, elevation_rate_rad_s * ca, azimuth_rate_rad_s])
+    return v_W, omega_W

@@ -1,0 +1,52 @@
+"""What must stay undisturbed: meshes from files, procedural corals, a target on the bed, the region round it.
+
+Delicate features are found from the mesh or marked by a person, and may count more in the region than the rest.
+
+Start reading in `target.py` (a mesh on its bed), `find.py` (a target by name) and `region.py` (points that stand for
+its water). `corals.py` and `soft.py` with `fields.py` grow corals, `mesh.py` reads files, `sampling.py` spreads points,
+`distance.py` and `rays.py` measure, `delicate.py` and `marks.py` say what is delicate. `sway.py` with `sections.py`
+says how a soft one bends, `tissues.py` what it is made of.
+"""
+
+from wakewise.scene.targets.corals import coral, coral_kinds, soft_kinds, stony_kinds
+from wakewise.scene.targets.delicate import Delicacy, delicacy
+from wakewise.scene.targets.distance import MeshDistance
+from wakewise.scene.targets.find import find_mesh, find_target, is_mesh_file
+from wakewise.scene.targets.marks import Marks, read_marks, read_vertex_scores
+from wakewise.scene.targets.mesh import Mesh, load_mesh, read_mesh, write_mesh
+from wakewise.scene.targets.region import Measure, Region, region_measure, sample_region
+from wakewise.scene.targets.sampling import sampling_error_pct
+from wakewise.scene.targets.sway import Sway, Tissue, turned_normals
+from wakewise.scene.targets.target import Target, place_on_bed
+from wakewise.scene.targets.tissues import TISSUES
+
+__all__ = [
+    "TISSUES",
+    "Delicacy",
+    "Marks",
+    "Measure",
+    "Mesh",
+    "MeshDistance",
+    "Region",
+    "Sway",
+    "Target",
+    "Tissue",
+    "coral",
+    "coral_kinds",
+    "delicacy",
+    "find_mesh",
+    "find_target",
+    "is_mesh_file",
+    "load_mesh",
+    "place_on_bed",
+    "read_marks",
+    "read_mesh",
+    "read_vertex_scores",
+    "region_measure",
+    "sample_region",
+    "sampling_error_pct",
+    "soft_kinds",
+    "stony_kinds",
+    "turned_normals",
+    "write_mesh",
+]

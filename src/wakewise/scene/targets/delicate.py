@@ -1,0 +1,203 @@
+"""Delicate features of a target: thin parts, tips and sharp edges found from its mesh, or marked by a person.
+
+Two figures are measured at every vertex. The thickness is the diameter of the largest ball within the flesh that
+touches there, found by shrinking it (J. Ma, S. W. Bae and S. Choi, Vis. Comput. 28 (2012) 7, doi
+10.1007/s00371-011-0594-7) from what a ray straight inward allows. The curvature is the mean of the two principal ones,
+positive where the surface is convex, from the cotangent Laplacian (M. Meyer et al., Visualization and Mathematics III,
+2003, 35, doi 10.1007/978-3-662-05105-4_2), averaged over 3 mm so that roughness and the steps of a mesh are no tips.
+
+A score runs from 0 (robust) to 1 (delicate): thin is linear between `THIN_M`, sharp is linear between `SHARP_PER_M`,
+and the score is 1 - (1 - thin)(1 - sharp), so that either suffices. These bounds are a choice, not biology: they tell
+the twigs and rims of a hand-sized coral from its trunk.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array, diags_array
+from scipy.spatial import KDTree
+
+from wakewise.core.arrays import Array, BoolArray, freeze
+from wakewise.core.errors import InputError
+from wakewise.scene.targets.mesh import Mesh
+from wakewise.scene.targets.rays import Rays
+
+THIN_M = (0.004, 0.012)
+"""Thickness at or below which a part is as thin as can be, and from which on it is not thin."""
+SHARP_PER_M = (100.0, 300.0)
+"""Mean curvature up to which nothing is sharp (a ball of 10 mm radius, a rod of 5), and from which on all is (3.3)."""
+SMOOTHED_OVER_M = 0.003
+MOST_STEPS = 1000
+DELICATE_FROM = 0.5
+"""Score from which on a place is called delicate when shares of the surface are told."""
+ROUGH_RAD = np.deg2rad(60.0)
+SHRINKS = 20
+COARSE = 3000
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Delicacy:
+    """How delicate a mesh is, vertex by vertex.
+
+    Parameters
+    ----------
+    thickness_m : ndarray, shape (n,)
+        Of the flesh under each vertex; at most the mesh's diameter, which it is where no ray leaves again.
+    curvature_per_m : ndarray, shape (n,)
+        Mean curvature, positive where convex; 0 at the rim of an open mesh, where it has no value.
+    score : ndarray, shape (n,)
+        0 robust to 1 delicate.
+    """
+
+    thickness_m: Array
+    curvature_per_m: Array
+    score: Array
+
+    def __post_init__(self) -> None:
+        n = len(self.score)
+        freeze(self, thickness_m=(n,), curvature_per_m=(n,), score=(n,))
+        if n and (self.score.min() < 0.0 or self.score.max() > 1.0):
+            raise InputError(f"delicacy: scores {self.score.min():g} to {self.score.max():g}, allowed 0 to 1")
+
+    def share(self, mesh: Mesh) -> float:
+        """Share of a mesh's area, from 0 to 1, whose score is at least `DELICATE_FROM`."""
+        area = mesh.face_areas_m2
+        return float(area @ np.mean(self.score[mesh.faces] >= DELICATE_FROM, axis=1) / area.sum())
+
+
+def delicacy(mesh: Mesh, marked: Array | None = None) -> Delicacy:
+    """Find the delicate features of a mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        In any frame; outward faces.
+    marked : ndarray, shape (n,), optional
+        Scores of what a person marked; the higher of found and marked counts.
+
+    Raises
+    ------
+    InputError
+        If the marks are not one per vertex or outside 0 to 1, or the mesh has no area.
+    """
+    n = len(mesh.vertices_m)
+    if not mesh.face_areas_m2.sum() > 0.0:
+        raise InputError("delicacy: every face has zero area, a target needs triangles that span a surface")
+    if marked is not None and (
+        np.shape(marked) != (n,) or not np.all(np.isfinite(marked)) or np.min(marked) < 0.0 or np.max(marked) > 1.0
+    ):
+        raise InputError(f"marks: shape {np.shape(marked)}, allowed one score from 0 to 1 for each of {n} vertices")
+    thickness, curvature = thickness_m(mesh), curvature_per_m(mesh)
+    thin = np.clip((THIN_M[1] - thickness) / (THIN_M[1] - THIN_M[0]), 0.0, 1.0)
+    sharp = np.clip((curvature - SHARP_PER_M[0]) / (SHARP_PER_M[1] - SHARP_PER_M[0]), 0.0, 1.0)
+    score = 1.0 - (1.0 - thin) * (1.0 - sharp)
+    score = score if marked is None else np.maximum(score, marked)
+    return Delicacy(thickness_m=thickness, curvature_per_m=curvature, score=score)
+
+
+def vertex_normals(mesh: Mesh) -> Array:
+    """Unit normals, shape (n, 3), each the mean of its faces' by area; zero at a vertex without faces."""
+    total = np.zeros((len(mesh.vertices_m), 3))
+    for corner in range(3):
+        for k in range(3):
+            total[:, k] += np.bincount(mesh.faces[:, corner], mesh.area_vectors_m2[:, k], len(total))
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.asarray(np.divide(total, length, out=np.zeros_like(total), where=length > 0.0), dtype=np.float64)
+
+
+def thickness_m(mesh: Mesh) -> Array:
+    """Thickness of the flesh at every vertex, shape (n,): diameter of the largest ball inside that touches there.
+
+    A ray straight inward says how large the ball may be; it shrinks until no vertex lies within. A vertex seen from the
+    ball's middle within `ROUGH_RAD` of where it touches is roughness of the same side and does not count. The result is
+    the diameter of a ball or a rod and the thickness of a plate, at its rim too; at most the mesh's own diameter, which
+    it is where a ray never leaves an open mesh.
+    """
+    normals = vertex_normals(mesh)
+    diameter = float(np.linalg.norm(mesh.extent_m))
+    radius = 0.5 * _seen_through(mesh, normals, diameter)
+    whole = np.arange(len(radius))
+    # A few vertices shrink most balls nearly all the way; with all of them the last percent is not worth its time.
+    for among in (whole[:: max(1, len(whole) // COARSE)], whole):
+        _shrink(radius, mesh.vertices_m, normals, mesh.vertices_m[among])
+    return np.asarray(np.minimum(2.0 * radius, diameter), dtype=np.float64)
+
+
+def _shrink(radius: Array, vertices: Array, normals: Array, obstacles: Array) -> None:
+    """Shrink, in place, the radii of balls that touch at the vertices from inside until they hold no obstacle."""
+    tree = KDTree(obstacles)
+    active = np.flatnonzero(np.linalg.norm(normals, axis=1) > 0.5)
+    for _ in range(SHRINKS):
+        middle = vertices[active] - radius[active, None] * normals[active]
+        gap, touched = tree.query(middle, eps=0.01)
+        away = vertices[active] - obstacles[touched]
+        along = np.einsum("nk,nk->n", away, normals[active])
+        distance2 = np.einsum("nk,nk->n", away, away)
+        smaller = 0.5 * distance2 / np.maximum(along, 1e-12) + 1e-12
+        # The chord between the two places the ball would touch subtends this angle at its middle.
+        angle = 2.0 * np.arcsin(np.clip(np.sqrt(distance2) / (2.0 * smaller), 0.0, 1.0))
+        shrinks = (gap < 0.99 * radius[active]) & (along > 0.0) & (smaller < radius[active]) & (angle > ROUGH_RAD)
+        active, smaller = active[shrinks], smaller[shrinks]
+        if len(active) == 0:
+            break
+        radius[active] = smaller
+
+
+def _seen_through(mesh: Mesh, normals: Array, farthest_m: float) -> Array:
+    """How far a ray straight inward from every vertex goes before it leaves the flesh, shape (n,)."""
+    # A ray must start just inside, or it would meet the faces of its own vertex.
+    inside_m = 2e-5 * farthest_m
+    face, length = Rays(mesh).first(mesh.vertices_m - inside_m * normals, -normals)
+    leaves = (face >= 0) & (np.einsum("nk,nk->n", normals, mesh.area_vectors_m2[face]) < 0.0)
+    return np.where(leaves, np.minimum(length + inside_m, farthest_m), farthest_m)
+
+
+def curvature_per_m(mesh: Mesh) -> Array:
+    """Mean curvature at every vertex, shape (n,), positive where convex: 1/R on a ball, 1/(2 R) on a rod.
+
+    The bare curvature of a vertex is as rough as the mesh. It is averaged by a random walk along edges, each as likely
+    as its faces are large, which keeps the integral, and goes `SMOOTHED_OVER_M` in the root mean square.
+    """
+    n, faces = len(mesh.vertices_m), mesh.faces
+    area = np.bincount(faces.ravel(), np.repeat(mesh.face_areas_m2 / 3.0, 3), n)
+    mean = 0.5 * np.einsum("nk,nk->n", _cotangent_sums(mesh), vertex_normals(mesh))
+    mean = np.divide(mean, area, out=np.zeros(n), where=area > 0.0)
+    rim = _on_rim(mesh)
+    mean[rim] = 0.0
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    share = np.repeat(mesh.face_areas_m2, 3)
+    along = coo_array((np.tile(share, 2), (np.concatenate([start, end]), np.concatenate([end, start]))), (n, n))
+    leaving = np.asarray(along.sum(axis=1)).ravel()
+    walk = csr_array(diags_array(1.0 / np.where(leaving > 0.0, leaving, 1.0)) @ along)
+    step2 = share @ np.sum((mesh.vertices_m[end] - mesh.vertices_m[start]) ** 2, axis=1) / share.sum()
+    for _ in range(min(MOST_STEPS, round(SMOOTHED_OVER_M**2 / step2))):
+        mean = walk @ mean
+    mean[rim] = 0.0
+    return np.asarray(mean, dtype=np.float64)
+
+
+def _cotangent_sums(mesh: Mesh) -> Array:
+    """Sum over a vertex's edges of half their cotangents times the way back along them, shape (n, 3): 2 H n area."""
+    n = len(mesh.vertices_m)
+    # A sliver's cotangent is beyond bounds, and its area is nothing.
+    twice_area = np.maximum(2.0 * mesh.face_areas_m2, 1e-4 * mesh.face_areas_m2.mean())
+    total = np.zeros((n, 3))
+    for corner in range(3):
+        at, one, two = (mesh.faces[:, (corner + k) % 3] for k in range(3))
+        a = mesh.vertices_m[one] - mesh.vertices_m[at]
+        b = mesh.vertices_m[two] - mesh.vertices_m[at]
+        pull = (0.5 * np.einsum("nk,nk->n", a, b) / twice_area)[:, None] * (a - b)
+        for k in range(3):
+            total[:, k] += np.bincount(one, pull[:, k], n) - np.bincount(two, pull[:, k], n)
+    return total
+
+
+def _on_rim(mesh: Mesh) -> BoolArray:
+    """Vertices of edges that belong to one face only."""
+    edges = np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]), axis=1)
+    unique, count = np.unique(edges, axis=0, return_counts=True)
+    rim = np.zeros(len(mesh.vertices_m), dtype=np.bool_)
+    rim[unique[count == 1].ravel()] = True
+    return rim

@@ -1,0 +1,283 @@
+"""Sample points of the water that must stay still, with quadrature weights of the paper's integral.
+
+The paper sums over points on the target's surface and in the water round it, stratified, with weights exp(-d / 5 cm).
+Here the region is the surface above the bed and all water above the bed within 10 cm of it, which takes in the water
+between branches. What is summed stands for, at n points,
+
+    D = n/2 * mean of f over the surface  +  n/2 * mean of f exp(-d / 5 cm) over the water,   f = squared speed,
+
+which is what the paper's weights give in the mean when half of its points are spread evenly over the surface and half
+over the water. The surface carries the coral's tissue and the silt, so it counts as much as all of the water together,
+and more after weighting.
+
+The points drawn here are fewer where f is better known and carry weights to match: one third of them lies on the
+surface, two thirds in the water, which is larger, and each weighs what its neighbourhood weighs. Their sum estimates
+the same two integrals with the same total weight, with less error than bare exp(-d / 5 cm) at even points; see
+`wakewise.scene.targets.sampling`. D grows with the number of points: compare it at equal n only.
+
+With delicate features marked, what stands for a place counts 1 + gain * score times as much there; a gain of 0 is the
+paper's weights.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from wakewise.core.arrays import Array, BoolArray, IntArray, freeze
+from wakewise.core.errors import InputError
+from wakewise.scene.targets.delicate import Delicacy
+from wakewise.scene.targets.distance import MeshDistance
+from wakewise.scene.targets.mesh import Mesh
+from wakewise.scene.targets.rays import Rays
+from wakewise.scene.targets.sampling import cell_middles, centroidal, relaxed, reweighted
+from wakewise.scene.targets.target import Target
+
+DECAY_M = 0.05
+"""The paper's decay length of the weights."""
+SHELL_M = 0.10
+"""How far from the surface the region reaches: two decay lengths, where the weight has fallen to 0.14."""
+POINTS_ALLOWED = (2, 10_000)
+GAIN_ALLOWED = (0.0, 100.0)
+SURFACE_SHARE = 1.0 / 3.0
+"""Share of the points that lie on the surface."""
+MEASURE_POINTS = (8_000, 40_000)
+"""Points of surface, and of water, that stand for the whole: at least, and at most unless very many are drawn."""
+PER_POINT = (8, 130)
+"""How many of these for each point drawn: never fewer, and as many as the number above allows."""
+RELAXED_UP_TO = 600
+"""Up to this many points are relaxed, at a cost of n times the cells; with more, clusters alone are good enough."""
+CELLS = (1500, 3000)
+"""Cells of surface and of water that points are fitted to, or six for each point if that is more."""
+
+# Steps of a Kronecker sequence in three dimensions: powers of the root of x^4 = x + 1.
+_KRONECKER = 1.2207440846057596 ** -np.arange(1.0, 4.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Region:
+    """Points of the water that must stay still.
+
+    Parameters
+    ----------
+    points_W_m : ndarray, shape (n, 3)
+        In the world, above the bed; those on the surface come first.
+    weights : ndarray, shape (n,)
+        Positive; each times the squared speed at its point adds to D.
+    distance_m : ndarray, shape (n,)
+        To the target's surface; 0 for the points on it.
+    """
+
+    points_W_m: Array
+    weights: Array
+    distance_m: Array
+
+    def __post_init__(self) -> None:
+        n = len(self.points_W_m)
+        freeze(self, points_W_m=(n, 3), weights=(n,), distance_m=(n,))
+
+    def moved(self, shift_W_m: Array) -> Region:
+        """The same points about a target elsewhere, by a shift of shape (3,)."""
+        return replace(self, points_W_m=self.points_W_m + shift_W_m)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Measure:
+    """The region as very many weighted points, surface first: what few points are to stand for.
+
+    Parameters
+    ----------
+    points_W_m : ndarray, shape (n, 3)
+    weights : ndarray, shape (n,)
+        Those of the surface add up to 1/2 (without a gain), those of the water to 1/2 * mean of exp(-d / 5 cm).
+    on_surface : int
+        How many of the points lie on the surface.
+    """
+
+    points_W_m: Array
+    weights: Array
+    on_surface: int
+
+    def __post_init__(self) -> None:
+        n = len(self.points_W_m)
+        freeze(self, points_W_m=(n, 3), weights=(n,))
+
+
+def sample_region(
+    target: Target, n: int, rng: np.random.Generator, delicacy: Delicacy | None = None, gain: float = 0.0
+) -> Region:
+    """Draw the region's sample points: a third on the surface, the others in the water round it.
+
+    A fine measure of the region is cut into clusters; points are set at their middles, moved a little and weighed so
+    that jets from any side are summed well. Points end on the surface or in the water, never in the flesh.
+
+    Parameters
+    ----------
+    target : Target
+    n : int
+        Number of points; the paper takes 150 for a simple and 300 for a branching target.
+    rng : numpy.random.Generator
+    delicacy : Delicacy, optional
+        Of the target's mesh, one score per vertex.
+    gain : float
+        How many times more the most delicate feature counts, 0 to 100.
+
+    Returns
+    -------
+    Region
+        A function of target, n and the generator's state alone.
+
+    Raises
+    ------
+    InputError
+        If n is outside 2 to 10,000, the gain out of range or given without features, or the features of another mesh.
+    """
+    if not POINTS_ALLOWED[0] <= n <= POINTS_ALLOWED[1]:
+        raise InputError(f"region points {n}: allowed {POINTS_ALLOWED[0]} to {POINTS_ALLOWED[1]}")
+    count = max(PER_POINT[0] * n, int(np.clip(PER_POINT[1] * n, *MEASURE_POINTS)))
+    solid = Solid(target.mesh)
+    measure = region_measure(target, count, count, rng, delicacy, gain, solid)
+    s = measure.on_surface
+    surface, water = measure.points_W_m[:s], measure.points_W_m[s:]
+    few = max(1, round(SURFACE_SHARE * n))
+    fine = [
+        cell_middles(points, weights, min(max(cells, 6 * n), len(points)))
+        for points, weights, cells in zip(
+            (surface, water), (measure.weights[:s], measure.weights[s:]), CELLS, strict=True
+        )
+    ]
+    dry, dry_weights = centroidal(*fine[0], few)
+    wet, wet_weights = centroidal(*fine[1], n - few)
+    dry = surface[KDTree(surface).query(dry)[1]]
+    points, weights = np.concatenate([dry, wet]), np.concatenate([dry_weights, wet_weights])
+    if n <= RELAXED_UP_TO:
+        points, weights = relaxed(points, weights, np.arange(n) >= few, *_joined(fine))
+    wet, distance = _in_water(points[few:], target, solid, water)
+    points = np.concatenate([dry, wet])
+    if n <= RELAXED_UP_TO:
+        weights = reweighted(points, weights, *_joined(fine))
+    return Region(points_W_m=points, weights=n * weights, distance_m=np.concatenate([np.zeros(few), distance]))
+
+
+def region_measure(
+    target: Target,
+    on_surface: int,
+    in_water: int,
+    rng: np.random.Generator,
+    delicacy: Delicacy | None = None,
+    gain: float = 0.0,
+    solid: Solid | None = None,
+) -> Measure:
+    """Very many evenly spread points of surface and water with the paper's weights; a reference for fewer.
+
+    Parameters
+    ----------
+    target : Target
+    on_surface, in_water : int
+        How many of each.
+    rng, delicacy, gain
+        As in `sample_region`.
+    solid : Solid, optional
+        Of the target's mesh, where it is at hand.
+
+    Raises
+    ------
+    InputError
+        As `sample_region`.
+    """
+    if not GAIN_ALLOWED[0] <= gain <= GAIN_ALLOWED[1]:
+        raise InputError(f"delicate gain {gain:g}: allowed {GAIN_ALLOWED[0]:g} to {GAIN_ALLOWED[1]:g}")
+    if gain > 0.0 and delicacy is None:
+        raise InputError(f"delicate gain {gain:g}: no delicate features were given, find or mark them first, or pass 0")
+    if delicacy is not None and len(delicacy.score) != len(target.mesh.vertices_m):
+        raise InputError(
+            f"delicacy: {len(delicacy.score)} scores, allowed one per vertex of {target.name} "
+            f"({len(target.mesh.vertices_m)})"
+        )
+    score = None if delicacy is None or gain == 0.0 else delicacy.score
+    surface, surface_score = _surface_points(target, on_surface, rng, score)
+    water, distance, nearest = _water_points(target, solid or Solid(target.mesh), surface, in_water, rng)
+    dry = np.full(len(surface), 0.5 / len(surface)) * (1.0 + gain * surface_score)
+    # Distance to the nearest of many surface points is a fraction of a millimetre too long: 0.3 % of weight at most.
+    wet = 0.5 / len(water) * np.exp(-distance / DECAY_M) * (1.0 + gain * surface_score[nearest])
+    return Measure(
+        points_W_m=np.concatenate([surface, water]), weights=np.concatenate([dry, wet]), on_surface=len(surface)
+    )
+
+
+def _joined(parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
+    return np.concatenate([points for points, _ in parts]), np.concatenate([weights for _, weights in parts])
+
+
+def _surface_points(target: Target, count: int, rng: np.random.Generator, score: Array | None) -> tuple[Array, Array]:
+    """Points spread evenly over the surface above the bed, and their scores: systematic in area, random in the face."""
+    triangles = target.mesh.triangles_m
+    share = target.mesh.face_areas_m2 * (triangles[:, :, 2].mean(axis=1) < target.bed_z_m)
+    running = np.cumsum(share)
+    if not running[-1] > 0.0:
+        raise InputError(f"target {target.name}: no surface above the bed, nothing to keep undisturbed")
+    stops = (np.arange(count) + rng.random(count)) / count * running[-1]
+    face = np.searchsorted(running, stops, side="right").clip(max=len(share) - 1)
+    u, v = rng.random((2, count))
+    fold = u + v > 1.0
+    u, v = np.where(fold, 1.0 - u, u), np.where(fold, 1.0 - v, v)
+    within = np.stack([1.0 - u - v, u, v], axis=1)
+    points = np.einsum("nk,nkd->nd", within, triangles[face])
+    values = np.zeros(count) if score is None else np.einsum("nk,nk->n", within, score[target.mesh.faces[face]])
+    # A face that straddles the bed may give a point under it.
+    above = points[:, 2] <= target.bed_z_m
+    if not np.any(above):
+        raise InputError(f"target {target.name}: no surface above the bed, nothing to keep undisturbed")
+    return points[above], values[above]
+
+
+def _water_points(
+    target: Target, solid: Solid, surface: Array, count: int, rng: np.random.Generator
+) -> tuple[Array, Array, IntArray]:
+    """Points spread evenly over the water within the shell, their distances, and their nearest surface points."""
+    low, high = surface.min(axis=0) - SHELL_M, surface.max(axis=0) + SHELL_M
+    high[2] = target.bed_z_m
+    # Many leaves to a node and no balancing: half of the query time, the same answers.
+    tree = KDTree(surface, leafsize=32, balanced_tree=False)
+    shift, done, held = rng.random(3), 0, 0
+    found: list[tuple[Array, Array, IntArray]] = []
+    while held < count:
+        steps = np.arange(done, done + count)[:, None]
+        points = low + (high - low) * ((shift + (steps + 1) * _KRONECKER) % 1.0)
+        distance, nearest = map(np.asarray, tree.query(points, distance_upper_bound=SHELL_M))
+        keep = np.flatnonzero(distance <= SHELL_M)
+        keep = keep[~solid.holds(points[keep])]
+        found.append((points[keep], distance[keep], nearest[keep]))
+        done, held = done + count, held + len(keep)
+    points, distance = (np.concatenate([part[k] for part in found])[:count] for k in (0, 1))
+    return points, distance, np.concatenate([part[2] for part in found])[:count]
+
+
+def _in_water(points: Array, target: Target, solid: Solid, water: Array) -> tuple[Array, Array]:
+    """Points, those that left the region put back on its nearest water, and their exact distances to the surface."""
+    measure = MeshDistance(target.mesh.vertices_m, target.mesh.faces)
+    distance = measure(points)
+    left = (points[:, 2] > target.bed_z_m) | (distance > SHELL_M) | solid.holds(points)
+    if np.any(left):
+        points = points.copy()
+        points[left] = water[KDTree(water).query(points[left])[1]]
+        distance[left] = measure(points[left])
+    return points, distance
+
+
+class Solid:
+    """Tells the flesh from the water: a point is inside when the first face straight above it is seen from behind.
+
+    A closed mesh is judged right. So is a scan that is open towards the bed, where a count of crossings could not be.
+    """
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._rays = Rays(mesh)
+        self._faces_up = mesh.area_vectors_m2[:, 2] < 0.0
+
+    def holds(self, points_W_m: Array) -> BoolArray:
+        """Whether each point, shape (n, 3), is inside."""
+        face, _ = self._rays.first(points_W_m, np.array([0.0, 0.0, -1.0]))
+        return np.asarray((face >= 0) & self._faces_up[face], dtype=np.bool_)

@@ -1,0 +1,305 @@
+"""What the lattice computes: small declarative records of jets in a box, in the jet's own units.
+
+Lengths are in exit diameters D and speeds in U0 = sqrt(T / (rho A)), the exit speed of a ducted jet of area A, so that
+one run holds for all thrusts and diameters: speeds grow with sqrt(T). That leaves out the Reynolds number
+U0 D / nu, 36,000 for 1 N on 60 mm: turbulent jets far above some 10,000 no longer depend on it (Dimotakis 2000,
+doi:10.1017/S0022112099007946), and the runs use 10,000; thrusts under a tenth of a newton are not covered.
+
+The duct is not drawn cell by cell. An open actuator disk of twice the exit area sends out the same slipstream by
+momentum theory: it contracts to half the disk's area and reaches sqrt(2 T / (rho 2 A)) = U0. So the body force of each
+jet acts on a disk of diameter sqrt(2) D, its thrust is known exactly, and one diameter downstream the flow is that of
+the ducted exit. Nearer to the disk than that the flow is the open disk's, wider and slower.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from dataclasses import asdict, dataclass, replace
+
+from wakewise.core.errors import InputError
+
+_Corner = tuple[float, float, float]
+
+SOLVER = "d3q19-regularised-2"
+"""Version of solver and disk; part of every hash, so raise it when a change of the code changes the flow."""
+
+AXES = ("x", "y", "z")
+"""What the axis of a disk may be called."""
+
+T200_TORQUE = 0.15
+"""Torque over thrust and diameter, Q / (T D), of a small ducted propeller.
+
+Blue Robotics' table of the T200 (September 2019, 12 and 16 V, 76 mm) gives electrical power / (2 pi n) = 0.19 to 0.26
+T D forwards, 0.20 to 0.22 at 4 to 8 N; of this a brushless motor with its controller turns some 70 % into shaft torque
+(assumed). Ducted screws of the Ka series lie lower, near 0.09, so take the swirl here as that of a strong case.
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiskJet:
+    """One actuator disk.
+
+    Parameters
+    ----------
+    position_D : tuple of three
+        Centre of the disk, the origin being the disk of the case's first jet.
+    along : int
+        +1 or -1: the jet blows along plus or minus its axis.
+    strength : float
+        Momentum flux over that of a jet with exit speed U0: thrust over the unit thrust.
+    torque : float
+        Q / (T D), turning the water about the axis; 0 for a jet without swirl.
+    axis : str
+        x, y or z.
+    start, stop : float
+        When it pushes, in D / U0.
+    turn_deg : float
+        How far its axis, x, is turned about z, towards y.
+    """
+
+    position_D: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    along: int = 1
+    strength: float = 1.0
+    torque: float = 0.0
+    axis: str = "x"
+    start: float = 0.0
+    stop: float = float("inf")
+    turn_deg: float = 0.0
+
+    @property
+    def direction(self) -> tuple[float, float, float]:
+        """Unit vector along which it blows."""
+        turn = math.radians(self.turn_deg)
+        way = [math.cos(turn), math.sin(turn), 0.0]
+        shift = AXES.index(self.axis)
+        x, y, z = (self.along * way[(k - shift) % 3] for k in range(3))
+        return x, y, z
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """Jets in a box of still water with open faces, perhaps a floor that the first jet strikes, and solid boxes.
+
+    Parameters
+    ----------
+    name : str
+    jets : tuple of DiskJet
+    low_D, high_D : tuple of three
+        Corners of the box; every side must be a whole number of cells.
+    floor : bool
+        Whether the face at high x is a solid floor (half-way bounce-back); the others are open.
+    sponge_D : float
+        Thickness of the sponge before the open face at high x, in which viscosity grows; before the other open
+        faces, where water comes in slowly, it is one diameter.
+    cells_per_D : int
+    develop, average : float
+        Time before and during averaging, in D / U0.
+    reynolds : float
+        U0 D / nu.
+    smagorinsky : float
+        Smagorinsky's constant with the cell as filter width.
+    lattice_speed : float
+        U0 in cells per step; small against the lattice's speed of sound, 0.577.
+    unsteadiness : float
+        Rms of the disk's load over its mean, in patches of about D / 4 that live D / (2 U0): blades do not push
+        evenly, and a disk that did would send a laminar core.
+    seed : int
+    boxes_D : tuple of pairs of corners
+        Solid boxes in the water, low and high corner of each: cells whose middles they hold (half-way bounce-back).
+    """
+
+    name: str
+    jets: tuple[DiskJet, ...]
+    low_D: tuple[float, float, float]
+    high_D: tuple[float, float, float]
+    floor: bool = False
+    sponge_D: float = 1.5
+    cells_per_D: int = 10
+    develop: float = 40.0
+    average: float = 80.0
+    reynolds: float = 1.0e4
+    smagorinsky: float = 0.12
+    lattice_speed: float = 0.15
+    unsteadiness: float = 0.15
+    seed: int = 0
+    boxes_D: tuple[tuple[_Corner, _Corner], ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.cells_per_D < 4:
+            raise InputError(f"lattice case {self.name!r}: {self.cells_per_D} cells per diameter, allowed 4 or more")
+        if not self.jets:
+            raise InputError(f"lattice case {self.name!r}: no jets, allowed one or more")
+        for jet in self.jets:
+            if jet.along not in (-1, 1):
+                raise InputError(f"lattice case {self.name!r}: jet along {jet.along}, allowed +1 or -1")
+            if jet.axis not in AXES:
+                raise InputError(f"lattice case {self.name!r}: axis {jet.axis!r} of a jet, allowed {', '.join(AXES)}")
+            if jet.turn_deg and jet.axis != "x":
+                raise InputError(f"lattice case {self.name!r}: a turned jet along {jet.axis}, allowed x")
+        if self.jets[0].axis != "x":
+            raise InputError(f"lattice case {self.name!r}: axis {self.jets[0].axis!r} of the first jet, allowed x")
+        for low, high in zip(self.low_D, self.high_D, strict=True):
+            cells = (high - low) * self.cells_per_D
+            if cells < 12 or abs(cells - round(cells)) > 1e-6:
+                raise InputError(
+                    f"lattice case {self.name!r}: a side of {cells:g} cells, allowed whole numbers from 12"
+                )
+        for corners in self.boxes_D:
+            for a, b, low, high in zip(*corners, self.low_D, self.high_D, strict=True):
+                if not low + 1.0 <= a < b <= high - 1.0:
+                    raise InputError(
+                        f"lattice case {self.name!r}: a solid box from {a:g} to {b:g} D, "
+                        f"allowed from {low + 1:g} to {high - 1:g}"
+                    )
+
+    @property
+    def cells(self) -> tuple[int, int, int]:
+        """Cells along x, y and z."""
+        n = [round((b - a) * self.cells_per_D) for a, b in zip(self.low_D, self.high_D, strict=True)]
+        return n[0], n[1], n[2]
+
+    def resolved(self, cells_per_D: int) -> Case:
+        """The same case on another grid."""
+        return replace(self, cells_per_D=cells_per_D)
+
+
+def case_hash(case: Case) -> str:
+    """Digest of everything that decides the flow: the case and the version of the solver."""
+    stated = asdict(case)
+    for jet in stated["jets"]:
+        # What is as it was before there was anything else is not told.
+        if jet["axis"] == "x":
+            del jet["axis"]
+        if not jet["turn_deg"]:
+            del jet["turn_deg"]
+    if not case.boxes_D:
+        del stated["boxes_D"]
+    text = json.dumps({"solver": SOLVER, **stated}, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+_FREE_BOX: tuple[_Corner, _Corner] = ((-3.0, -5.5, -5.5), (11.0, 5.5, 5.5))
+
+
+def _crossing_at(angle_deg: float, back_D: float, half_D: tuple[float, float]) -> Case:
+    """Jets that cross at an angle 6 D from both disks, the bisector along x, 9 D of it behind the crossing.
+
+    `back_D` of the box lie before the crossing, and `half_D` on either side of it along y and z.
+    """
+    turn_deg = 0.5 * angle_deg
+    x, y = (round(6.0 * f(math.radians(turn_deg)), 4) for f in (math.cos, math.sin))
+    return Case(
+        name=f"crossing-{angle_deg:g}",
+        jets=(DiskJet(turn_deg=turn_deg), DiskJet(turn_deg=-turn_deg, position_D=(0.0, 2 * y, 0.0))),
+        low_D=(x - back_D, y - half_D[0], -half_D[1]),
+        high_D=(x + 9.0, y + half_D[0], half_D[1]),
+        cells_per_D=8,
+    )
+
+
+def _past_box(name: str, gap_D: float, side_D: float) -> Case:
+    """A jet along x whose axis runs so far above the top of a solid cube, z down, which begins 3 D from the disk."""
+    half = 0.5 * side_D
+    return Case(
+        name=name,
+        jets=(DiskJet(),),
+        low_D=(-3.0, -5.0, -5.0),
+        high_D=(13.0, 5.0, 7.0),
+        cells_per_D=8,
+        boxes_D=(((3.0, -half, gap_D), (3.0 + side_D, half, gap_D + side_D)),),
+    )
+
+
+def _cases() -> dict[str, Case]:
+    swirling = DiskJet(torque=T200_TORQUE)
+    plain = DiskJet()
+    return {
+        case.name: case
+        for case in (
+            Case(name="free", jets=(plain,), low_D=_FREE_BOX[0], high_D=_FREE_BOX[1]),
+            Case(name="swirl", jets=(swirling,), low_D=_FREE_BOX[0], high_D=_FREE_BOX[1]),
+            Case(
+                name="long",
+                jets=(plain,),
+                low_D=(-3.0, -5.5, -5.5),
+                high_D=(17.0, 5.5, 5.5),
+                cells_per_D=7,
+                develop=70.0,
+                average=150.0,
+            ),
+            Case(
+                name="floor",
+                jets=(plain,),
+                low_D=(-3.0, -6.0, -6.0),
+                high_D=(5.0, 6.0, 6.0),
+                floor=True,
+                cells_per_D=7,
+                develop=60.0,
+            ),
+            Case(
+                name="stop",
+                jets=(replace(plain, stop=40.0),),
+                average=10.0,
+                cells_per_D=6,
+                low_D=_FREE_BOX[0],
+                high_D=_FREE_BOX[1],
+            ),
+            Case(
+                name="twin",
+                jets=(replace(plain, position_D=(0.0, -2 / 3, 0.0)), replace(plain, position_D=(0.0, 2 / 3, 0.0))),
+                cells_per_D=6,
+                low_D=(-3.0, -5.0, -4.0),
+                high_D=(15.0, 5.0, 4.0),
+            ),
+            Case(
+                name="head-on",
+                jets=(plain, replace(plain, position_D=(10.0, 0.0, 0.0), along=-1)),
+                low_D=(-3.0, -6.0, -6.0),
+                high_D=(13.0, 6.0, 6.0),
+                sponge_D=1.0,
+                cells_per_D=6,
+            ),
+            Case(
+                name="crossing",
+                jets=(plain, replace(plain, axis="y", position_D=(6.0, -6.0, 0.0))),
+                low_D=(-3.0, -9.0, -5.0),
+                high_D=(15.0, 9.0, 5.0),
+                cells_per_D=8,
+            ),
+            _crossing_at(40.0, 9.0, (6.0, 5.0)),
+            _crossing_at(110.0, 8.0, (8.0, 6.0)),
+            _past_box("past-box", 1.0, 4.0),
+            _past_box("grazing-box", 0.5, 4.0),
+            _past_box("grazing-target", 0.5, 2.5),
+            _past_box("struck-target", -1.25, 2.5),
+            Case(
+                name="four",
+                jets=(replace(plain, strength=4.0),),
+                cells_per_D=6,
+                low_D=_FREE_BOX[0],
+                high_D=_FREE_BOX[1],
+            ),
+        )
+    }
+
+
+CASES = _cases()
+"""Cases by name. `twin`: 8 cm apart for D = 60 mm; `head-on`: 0.6 m apart; `crossing`: at right angles, 0.36 m
+from both disks, and at 40 and 110 degrees; `past-box`, `grazing-box`, `grazing-target`: one diameter and half of one
+beside a cube of 0.24 m, and half of one beside one of 0.15 m; `struck-target`: square on that one; `four`: four times
+the thrust."""
+
+
+def find_case(name: str) -> Case:
+    """Look a case up.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name.
+    """
+    if name not in CASES:
+        raise InputError(f"lattice case {name!r}: no such case, allowed {', '.join(CASES)}")
+    return CASES[name]

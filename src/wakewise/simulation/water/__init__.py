@@ -1,0 +1,28 @@
+"""The true water of the tank: turbulent jets as vortex parcels, walls, target, currents. Arrays and targets only.
+
+The controllers' wake models (`wakewise.wake`) are not used here, nor is this room there: a planner that knew the
+truth would prove nothing. Jets are made of impulse parcels that take time to travel, entrain, merge, strike the bed
+and run out along it.
+
+Start reading in `water.py` (what callers see), `stepping.py` (one compiled step of all of it) and `instant.py` (the
+velocity at any points, now). `parcels.py`, `closure.py` and `drift.py` are a free jet, `fans.py` and `meeting.py` jets
+that cross and meet, `hullwake.py` what a hull leaves, `walljets.py` and `bedjets*.py` jets on the bed, `blockage.py`
+and `bodyjets.py` the target and jets that come up to it, `faces.py` walls, `clusters.py`, `induction.py`,
+`space_order.py` and `chunks.py` fast sums,
+`currents.py` (its turbulence summed by `modes.py`) and `current_series.py` what moves without thrusters.
+Laws and their sources stand beside the equations.
+"""
+
+from wakewise.simulation.water.current_series import read_current_series
+from wakewise.simulation.water.currents import AiryWave, AmbientSum, BackgroundTurbulence, PumpJet, SteadyCurrent
+from wakewise.simulation.water.water import Water
+
+__all__ = [
+    "AiryWave",
+    "AmbientSum",
+    "BackgroundTurbulence",
+    "PumpJet",
+    "SteadyCurrent",
+    "Water",
+    "read_current_series",
+]

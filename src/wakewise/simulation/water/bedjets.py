@@ -1,0 +1,360 @@
+"""Radial wall jets on the bed and the other faces: where a free jet goes after it has struck one.
+
+A free jet that strikes a floor turns within about 0.14 of its height and runs out along the floor in a thin layer with
+u_max = 1.16 sqrt(M) / r and a half thickness of 0.09 r, r from the strike point, M = thrust / density (Beltaos and
+Rajaratnam 1974, J. Hydraul. Div. ASCE 100 HY10; Rajaratnam 1976, Turbulent Jets). Impulse parcels cannot
+form that layer, so each one that strikes becomes a *ring*: a stretch of the layer that carries the parcel's impulse
+outward at the layer's mean speed. Rings of one jet add up to the law when thrust is steady, and start, swell and fade
+with it otherwise.
+
+One ring's velocity in the sector at azimuth phi (height h above the bed, distance r from its centre) is
+    u_r = (A/r) g dF/dh,   u_up = -(A/r) dg/dr F,   g = exp(-ln(r/R)^2 / (2 L^2)),
+    F = delta sqrt(pi/2) erf(h / (sqrt 2 delta)) exp(-h/R),   delta = 0.093 R,
+which is free of divergence, runs along the bed at h = 0 and takes its water from above. A jet that comes in at a slant
+sends the share w(phi) = exp(kappa cos(phi - phi0)) / I0(kappa) of its momentum towards phi, with kappa such that the
+horizontal momentum is the jet's own; in that sector R becomes R w^(1/4) and A becomes A sqrt(w), as the law asks.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from wakewise.core.arrays import Array, IntArray
+from wakewise.core.jit.compiled import assign, njit
+from wakewise.simulation.water.bedjets_sums import (
+    COLUMNS,
+    LOG_WIDTH,
+    WALL_JET_SPREAD,
+    finish_rows,
+    leaning,
+    log_i0s,
+    log_overlap,
+    sum_planes,
+)
+from wakewise.simulation.water.chunks import over_points
+
+WALL_JET_SPEED = 1.16  # u_max r / sqrt(M), Rajaratnam 1976
+STRIKE_HEIGHT = 1.75  # of the parcel's sigma: 0.14 H, where the bed's pressure begins to turn the jet (Beltaos 1974)
+_LAYER_CONVECTION = 1 / math.sqrt(2)  # mean of u weighted with u over a Gaussian layer, as a share of u_max
+STRENGTH = _LAYER_CONVECTION * WALL_JET_SPEED**2 / (math.sqrt(2 * math.pi) * LOG_WIDTH)
+"""A of a ring in m2/s over its impulse, times its radius squared."""
+# Rings become one that are less than this apart, counted in widths L of their crests: then rows are no coarser than
+# 2 sqrt(2) L, where Gaussians still sum to a constant within 17 % (Poisson summation, 2 exp(-2 pi^2 / 8)), and mostly
+# no coarser than 2 L, where they do within 1.4 %.
+_MERGE_L2 = 2.0
+# Weak rings may come from farther, as long as no water is moved wrongly by more than about this.
+_MERGE_ERROR_M_S, _FARTHEST_L2 = 1.5e-3, 6.0
+
+
+class Layers(NamedTuple):
+    """Room for the rings of all planes, of which the first so many are in use; the step writes into it.
+
+    `plane`, shape (n,), is the number of each ring's plane; the others are as in `Rings`.
+    """
+
+    plane: IntArray
+    centre: Array
+    radius: Array
+    impulse: Array
+    lean: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Rings:
+    """Rings of the wall jets on one plane, in its own frame.
+
+    Parameters
+    ----------
+    centre_m : ndarray, shape (n, 2)
+        Where the jet struck, carried by the current since.
+    radius_m : ndarray, shape (n,)
+    impulse_m4_s : ndarray, shape (n,)
+    lean : ndarray, shape (n, 2)
+        Share of the impulse that goes along the plane, as a vector: its length is below 1, and 0 for an upright jet.
+    """
+
+    centre_m: Array
+    radius_m: Array
+    impulse_m4_s: Array
+    lean: Array
+
+    @classmethod
+    def none(cls) -> Rings:
+        """No rings at all."""
+        return cls(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros((0, 2)))
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self.radius_m)
+
+    @cached_property
+    def heading_kappa(self) -> tuple[Array, Array]:
+        """Unit vectors towards which slanting jets lean, shape (n, 2), and how much, shape (n,): 0 for upright ones."""
+        heading, kappa = leaning(self.lean)
+        return heading, kappa
+
+    def take(self, keep: np.ndarray) -> Rings:
+        """Those that a mask or an index array picks."""
+        return Rings(self.centre_m[keep], self.radius_m[keep], self.impulse_m4_s[keep], self.lean[keep])
+
+    @classmethod
+    def of(cls, layers: Layers, count: int, plane: int) -> Rings:
+        """A copy of those of the first `count` that lie on a plane."""
+        on = np.flatnonzero(layers.plane[:count] == plane)
+        return cls(layers.centre[on], layers.radius[on], layers.impulse[on], layers.lean[on])
+
+    def layers(self) -> Layers:
+        """A copy as the only plane's."""
+        copies = (a.copy() for a in (self.centre_m, self.radius_m, self.impulse_m4_s, self.lean))
+        return Layers(np.zeros(self.count, np.int64), *copies)
+
+    def joined(self, later: Rings) -> Rings:
+        """These followed by the later ones."""
+        return Rings(
+            np.concatenate([self.centre_m, later.centre_m]),
+            np.concatenate([self.radius_m, later.radius_m]),
+            np.concatenate([self.impulse_m4_s, later.impulse_m4_s]),
+            np.concatenate([self.lean, later.lean]),
+        )
+
+
+def rings_from_strikes(position_m: Array, impulse_m4_s: Array, sigma_m: Array) -> Rings:
+    """Rings that take over from parcels (arrays as in `Parcels`, in the plane's frame) which have come down to it."""
+    size = np.linalg.norm(impulse_m4_s, axis=1)
+    lean = impulse_m4_s[:, :2] / np.where(size > 0, size, 1.0)[:, None]
+    return Rings(position_m[:, :2].copy(), STRIKE_HEIGHT * sigma_m, size, lean)
+
+
+def ring_velocity(
+    points_W_m: Array, rings: Rings, bed_z_m: float, least_m: float = 0.0, *, exact: bool = False
+) -> Array:
+    """Velocity of the rings, shape (n, 3), at points, shape (n, 3); zero if there are none.
+
+    `least_m` is the least thickness delta of a layer, whose momentum stays; see `packed_rings`. `exact` sums in double
+    precision.
+    """
+    return packed_velocity(points_W_m, packed_rings(rings, least_m), bed_z_m, exact=exact)
+
+
+def packed_rings(rings: Rings, least_m: float = 0.0, per_height: float = 0.0, stretch: float = 1.0) -> Array:
+    """One row per ring, as the kernel reads it, for several calls of `packed_velocity`, shape (n, 15).
+
+    A layer has the thickness hypot(0.093 R, least_m), or `stretch` times 0.093 R in that. It is slower in proportion to
+    what that is more than the law's: each ring then carries its impulse, and the jet of many its momentum, which makes
+    the whole slower by the square root. `per_height` is one over the distance to the opposite face, where F ends with a
+    factor 1 - h per_height; 0 for none.
+    """
+    heading, kappa = rings.heading_kappa
+    rows = np.empty((rings.count, COLUMNS))
+    for j in range(rings.count):
+        sizes = rings.radius_m[j], rings.impulse_m4_s[j]
+        fill_row(rows[j], rings.centre_m[j], *sizes, heading[j], kappa[j], least_m, per_height, stretch)
+    finish_rows(rows)
+    return rows
+
+
+@njit(nogil=True)
+def fill_row(
+    row: Array,
+    centre: Array,
+    radius: float,
+    impulse: float,
+    heading: Array,
+    kappa: float,
+    least: float,
+    per_height: float,
+    stretch: float,
+) -> None:
+    """Write one row of `packed_rings`, but for what `finish_rows` fills in."""
+    row[0], row[1], row[2] = centre[0], centre[1], radius
+    row[3] = STRENGTH * impulse / radius**2 / stretch
+    row[4], row[5], row[6] = heading[0], heading[1], kappa
+    row[11], row[12] = least / stretch, per_height
+
+
+def packed_velocity(points_W_m: Array, packed: Array, bed_z_m: float, *, exact: bool = False) -> Array:
+    """Velocity of packed rings, shape (n, 3), at points, shape (n, 3)."""
+    flat = np.concatenate([np.zeros(3), np.eye(3).ravel(), [bed_z_m, 0.0]])
+    return planes_velocity(points_W_m, flat[None], np.array([0, len(packed)]), packed, exact=exact)
+
+
+def planes_velocity(points_W_m: Array, planes: Array, starts: IntArray, packed: Array, *, exact: bool = False) -> Array:
+    """Velocity of packed rings on several planes, shape (n, 3), at points, shape (n, 3).
+
+    Parameters
+    ----------
+    points_W_m : ndarray, shape (n, 3)
+    planes : ndarray, shape (k, 14)
+        Of each: origin, the three rows of the turn from the world into its frame, depth there, and 0 if its rings are
+        those of a wall jet; if it has the same rings on both sides, how many times higher than a wall jet's they are.
+    starts : ndarray of int, shape (k + 1,)
+        Plane i has the rings from starts[i] to starts[i + 1].
+    packed : ndarray, shape (m, 15)
+        See `packed_rings`; each in its plane's frame.
+    exact : bool
+        Sum in double precision.
+    """
+    out = np.zeros((len(points_W_m), 3))
+    if len(packed) and len(points_W_m):
+        points = np.ascontiguousarray(points_W_m, dtype=np.float64)
+        cost = 4 * len(points) * len(packed)  # a ring takes as long as four parcels
+        kind = np.zeros(0, np.float64 if exact else np.float32)
+        over_points(lambda some, result: sum_planes(some, planes, starts, packed, kind, result), points, out, cost)
+    return out
+
+
+def ring_strength(rings: Rings) -> Array:
+    """A of each ring in m2/s, shape (n,): such that rings sent at a steady rate add up to u_max = 1.16 sqrt(M) / r."""
+    strength: Array = STRENGTH * rings.impulse_m4_s / rings.radius_m**2
+    return strength
+
+
+def layer_speed(rings: Rings) -> Array:
+    """Speed at the bed under each ring's crest, shape (n,), from all rings that lie on the same ground.
+
+    Rings about one centre that lean the same way add up in full, from whichever jets they came. Rings about different
+    centres meet along less and less of their crests as the centres part, and hardly at all a radius apart; those that
+    lean different ways lend each other speed as far as their directions overlap.
+    """
+    speed: Array = layer_speeds(rings.layers(), rings.count)
+    return speed
+
+
+def grown(
+    rings: Rings, current_m_s: Array, dt_s: float, least_m: float = 0.0, stretch: float = 1.0
+) -> tuple[Rings, Array]:
+    """Rings of one plane after dt_s, and the layer speed they had, shape (n,); see `grow_layers`.
+
+    The current is a velocity in the plane's frame, shape (3,) or (n, 3).
+    """
+    layers, speed = rings.layers(), np.empty(rings.count)
+    current = np.ascontiguousarray(np.broadcast_to(current_m_s, (rings.count, 3)))
+    grow_layers(layers, rings.count, current, np.array([least_m]), np.array([stretch]), dt_s, speed)
+    return Rings.of(layers, rings.count, 0), speed
+
+
+def coarsened(rings: Rings) -> Rings:
+    """Rings of one plane that are near each other made one; see `merge_layers`."""
+    layers = rings.layers()
+    return Rings.of(layers, merge_layers(layers, rings.count), 0)
+
+
+@njit(apart=True, nogil=True)
+def kept_rings(layers: Layers, count: int, keep: np.ndarray) -> int:
+    """Close the ranks: of the first `count`, only those that a mask picks stay; how many they are."""
+    left = 0
+    for j in range(count):
+        if keep[j]:
+            layers.plane[left], layers.radius[left] = layers.plane[j], layers.radius[j]
+            layers.impulse[left] = layers.impulse[j]
+            layers.centre[left], layers.lean[left] = layers.centre[j], layers.lean[j]
+            left += 1
+    return left
+
+
+@njit(apart=True, nogil=True)
+def layer_speeds(layers: Layers, count: int) -> Array:
+    """As `layer_speed`, each among those of its own plane."""
+    out, per_L = np.empty(count), 1.0 / LOG_WIDTH
+    heading, kappa = leaning(layers.lean[:count])
+    centre, radius, plane = layers.centre, layers.radius, layers.plane
+    logs, bessel = np.log(radius[:count]), log_i0s(kappa)
+    strength = STRENGTH * layers.impulse[:count] / radius[:count] ** 2
+    assign(out, strength)
+    for i in range(count):
+        for j in range(i + 1, count):
+            apart = (logs[i] - logs[j]) * per_L
+            alike = 0.5 * apart * apart
+            if alike >= 12.0 or plane[i] != plane[j]:
+                continue
+            dx, dy = centre[i, 0] - centre[j, 0], centre[i, 1] - centre[j, 1]
+            off = 2.0 * (dx * dx + dy * dy)
+            for_i, for_j = alike + off / (radius[i] * radius[i]), alike + off / (radius[j] * radius[j])
+            if min(for_i, for_j) >= 12.0:
+                continue
+            shared = log_overlap(heading[i], kappa[i], bessel[i], heading[j], kappa[j], bessel[j])
+            if for_i < 12.0:
+                out[i] += strength[j] * math.exp(shared - for_i)
+            if for_j < 12.0:
+                out[j] += strength[i] * math.exp(shared - for_j)
+    for i in range(count):
+        out[i] /= radius[i]
+    return out
+
+
+@njit(apart=True, nogil=True)
+def grow_layers(
+    layers: Layers, count: int, current_m_s: Array, least_m: Array, stretch: Array, dt_s: float, speed_m_s: Array
+) -> None:
+    """Let rings run out for dt_s, in place. Exact in dt for a speed that falls as 1/R.
+
+    Parameters
+    ----------
+    layers : Layers
+    count : int
+    current_m_s : ndarray, shape (count, 3)
+        Velocity of the current in each ring's plane's frame, which carries the centres.
+    least_m, stretch : ndarray, one of each plane
+        As in `packed_rings`.
+    dt_s : float
+    speed_m_s : ndarray, shape (count,)
+        Layer speed that they had; written.
+    """
+    speeds = layer_speeds(layers, count)
+    for j in range(count):
+        R, plane = layers.radius[j], layers.plane[j]
+        thin = WALL_JET_SPREAD * R
+        speed_m_s[j] = speeds[j] * thin / math.sqrt((stretch[plane] * thin) ** 2 + least_m[plane] ** 2)
+        layers.radius[j] = math.sqrt(R * R + 2 * R * _LAYER_CONVECTION * speed_m_s[j] * dt_s)
+        for k in range(2):
+            layers.centre[j, k] += current_m_s[j, k] * dt_s
+
+
+@njit(apart=True, nogil=True)
+def merge_layers(layers: Layers, count: int) -> int:
+    """Rings of a plane that are near each other in centre, radius and direction made one; how many are left.
+
+    Kept are their impulse, the part of it along the plane, the centre of impulse, and the flow that they carry, which
+    goes with impulse over radius. Each ring may take up an older one close to it, and one that took part waits for the
+    next time.
+    """
+    if count < 2:
+        return count
+    centre, radius, impulse, lean = layers.centre, layers.radius, layers.impulse, layers.lean
+    free, keep, found = np.ones(count, np.bool_), np.ones(count, np.bool_), False
+    heading, kappa = leaning(lean[:count])
+    logs, bessel, per_L2 = np.log(radius[:count]), log_i0s(kappa), LOG_WIDTH**-2
+    speed = STRENGTH * impulse[:count] / radius[:count] ** 3
+    for b in range(count - 1, 0, -1):
+        if not free[b]:
+            continue
+        for a in range(b - 1, -1, -1):
+            if not free[a] or layers.plane[a] != layers.plane[b]:
+                continue
+            dx, dy = centre[a, 0] - centre[b, 0], centre[a, 1] - centre[b, 1]
+            apart2 = per_L2 * ((logs[a] - logs[b]) ** 2 + (dx * dx + dy * dy) / min(radius[a], radius[b]) ** 2)
+            weaker = min(speed[a], speed[b])
+            most = min(max(_MERGE_L2, (_MERGE_ERROR_M_S / weaker) ** 2), _FARTHEST_L2)
+            if apart2 > most:
+                continue
+            # Gaussians x widths apart overlap by exp(-x^2 / 8).
+            apart2 -= 8.0 * log_overlap(heading[a], kappa[a], bessel[a], heading[b], kappa[b], bessel[b])
+            if apart2 > most:
+                continue
+            total = impulse[a] + impulse[b]
+            share = impulse[a] / total
+            for k in range(2):
+                centre[b, k] = share * centre[a, k] + (1 - share) * centre[b, k]
+                lean[b, k] = share * lean[a, k] + (1 - share) * lean[b, k]
+            radius[b] = 1.0 / (share / radius[a] + (1 - share) / radius[b])
+            impulse[b] = total
+            keep[a] = free[a] = free[b] = False
+            found = True
+            break
+    return kept_rings(layers, count, keep) if found else count

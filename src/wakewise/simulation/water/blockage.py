@@ -1,0 +1,286 @@
+"""A solid body in the water: sources in its surface that turn the flow aside.
+
+Potential flow about a body of any shape by sources on its surface (J. L. Hess and A. M. O. Smith 1967, Prog. Aerosp.
+Sci. 8, 1, doi 10.1016/0376-0421(67)90003-6), here as a few smooth sources a little below the surface whose strengths
+make the velocity across the surface least, in the mean square, at points spread over it. Together they give out no
+water. Shapes finer than the distance between sources are blocked in part only: `leakage` says how much passes. What it
+has not: a boundary layer, separation, or a wake behind the body.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from wakewise.core.arrays import Array, IntArray, freeze
+from wakewise.core.jit.compiled import assign, njit
+from wakewise.scene.targets import Target
+from wakewise.simulation.water.chunks import over_points
+from wakewise.simulation.water.induction import SINGLE, FixedSources, smooth_share, sum_sources
+from wakewise.simulation.water.space_order import in_space
+
+_POINTS = 480
+_SOURCES = 160
+# Of the sources' spacing: wide enough that what they make is even along the surface, and so deep that little water is
+# made outside. Half ball flow is then right to 5 %; half as wide and deep they let twice as much through corals.
+_SIGMA, _DEPTH = 0.8, 1.4
+_DAMPING = 1e-4  # of the mean square singular value: strengths stay of the order of the flow
+
+
+class BodyRows(NamedTuple):
+    """A `Blockage` as the compiled step takes it; of no body all are empty.
+
+    `points` and `normals`, shape (k, 3), are as in `Blockage`, and `answers`, shape (k, s), its response the other way
+    round; `sources`, shape (4, 2 s), are the sources' places and one over their sizes, images after originals, and
+    `per_area`, shape (s,), is one over their sizes squared. `ball`, shape (4,), is the middle and how far it is felt,
+    `radius` how far the points reach from there, and `piece`, in m2, the area that each stands for.
+    """
+
+    points: Array
+    normals: Array
+    answers: Array
+    sources: np.ndarray
+    per_area: Array
+    ball: Array
+    constants: np.ndarray
+    radius: float
+    piece: float
+
+    @classmethod
+    def none(cls) -> BodyRows:
+        """No body."""
+        v = np.zeros((0, 3))
+        return cls(v, v, np.zeros((0, 0)), np.zeros((4, 0), np.float32), np.zeros(0), np.zeros(4), SINGLE, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Blockage:
+    """Sources that keep water out of a body standing on the bed.
+
+    Parameters
+    ----------
+    points_m, normals : ndarray, shape (k, 3)
+        On the surface, and outward from it: where the flow across is made least.
+    sources_m : ndarray, shape (s, 3)
+    sigmas_m : ndarray, shape (s,)
+    response : ndarray, shape (s, k)
+        Strengths in m3/s for a unit velocity across the surface at each point.
+    bed_z_m : float
+        The sources are mirrored there.
+    piece_m2 : float
+        Area of the convex hull, or of the surface if that is less, over the number of points.
+    """
+
+    points_m: Array
+    normals: Array
+    sources_m: Array
+    sigmas_m: Array
+    response: Array
+    bed_z_m: float
+    piece_m2: float
+    rows: BodyRows = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        k, s = len(self.points_m), len(self.sigmas_m)
+        images = np.array(self.sources_m)
+        images[:, 2] = 2 * self.bed_z_m - images[:, 2]
+        both = FixedSources(np.concatenate([self.sources_m, images]), np.tile(self.sigmas_m, 2))
+        middle = np.mean(self.points_m, axis=0)
+        radius = float(np.linalg.norm(self.points_m - middle, axis=1).max())
+        rows = BodyRows(
+            np.ascontiguousarray(self.points_m, dtype=np.float64),
+            np.ascontiguousarray(self.normals, dtype=np.float64),
+            np.ascontiguousarray(self.response.T, dtype=np.float64),
+            both.columns,
+            1.0 / self.sigmas_m**2,
+            np.array([*middle, 4.0 * radius]),
+            SINGLE,
+            radius,
+            self.piece_m2,
+        )
+        object.__setattr__(self, "rows", rows)
+        freeze(self, points_m=(k, 3), normals=(k, 3), sources_m=(s, 3), sigmas_m=(s,), response=(s, k))
+
+    @classmethod
+    def of(cls, target: Target) -> Blockage:
+        """For a target on its bed; the same target always gives the same sources."""
+        points, normals, area = _surface(target, _POINTS, np.random.default_rng(0))
+        order = in_space(points)  # which suits the sums over jets there
+        points, normals = points[order], normals[order]
+        inner, inward, _ = _surface(target, _SOURCES, np.random.default_rng(1))
+        size = math.sqrt(area / _SOURCES)
+        sigmas = np.full(_SOURCES, _SIGMA * size)
+        sources = inner - _DEPTH * size * inward
+        across = _across(points, normals, sources, sigmas, target.bed_z_m)
+        response = _least_squares(across, _DAMPING)
+        piece = min(area, _hull_area(target)) / _POINTS
+        return cls(points, normals, sources, sigmas, response, target.bed_z_m, piece)
+
+    def strengths_m3_s(self, undisturbed_m_s: Array) -> Array:
+        """Source strengths, shape (s,), for the velocity that there would be at `points_m` without the body."""
+        strengths: Array = answer(self.rows, np.ascontiguousarray(undisturbed_m_s))
+        return strengths
+
+    def felt_at(self, points_W_m: Array) -> bool:
+        """Whether any of the points, shape (n, 3), is within four times the body's radius."""
+        return bool(any_near(self.rows.ball, points_W_m))
+
+    def velocity(self, points_W_m: Array, strengths_m3_s: Array) -> Array:
+        """What the sources add, shape (n, 3), at points, shape (n, 3); nothing beyond four times the body's radius."""
+        out = np.zeros_like(points_W_m)
+        self.add_velocity(points_W_m, strengths_m3_s, out)
+        return out
+
+    def add_velocity(self, points_W_m: Array, strengths_m3_s: Array, out: Array) -> None:
+        """Add to `out` what the sources add, both shape (n, 3)."""
+        points = np.ascontiguousarray(points_W_m, dtype=np.float64)
+        cost = len(points) * self.rows.sources.shape[1] // 4
+        over_points(lambda some, result: add_body(self.rows, some, strengths_m3_s, result), points, out, cost)
+
+    def leakage(self, undisturbed_m_s: Array) -> float:
+        """Root mean square velocity across the surface with the body's answer, over that without it."""
+        answer = self.velocity(self.points_m, self.strengths_m3_s(undisturbed_m_s))
+        before = np.einsum("ni,ni->n", undisturbed_m_s, self.normals)
+        after = before + np.einsum("ni,ni->n", answer, self.normals)
+        return float(np.sqrt(np.mean(after**2) / max(np.mean(before**2), 1e-30)))
+
+
+@njit(apart=True, nogil=True)
+def answer(body: BodyRows, undisturbed_m_s: Array) -> Array:
+    """Strengths, shape (s,): see `Blockage.strengths_m3_s`. In one order, whatever the number of threads."""
+    out = np.zeros(body.answers.shape[1])
+    for p in range(body.answers.shape[0]):
+        across = 0.0
+        for k in range(3):
+            across += undisturbed_m_s[p, k] * body.normals[p, k]
+        unit = body.answers[p]
+        for i in range(out.shape[0]):
+            out[i] += unit[i] * across
+    return out
+
+
+@njit(nogil=True)
+def any_near(ball: Array, points: Array) -> bool:
+    """Whether any point, shape (n, 3), is in a ball: its middle and radius, shape (4,)."""
+    for p in range(points.shape[0]):
+        dx, dy, dz = points[p, 0] - ball[0], points[p, 1] - ball[1], points[p, 2] - ball[2]
+        if dx * dx + dy * dy + dz * dz < ball[3] ** 2:
+            return True
+    return False
+
+
+@njit(apart=True, nogil=True)
+def near_body(body: BodyRows, points: Array) -> IntArray:
+    """Indices of the points, shape (n, 3), that feel the body."""
+    found = np.empty(points.shape[0], np.int64)
+    count = 0
+    for p in range(points.shape[0]):
+        dx, dy, dz = points[p, 0] - body.ball[0], points[p, 1] - body.ball[1], points[p, 2] - body.ball[2]
+        if dx * dx + dy * dy + dz * dz < body.ball[3] ** 2:
+            found[count] = p
+            count += 1
+    return found[:count]
+
+
+@njit(apart=True, nogil=True)
+def add_body(body: BodyRows, points: Array, strengths_m3_s: Array, out: Array) -> None:
+    """Add to `out` what the body's sources add at points, both shape (n, 3)."""
+    near = near_body(body, points)
+    if near.shape[0] == 0:
+        return
+    some, result = np.empty((near.shape[0], 3), np.float32), np.empty((near.shape[0], 3))
+    for q in range(near.shape[0]):
+        for k in range(3):
+            some[q, k] = points[near[q], k]
+    s = strengths_m3_s.shape[0]
+    both = np.empty(2 * s, np.float32)
+    for i in range(s):
+        both[i] = both[s + i] = strengths_m3_s[i] * body.per_area[i]
+    S = body.sources
+    sum_sources(some, S[0], S[1], S[2], both, S[3], body.constants, result)
+    for q in range(near.shape[0]):
+        for k in range(3):
+            out[near[q], k] += result[q, k]
+
+
+@njit
+def _least_squares(across: Array, damping: float) -> Array:
+    """Strengths, shape (s, k), that leave least of a unit velocity across the surface at each point.
+
+    `across`, shape (k, s), is what unit strengths make there. Strengths sum to zero: the search is in the space across
+    (1, ..., 1). By Cholesky's way, written out: a library's sums would depend on the number of threads.
+    """
+    k, s = across.shape
+    M = across.copy()
+    for p in range(k):
+        M[p] -= across[p].mean()
+    L, trace = np.zeros((s, s)), 0.0
+    for p in range(k):
+        for i in range(s):
+            trace += M[p, i] ** 2
+            for j in range(i + 1):
+                L[i, j] += M[p, i] * M[p, j]
+    for i in range(s):
+        L[i, i] += damping * trace / s
+    for j in range(s):
+        for i in range(j, s):
+            for n in range(j):
+                L[i, j] -= L[i, n] * L[j, n]
+            L[i, j] = math.sqrt(L[j, j]) if i == j else L[i, j] / L[j, j]
+    out = np.empty((s, k))
+    x = np.empty(s)
+    for p in range(k):
+        for i in range(s):
+            x[i] = -M[p, i]
+            for n in range(i):
+                x[i] -= L[i, n] * x[n]
+            x[i] /= L[i, i]
+        for i in range(s - 1, -1, -1):
+            for n in range(i + 1, s):
+                x[i] -= L[n, i] * x[n]
+            x[i] /= L[i, i]
+        assign(out[:, p], x - x.mean())
+    return out
+
+
+def _hull_area(target: Target) -> float:
+    """Of the convex hull, above the bed, in m2."""
+    hull = ConvexHull(target.mesh.vertices_m)
+    corners = hull.points[hull.simplices]
+    twice = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return float(0.5 * twice[corners.mean(axis=1)[:, 2] < target.bed_z_m - 1e-4].sum())
+
+
+def _across(points: Array, normals: Array, sources: Array, sigmas: Array, bed_z_m: float) -> Array:
+    """Velocity across the surface at each point for a unit source and its image in the bed, shape (k, s)."""
+    total = np.zeros((len(points), len(sources)))
+    for flip in (1.0, -1.0):
+        place = sources.copy()
+        if flip < 0.0:
+            place[:, 2] = 2 * bed_z_m - place[:, 2]
+        d = (points[:, None] - place) / sigmas[:, None]
+        q = np.einsum("ksi,ksi->ks", d, d)
+        total += smooth_share(q) * np.einsum("ksi,ki->ks", d, normals) / sigmas**2
+    return total
+
+
+def _surface(target: Target, count: int, rng: np.random.Generator) -> tuple[Array, Array, float]:
+    """Points evenly by area over the surface above the bed, outward normals there, and its whole area."""
+    corners = target.mesh.vertices_m[target.mesh.faces]
+    turned = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    volume = np.einsum("ni,ni->n", corners[:, 0] - target.centre_W_m, turned).sum()
+    twice = np.linalg.norm(turned, axis=1)
+    area = np.where(corners.mean(axis=1)[:, 2] < target.bed_z_m - 1e-4, 0.5 * twice, 0.0)
+    sums = np.cumsum(area)
+    picks = (np.arange(count) + rng.uniform(size=count)) / count * sums[-1]
+    face = np.minimum(np.searchsorted(sums, picks, side="right"), len(area) - 1)
+    a, b = rng.uniform(size=(2, count))
+    fold = a + b > 1
+    a, b = np.where(fold, 1 - a, a)[:, None], np.where(fold, 1 - b, b)[:, None]
+    one, two, three = (corners[face, k] for k in range(3))
+    normals = turned[face] / twice[face, None] * (1.0 if volume > 0 else -1.0)
+    return one + a * (two - one) + b * (three - one), normals, float(sums[-1])

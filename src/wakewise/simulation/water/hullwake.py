@@ -1,0 +1,131 @@
+"""The wake of a hull: what drag takes from the water's motion past the hull, given back to the water behind it.
+
+A hull that moves through the water drags some of it along. The force that this costs, F, is the water's loss: parcels
+of impulse -F dt / rho, sent from the lee of the hull, carry it on (`wakewise.simulation.water.closure`, *Wakes*). A
+vehicle that hovers in a current so leaves no momentum in the mean: its jets carry what its wake lacks.
+
+The wake begins as wide as the hull: as a Gaussian whose middle is as fast as a top hat's of the hull's frontal area
+would be, sigma = sqrt(A / 2 pi), the relation of a jet's sigma and its disk. A hull whose drag coefficient is above 2
+would so lose more than all of the speed of the water behind it, and its wake begins wider, with the momentum thickness
+as sigma, where the deficit on the axis is all of that speed. A moment on the hull leaves no impulse and is left out, as
+is what an added mass borrows from the water and gives back.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wakewise.core.arrays import Array, freeze
+from wakewise.simulation.water.drift import EMISSION_SPACING
+from wakewise.simulation.water.parcels import Parcels
+
+_STILL_M_S = 1e-6  # slower water past the hull leaves it without a lee
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HullPush:
+    """What a hull, taken as a box about its origin, did to the water during a step.
+
+    Parameters
+    ----------
+    p_WB_m : ndarray, shape (3,)
+        Its middle at the end of the step.
+    R_WB : ndarray, shape (3, 3)
+    size_m : ndarray, shape (3,)
+        Of the box, along the body's axes.
+    velocity_W_m_s, through_W_m_s : ndarray, shape (3,)
+        Its velocity, and that through the water without thrusters.
+    impulse_W_N_s : ndarray, shape (3,)
+        The hull's drag on the water over the step: the opposite of the water's on the hull.
+    """
+
+    p_WB_m: Array
+    R_WB: Array
+    size_m: Array
+    velocity_W_m_s: Array
+    through_W_m_s: Array
+    impulse_W_N_s: Array
+
+    def __post_init__(self) -> None:
+        threes = ("p_WB_m", "size_m", "velocity_W_m_s", "through_W_m_s", "impulse_W_N_s")
+        freeze(self, R_WB=(3, 3), **dict.fromkeys(threes, (3,)))
+
+
+def frontal_area_m2(size_m: Array, direction_B: Array) -> float:
+    """Area of a box as seen along a unit vector."""
+    (a, b, c), (x, y, z) = size_m.tolist(), direction_B.tolist()
+    return float(abs(x) * b * c + abs(y) * a * c + abs(z) * a * b)
+
+
+def lee_m(size_m: Array, direction_B: Array) -> float:
+    """Distance from the middle of a box to its side along a unit vector."""
+    sides = zip(size_m.tolist(), direction_B.tolist(), strict=True)
+    return min(0.5 * size / max(abs(along), 1e-9) for size, along in sides)
+
+
+def first_wake(strength_m3_s: float, speed_m_s: float, area_m2: float) -> tuple[float, float]:
+    """Sigma in m and deficit on the axis in m/s of a wake where it begins.
+
+    `strength_m3_s` is its impulse over density and length, F / (rho U), and `speed_m_s` U.
+    """
+    theta2 = strength_m3_s / (2 * math.pi * speed_m_s)
+    sigma2 = max(area_m2 / (2 * math.pi), theta2)
+    return math.sqrt(sigma2), speed_m_s * theta2 / sigma2
+
+
+class HullWake:
+    """Collects what a hull gives to the water, and sends it as parcels at even distances along its way.
+
+    Parameters
+    ----------
+    stream : int
+        Of the parcels.
+    density_kg_m3 : float
+    """
+
+    def __init__(self, stream: int, density_kg_m3: float) -> None:
+        self._stream = stream
+        self._density = density_kg_m3
+        self.waiting_m4_s = np.zeros(3)
+        """Impulse over density not yet sent, shape (3,)."""
+        self._way = self._time = 0.0
+
+    def sent(self, dt_s: float, push: HullPush, rng: np.random.Generator) -> Parcels:
+        """Parcels of a step of dt_s, their place and age those of its end; mostly none."""
+        speed = math.hypot(*push.through_W_m_s.tolist())
+        self.waiting_m4_s = self.waiting_m4_s + push.impulse_W_N_s / self._density
+        self._way += speed * dt_s
+        self._time += dt_s
+        impulse = math.hypot(*self.waiting_m4_s.tolist())
+        if speed < _STILL_M_S or impulse == 0.0:
+            return Parcels.none()
+        ahead = push.through_W_m_s / speed
+        ahead_B = ahead @ push.R_WB
+        sigma, deficit = first_wake(impulse / self._way, self._way / self._time, frontal_area_m2(push.size_m, ahead_B))
+        spacing = EMISSION_SPACING * sigma
+        count = int(self._way / spacing)
+        if count == 0:
+            return Parcels.none()
+        # Each stands for the stretch of way about it; what is left of the way waits with its share of the impulse.
+        behind = lee_m(push.size_m, ahead_B) + self._way - spacing * (np.arange(count) + 0.5)
+        share = count * spacing / self._way
+        each = self.waiting_m4_s * (share / count)
+        self.waiting_m4_s = self.waiting_m4_s * (1.0 - share)
+        self._way, self._time = self._way * (1.0 - share), self._time * (1.0 - share)
+        same = np.ones(count)
+        sent = Parcels.sent(
+            push.p_WB_m - behind[:, None] * ahead,
+            np.tile(each, (count, 1)),
+            sigma * same,
+            # With twice its first sigma as diameter a wake has no core.
+            2.0 * sigma * same,
+            np.full(count, self._stream),
+            rng.standard_normal((count, 3)),
+            np.tile(push.velocity_W_m_s, (count, 1)),
+            deficit * same,
+        )
+        # None of its water came through a disk: the deficit itself is all that it has of the hull's motion.
+        return replace(sent, share=np.zeros(count))

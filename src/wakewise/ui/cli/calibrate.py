@@ -1,0 +1,77 @@
+"""`wakewise calibrate`: a camera from photographs of a ChArUco board."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wakewise.core.errors import InputError
+from wakewise.ui.cli.console import Bars, print_json, print_table, shown
+from wakewise.ui.cli.options import Json
+
+Photos = Annotated[Path, typer.Argument(help="Folder of photographs of one ChArUco board.")]
+Squares = Annotated[str, typer.Option("--board", metavar="COLUMNSxROWS", help="Squares across and down.")]
+Square = Annotated[float, typer.Option("--square-mm", help="Side of a square.")]
+Marker = Annotated[float, typer.Option("--marker-mm", help="Side of a marker.")]
+Lens = Annotated[
+    str, typer.Option("--model", help="pinhole, opencv (4 coefficients, as COLMAP's), radial (5) or rational (8).")
+]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", help="File for the camera, which `wakewise reconstruct --camera` reads: JSON with all "
+                 "figures, or .txt, COLMAP's cameras.txt.", show_default=False),
+]  # fmt: skip
+
+
+def calibrate(
+    photos: Photos,
+    board: Squares = "11x8",
+    square_mm: Square = 8.0,
+    marker_mm: Marker = 6.0,
+    model: Lens = "radial",
+    out: Out = None,
+    json: Json = False,
+) -> None:
+    """Calibrate a camera, also behind a flat port: focal length, distortion, and the residual of every lens model."""
+    from wakewise.core.optional_dependencies import need
+
+    need("wakewise calibrate", "photos")
+    from wakewise.core.files import write_json, write_text
+    from wakewise.vision.reconstruction import Board
+    from wakewise.vision.reconstruction import calibrate as solve
+    from wakewise.vision.reconstruction.calibration import cameras_txt
+
+    if out is not None and out.is_dir():
+        raise InputError(f"--out {out}: a folder is there, a file is needed (.json, or .txt for COLMAP's cameras.txt)")
+    columns, cross, rows = board.lower().partition("x")
+    if not (cross and columns.isdigit() and rows.isdigit()):
+        raise InputError(f"--board: '{board}', must be COLUMNSxROWS such as 11x8")
+    with Bars().stage("calibrate"):
+        squares = Board(columns=int(columns), rows=int(rows), square_m=1e-3 * square_mm, marker_m=1e-3 * marker_mm)
+        found = solve(photos, squares, model)
+    figures = found.summary()
+    if out is not None and out.suffix.lower() == ".txt":
+        write_text(out, cameras_txt(found))
+    elif out is not None:
+        write_json(out, figures)
+    if json:
+        print_json(figures)
+        return
+    from rich.table import Table
+
+    table = Table(title=str(photos))
+    table.add_column("figure")
+    table.add_column("value", justify="right")
+    for key, value in figures.items():
+        if isinstance(value, dict):
+            for name, each in value.items():
+                table.add_row(f"{key}: {name}", shown(each))
+        elif isinstance(value, list):
+            table.add_row(key, ", ".join(shown(each) for each in value))
+        else:
+            table.add_row(key, shown(value))
+    print_table(table)
+    if out is not None:
+        typer.echo(f"camera: {out}; reconstruct PHOTOS --camera {out} begins with it")

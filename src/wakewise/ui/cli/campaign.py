@@ -1,0 +1,309 @@
+"""`wakewise campaign`: many trials from one file, run, resumed, looked at."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from wakewise.ui.cli.console import Bars, plain, print_json, print_table, shown
+from wakewise.ui.cli.options import Json
+
+if TYPE_CHECKING:
+    from wakewise.experiments.campaigns.engines import Engine
+    from wakewise.experiments.campaigns.table import Results
+
+app = typer.Typer(
+    help="Campaigns: methods x targets x worlds x seeds from one file, resumable, on one computer or a cluster.",
+    no_args_is_help=False,
+    rich_markup_mode=None,
+)
+
+File = Annotated[Path, typer.Argument(help="Campaign YAML file; `wakewise campaign example` prints one.")]
+Folder = Annotated[Path, typer.Argument(help="Folder of a campaign, or its file where --out was not given.")]
+Engines = Annotated[str, typer.Option("--engine", help="processes, or dask for more than one computer.")]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="ADDR",
+        help="dask: address of a running scheduler, such as tcp://10.0.0.1:8786, or its scheduler file; a cluster on "
+        "this computer if not given.",
+        show_default=False,
+    ),
+]
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        help="Trials at once; one per core if not given. Each has its share of the cores.", show_default=False
+    ),
+]
+Timeout = Annotated[
+    float | None,
+    typer.Option("--timeout", metavar="S", help="End a trial that takes longer; else the file's.", show_default=False),
+]
+Memory = Annotated[
+    float | None,
+    typer.Option("--memory", metavar="MB", help="End a trial that takes more; else the file's.", show_default=False),
+]
+Retries = Annotated[
+    int | None,
+    typer.Option(help="Tries after a process that died or was ended; else the file's.", show_default=False),
+]
+Out = Annotated[
+    Path | None, typer.Option("--out", help="Folder of the campaign; runs/NAME if not given.", show_default=False)
+]
+Again = Annotated[bool, typer.Option("--again", help="Try trials anew that have failed.")]
+By = Annotated[
+    str,
+    typer.Option(
+        help="Group by these, with commas between: method, target, world, vehicle, variation, seed; all that differ "
+        "but the seed if not given.",
+        show_default=False,
+    ),
+]
+Figures = Annotated[
+    str, typer.Option(help="Figures to show, with commas between; the main ones if not given.", show_default=False)
+]
+Compare = Annotated[
+    str,
+    typer.Option(
+        help="What is compared: method, target, world, vehicle or variation; the first that differs if not given.",
+        show_default=False,
+    ),
+]
+PageOut = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", help="File or folder to write; campaign.html in its folder if not given.", show_default=False
+    ),
+]
+Write = Annotated[
+    Path | None,
+    typer.Option("--write", help="Write all trials, a row each, as .parquet or .csv.", show_default=False),
+]
+
+
+@app.command("run")
+def run_campaign(
+    file: File,
+    engine: Engines = "processes",
+    scheduler: Scheduler = None,
+    workers: Workers = None,
+    timeout: Timeout = None,
+    memory: Memory = None,
+    retries: Retries = None,
+    out: Out = None,
+    again: Again = False,
+    json: Json = False,
+) -> None:
+    """Make the trials of a campaign that are not made yet.
+
+    Stopped by Ctrl-C or killed, the same command goes on; what is finished is kept. A second one on the same folder
+    takes what the first is not at. Trials that fail are kept with their reason.
+    """
+    from wakewise.core.errors import EnvironmentFailure, InputError
+    from wakewise.core.files import named
+    from wakewise.core.jit.precompile import warm
+    from wakewise.core.optional_dependencies import need
+    from wakewise.experiments.campaigns import load_campaign, planned, run
+    from wakewise.experiments.campaigns.plan import keep_plan
+    from wakewise.experiments.campaigns.run import check_bounds
+    from wakewise.experiments.campaigns.store import GO_ON, open_store
+    from wakewise.experiments.campaigns.table import group_table, results, status
+    from wakewise.operation.flying import FLIGHT_JOBS
+
+    chosen = _engine(engine, scheduler, workers)
+    campaign = load_campaign(file)
+    timeout_s = campaign.timeout_s if timeout is None else timeout
+    memory_MB = campaign.memory_MB if memory is None else memory
+    tries = campaign.retries if retries is None else retries
+    check_bounds(timeout_s, memory_MB, tries)
+    jobs: tuple[str, ...] = FLIGHT_JOBS
+    if campaign.stages == "model":
+        need("a campaign of `stages: model`", "photos", "logs")
+        from wakewise.experiments.trials.trial import JOBS
+
+        jobs = JOBS
+    bars = Bars()
+    with bars.stage("plan") as progress:
+        progress(0, 1, "checking every combination")
+        trials = planned(campaign, str(file))
+    folder = out or named(Path("runs"), campaign.name, f"{file}: name")
+    open_store(folder)
+    keep_plan(folder, campaign, trials)
+    with bars.stage("compile") as progress:  # else each of the workers would
+        warm(jobs, progress)
+    with bars.stage("trials") as progress:
+        outcomes = run(
+            [one.task for one in trials],
+            folder,
+            chosen,
+            timeout_s=timeout_s,
+            memory_MB=memory_MB,
+            retries=tries,
+            progress=progress,
+            again=again,
+        )
+    found = results(folder)
+    if json:
+        print_json(status(found) | {"folder": str(folder), "groups": group_table(found)})
+    else:
+        _show_groups(found, group_table(found))
+        typer.echo(f"folder: {folder}; `wakewise campaign page {folder}` says who won, with pictures")
+    unmade = [one for one in outcomes if one.figures is None and one.how == "computer"]
+    if unmade:
+        raise EnvironmentFailure(
+            f"{folder}: {len(unmade)} of {len(outcomes)} trials could not be made, the first: {unmade[0].task.name}: "
+            f"{unmade[0].reason}; {GO_ON}"
+        )
+    if found.count("done") == 0 and found.count("failed"):
+        raise InputError(f"{file}: every trial failed, the first: {status(found)['failures'][0]['reason']}")
+
+
+@app.command("status")
+def show_status(folder: Folder, json: Json = False) -> None:
+    """How many trials are done, at work, waiting and failed, and why those failed that did."""
+    from wakewise.experiments.campaigns.table import results, status
+
+    told = status(results(_folder(folder)))
+    if json:
+        print_json(told)
+        return
+    typer.echo(
+        f"{told['name']}: {told['done']} of {told['trials']} trials done, {told['running']} at work, "
+        f"{told['waiting']} waiting, {told['failed']} failed"
+    )
+    words = f"{told['attempts']} attempts; {told['drivers']} runs at it now"
+    if told["trial_s"] is not None:
+        words += f"; {told['trial_s']:.0f} s a trial"
+    if told["others"]:
+        words += f"; {told['others']} trials in the folder are not the file's any more"
+    typer.echo(words)
+    _show_failures(told["failures"])
+
+
+@app.command("table")
+def show_table(folder: Folder, by: By = "", figures: Figures = "", write: Write = None, json: Json = False) -> None:
+    """Each group's figures: mean and 95 % interval over its trials; failures with their reasons."""
+    from wakewise.experiments.campaigns.table import failures, group_table, results, write_table
+
+    found = results(_folder(folder))
+    groups = group_table(found, _listed(by), _listed(figures))
+    if write is not None:
+        write_table(found, write)
+    if json:
+        print_json({"name": found.plan.name, "groups": groups, "failures": failures(found)})
+        return
+    _show_groups(found, groups)
+
+
+@app.command("page")
+def make_page(folder: Folder, compare: Compare = "", out: PageOut = None, json: Json = False) -> None:
+    """Write a page that says who won, by how much, how sure, at what price, and shows where it failed."""
+    from dataclasses import asdict
+
+    from wakewise.core.optional_dependencies import need
+    from wakewise.experiments.campaigns.contest import contest, places
+    from wakewise.experiments.campaigns.table import results
+
+    need("the page of a campaign", "reports")
+    from wakewise.ui.reports import write_campaign
+
+    place = _folder(folder)
+    found = results(place)
+    page = write_campaign(found, place, out, compare)
+    if json:
+        judged = contest(places(found, compare))
+        print_json({"page": str(page), "glances": [asdict(one) | {"sure": one.sure} for _, one in judged]})
+        return
+    typer.echo(f"page: {page}")
+
+
+@app.command("example")
+def print_example() -> None:
+    """Print a campaign file to begin with."""
+    from wakewise.experiments.campaigns.definition import example
+
+    typer.echo(example(), nl=False)
+
+
+def _engine(name: str, scheduler: str | None, workers: int | None) -> Engine:
+    """The engine that the options name.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name, or the options do not fit.
+    """
+    from wakewise.core.errors import InputError
+    from wakewise.experiments.campaigns.definition import close_to
+    from wakewise.experiments.campaigns.engines import Processes
+
+    if name == "dask":
+        from wakewise.experiments.campaigns.cluster import Dask
+
+        return Dask(scheduler, workers)
+    if name != "processes":
+        raise InputError(f"--engine: '{name}', {close_to(name, ['processes', 'dask'])}allowed: processes, dask")
+    if scheduler is not None:
+        raise InputError("--scheduler: only with --engine dask")
+    return Processes(workers)
+
+
+def _folder(path: Path) -> Path:
+    """The folder of a campaign, where its file was given."""
+    if path.is_file():
+        from wakewise.core.files import named
+        from wakewise.experiments.campaigns import load_campaign
+
+        return named(Path("runs"), load_campaign(path).name, f"{path}: name")
+    return path
+
+
+def _listed(text: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in text.split(",") if part.strip())
+
+
+def _show_groups(found: Results, groups: list[dict[str, Any]]) -> None:
+    """A row per group, then what failed."""
+    from rich.table import Table
+
+    from wakewise.experiments.campaigns.table import failures
+    from wakewise.experiments.trials import UNITS
+
+    done = found.count("done")
+    table = Table(
+        title=f"{found.plan.name}: {done} of {len(found.made)} trials; mean and 95 % interval", title_justify="left"
+    )
+    factors = [key for key in groups[0] if key not in ("trials", "done", "failed", "figures")]
+    names = list(groups[0]["figures"])
+    for factor in factors:
+        table.add_column(factor, no_wrap=True)
+    table.add_column("trials", justify="right")
+    for name in names:
+        unit = UNITS.get(name, "")
+        table.add_column(
+            f"{name} [{unit}]" if unit and not name.endswith(unit.replace("/", "_")) else name, justify="right"
+        )
+    for group in groups:
+        lost = f" ({group['failed']} failed)" if group["failed"] else ""
+        cells = [_cell(group["figures"][name]) for name in names]
+        table.add_row(*(plain(str(group[f])) for f in factors), f"{group['done']}/{group['trials']}{lost}", *cells)
+    print_table(table)
+    _show_failures(failures(found))
+
+
+def _cell(figure: dict[str, Any]) -> str:
+    if figure["mean"] is None:
+        return shown(None)
+    mean = shown(float(figure["mean"]))
+    return mean if figure["low"] is None else f"{mean} ({shown(figure['low'])} to {shown(figure['high'])})"
+
+
+def _show_failures(failed: list[dict[str, Any]]) -> None:
+    for one in failed[:20]:
+        typer.echo(f"failed: {one['name']}: {one['reason']} ({one['attempts']} attempts; trials/{one['key']}/log.txt)")
+    if len(failed) > 20:
+        typer.echo(f"and {len(failed) - 20} more; --json lists all")

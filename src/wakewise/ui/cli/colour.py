@@ -1,0 +1,50 @@
+"""`wakewise colour`: photographs with the water's colour taken away, for people to look at."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wakewise.ui.cli.console import Bars, print_json
+from wakewise.ui.cli.options import Json
+
+Photos = Annotated[Path, typer.Argument(help="Folder of photographs, or of a finished trial.")]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", help="Folder for the corrected photographs; PHOTOS-colour if not given.", show_default=False),
+]
+Model = Annotated[
+    Path | None,
+    typer.Option(
+        "--model",
+        help="Folder that wakewise reconstruct or scan made from the same photographs: with its depths the water is "
+        "undone by physics. A trial brings its own.",
+        show_default=False,
+    ),
+]
+
+
+def colour(photos: Photos, out: Out = None, model: Model = None, json: Json = False) -> None:
+    """Correct the colours of underwater photographs for people; matching and measuring use the photographs as taken.
+
+    With a model, the water's veil and attenuation are fitted to colour and depth and undone. Without one, or for a
+    photograph that is not part of it, the colour cast is taken away and the contrast stretched.
+    """
+    from wakewise.core.optional_dependencies import need
+
+    need("wakewise colour", "photos")
+    from wakewise.vision.texturing.photo_colours import correct_photos
+
+    folder = photos / "images" if (photos / "images").is_dir() else photos
+    model = model or (photos if folder != photos else None)
+    into = out or photos.with_name(f"{photos.resolve().name}-colour")
+    with Bars().stage("colour") as progress:
+        done = correct_photos(folder, into, model=model, progress=progress)
+    if json:
+        print_json(done.summary() | {"folder": str(into)})
+        return
+    for line in done.words():
+        typer.echo(line)
+    typer.echo(f"photographs: {into}")

@@ -1,0 +1,95 @@
+"""`wakewise compare`: methods side by side on the same seed."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from wakewise.core.errors import InputError
+from wakewise.ui.cli.console import Bars, no_report, print_json, print_table, shown, unit_beside
+from wakewise.ui.cli.options import (
+    Json,
+    Out,
+    Preset,
+    ScenarioFile,
+    Seed,
+    Sets,
+    TargetName,
+    TargetSize,
+    Vehicle,
+    World,
+    default_folder,
+    overrides,
+)
+
+Methods = Annotated[str, typer.Option("--methods", help="Comma-separated; ratios are to the first.")]
+
+_ROWS = (
+    "success",
+    "rmse_mm",
+    "completeness_pct",
+    "target_speed_mean_m_s",
+    "exposure_speed_mean_m_s",
+    "bed_speed_p95_m_s",
+    "turbidity_mean_per_m",
+    "disturbance_flown",
+    "position_rmse_mm",
+    "path_rmse_mm",
+    "velocity_deviation_pct",
+    "energy_kJ",
+    "sign_flips_per_s",
+    "solve_ms_median",
+)
+
+
+def compare(
+    scenario: ScenarioFile = None,
+    methods: Methods = "dp,wake-aware",
+    preset: Preset = "quick",
+    out: Out = None,
+    target: TargetName = None,
+    target_size: TargetSize = None,
+    vehicle: Vehicle = None,
+    world: World = None,
+    seed: Seed = None,
+    sets: Sets = None,
+    json: Json = False,
+) -> None:
+    """Fly the same mission with each method in the same water, and set the outcomes side by side."""
+    from wakewise.core.optional_dependencies import need
+
+    need("wakewise compare", "photos", "reports", "logs")
+    from wakewise import api
+    from wakewise.experiments.trials import UNITS
+    from wakewise.operation import load_scenario
+
+    names = [name.strip() for name in methods.split(",") if name.strip()]
+    if len(names) != len(set(names)) or len(names) < 2:
+        hint = f"; one alone is `wakewise scan --method {names[0]}`" if len(names) == 1 else ""
+        raise InputError(f"--methods: '{methods}', must be two or more different names such as dp,wake-aware{hint}")
+    changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, world=world)
+    scenarios = {name: load_scenario(preset, scenario, changes | {"method": name}) for name in names}
+    folder = out or default_folder(scenarios[names[0]], "compare")
+    result = api.compare(scenarios, folder, Bars())
+    figures = result.figures
+    if json:
+        print_json(figures)
+        no_report(result.report_fault)
+        return
+    from rich.table import Table
+
+    table = Table(title=f"{scenarios[names[0]].name}, seed {scenarios[names[0]].seed}")
+    table.add_column("figure")
+    for name in names:
+        table.add_column(name, justify="right")
+    table.add_column("unit")
+    for key in _ROWS:
+        table.add_row(key, *(shown(figures["methods"][name][key]) for name in names), unit_beside(key, UNITS[key]))
+    table.add_section()
+    for key in figures["ratios"][names[0]]:
+        if key != "why":
+            table.add_row(f"{key} ratio", *(shown(figures["ratios"][name][key]) for name in names), f"to {names[0]}")
+    print_table(table)
+    if no_report(result.report_fault):
+        typer.echo(f"report: {result.report}")

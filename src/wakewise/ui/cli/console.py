@@ -1,0 +1,187 @@
+"""What a person sees: a bar per stage with time left on standard error, tables or JSON on standard output.
+
+Rich is imported when something is drawn, since every command imports this page and `--help` is to be quick.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext, suppress
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+
+HEARTBEAT_S = 30.0
+"""Longest silence of a stage whose progress goes into a pipe or a file."""
+INTERRUPTED = threading.Event()
+"""Set by Ctrl-C; whoever tells of progress afterwards is stopped, should the interrupt itself have been swallowed."""
+
+
+@cache
+def _stderr() -> Console:
+    from rich.console import Console
+
+    return Console(stderr=True, highlight=False)
+
+
+class Bars:
+    """A `Watch` that shows a progress bar while a stage runs and leaves one line behind it.
+
+    Where standard error is no terminal that line is written, and one now and then before it, so that a log shows life.
+    A stage that fails leaves nothing more: the error speaks.
+    """
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[Callable[..., None]]:
+        """Show a bar while the block runs."""
+        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+        stderr = _stderr()
+        columns = (
+            SpinnerColumn(),
+            TextColumn("{task.description:<12}"),
+            BarColumn(bar_width=30),
+            TextColumn("{task.percentage:>3.0f} %"),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+            TextColumn("[dim]{task.fields[note]}"),
+        )
+        began = time.perf_counter()
+        with Progress(*columns, console=stderr, transient=True, disable=not stderr.is_terminal) as progress:
+            task = progress.add_task(name, total=None, note="")
+
+            def advance(done: float, total: float, note: str = "") -> None:
+                if INTERRUPTED.is_set():
+                    raise KeyboardInterrupt
+                progress.update(task, completed=done, total=total, note=note)
+                where[:] = [done, total, note]
+
+            where: list[Any] = [0, 0, ""]
+            with nullcontext() if stderr.is_terminal else _heartbeat(name, where):
+                yield advance
+        took_s = round(time.perf_counter() - began)
+        stderr.print(f"[green]✓[/] {name:<12} {took_s // 60:>3}:{took_s % 60:02} min")
+
+    def skipped(self, name: str) -> None:
+        """Say that a stage was already done."""
+        _stderr().print(f"[green]✓[/] {name:<12} [dim]already done")
+
+
+@contextmanager
+def _heartbeat(name: str, where: list[Any]) -> Iterator[None]:
+    """Write where a stage is (done, total, note) to standard error every half minute while the block runs.
+
+    By a thread of its own, as the work may not speak for longer than that.
+    """
+    over = threading.Event()
+    began = time.perf_counter()
+
+    def beat() -> None:
+        while not over.wait(HEARTBEAT_S):
+            done, total, note = where
+            took_s = round(time.perf_counter() - began)
+            share = f" {100.0 * done / total:.0f} %" if total else ""
+            with suppress(OSError, ValueError):  # nobody reads on
+                _stderr().print(f"  {name}{share} {note}, {took_s // 60}:{took_s % 60:02} min", markup=False)
+
+    thread = threading.Thread(target=beat, name="heartbeat", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+def write_page(name: str, write: Callable[[], Any]) -> bool:
+    """Write a report beside a result, as a stage of this name; whether it came about.
+
+    A report that fails is told in one line, and costs neither the result nor the exit code.
+    """
+    from wakewise.experiments.trials.reporting import report_attempt
+
+    with report_attempt() as attempt, Bars().stage(name):
+        write()
+    if INTERRUPTED.is_set():
+        raise KeyboardInterrupt
+    return no_report(attempt.fault)
+
+
+def no_report(fault: str | None) -> bool:
+    """Say on standard error why there is no report; whether there is one, which is where no fault is given."""
+    if fault is not None:
+        print(f"wakewise: report could not be written: {fault}", file=sys.stderr)
+    return fault is None
+
+
+def print_json(value: Any) -> None:
+    """Print one JSON object and nothing else on standard output; NaN never leaves as a word JSON lacks."""
+    sys.stdout.write(json.dumps(value, indent=2, allow_nan=False) + "\n")  # whole or not at all
+
+
+def status_line(line: str) -> None:
+    """Write over the last line of a terminal, cut to its width so that nothing wraps; a line each time elsewhere."""
+    if sys.stderr.isatty():
+        columns = shutil.get_terminal_size().columns
+        sys.stderr.write(f"\r{line[: columns - 1]}\x1b[K")
+    else:
+        sys.stderr.write(f"{line}\n")
+    sys.stderr.flush()
+
+
+def print_table(table: Table) -> None:
+    """Print a table on standard output."""
+    from rich.console import Console
+
+    console = Console(highlight=False)
+    # A pipe or a file has no width to fit into.
+    Console(highlight=False, width=console.width if console.is_terminal else 140).print(table)
+
+
+def plain(words: str) -> Text:
+    """Words of a file as they stand: what looks like markup in them is none."""
+    from rich.text import Text
+
+    return Text(words)
+
+
+def shown(value: Any) -> str:
+    """A figure as people read it: four significant digits, words for what is missing."""
+    if value is None:
+        return "—"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        if value != 0 and math.isfinite(value) and abs(value) < 0.01:
+            return f"{value:.2g}"
+        return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}" if abs(value) < 10 else f"{value:.1f}"
+    return str(value)
+
+
+_IN_NAMES = {"m/s": "m_s", "%": "pct", "1/m": "per_m", "1/s": "per_s"}
+
+
+def unit_beside(key: str, unit: str) -> str:
+    """The unit to print beside a figure's name; nothing where the name ends in it or holds it."""
+    return "" if f"_{_IN_NAMES.get(unit, unit)}_" in f"{key}_" else unit
+
+
+def reasons_once(why: Mapping[str, str], keys: Sequence[str]) -> list[str]:
+    """A line for every reason that one of these figures is missing for; figures that share a reason share the line."""
+    shared: dict[str, list[str]] = {}
+    for key in keys:
+        if key in why:
+            shared.setdefault(why[key], []).append(key)
+    return [f"{', '.join(failed)}: {reason}" for reason, failed in shared.items()]

@@ -1,0 +1,250 @@
+"""`wakewise evaluate`: a cloud against a true mesh, another cloud, or depth maps of surveyed cameras."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from wakewise.core.errors import InputError
+from wakewise.ui.cli.console import print_json, print_table, shown
+from wakewise.ui.cli.options import Json
+
+if TYPE_CHECKING:
+    from wakewise.core.arrays import Array
+
+Cloud = Annotated[Path, typer.Argument(help="Reconstructed points or mesh (PLY), in metres.")]
+Reference = Annotated[
+    Path | None,
+    typer.Option("--reference", help="True surface in the same frame and metres: a mesh, or a cloud such as a laser "
+                 "scan's.", show_default=False),
+]  # fmt: skip
+Depths = Annotated[
+    Path | None,
+    typer.Option("--depth-maps", help="True depths instead: an .npz file with an array depth (n, h, w), m.",
+                 show_default=False),
+]  # fmt: skip
+Cameras = Annotated[
+    Path | None,
+    typer.Option("--cameras", help="Camera positions (.camera folder or CSV name,x_m,y_m,z_m): with a mesh for what "
+                 "was visible; with depth maps, the .camera folder they belong to.", show_default=False),
+]  # fmt: skip
+Bed = Annotated[
+    float | None,
+    typer.Option("--bed-z", metavar="M", help="Height of the bed (z down); what is near it does not count.",
+                 show_default=False),
+]  # fmt: skip
+NoIcp = Annotated[bool, typer.Option("--no-icp", help="Do not refine the alignment before measuring.")]
+Colours = Annotated[
+    Path | None,
+    typer.Option("--colours", metavar="PLY", help="Write the cloud coloured by error: blue 0, green 1.5, red 3 mm.",
+                 show_default=False),
+]  # fmt: skip
+Unit = Annotated[
+    float,
+    typer.Option("--unit-m", metavar="M", help="Length of the reference's unit in metres: 0.001 for millimetres."),
+]
+
+
+Thresholds = Annotated[
+    str | None,
+    typer.Option("--thresholds", metavar="LIST", help="Distances at which shares are counted: mm, as 0.5,1,2, or "
+                 "percent of the truth's extent, as 0.5%,1%; 0.25%,0.5%,1% if not given.", show_default=False),
+]  # fmt: skip
+Figures = tuple[dict[str, Any], dict[str, tuple[str, str]]]
+"""Values and what they are: unit and definition by key."""
+
+
+def evaluate(
+    cloud: Cloud,
+    reference: Reference = None,
+    depth_maps: Depths = None,
+    cameras: Cameras = None,
+    bed_z: Bed = None,
+    unit_m: Unit = 1.0,
+    thresholds: Thresholds = None,
+    no_icp: NoIcp = False,
+    colours: Colours = None,
+    json: Json = False,
+) -> None:
+    """Measure a model against the truth: accuracy, completeness, F-score, each figure defined beside it.
+
+    A model that is no model of the reference is a failure, never a figure.
+    """
+    from wakewise.vision.reconstruction import read_cloud
+
+    if (reference is None) == (depth_maps is None):
+        raise InputError("evaluate: give either --reference MESH or CLOUD, or --depth-maps NPZ with --cameras FOLDER")
+    if not unit_m > 0.0:
+        raise InputError(f"--unit-m {unit_m:g}: must be above 0")
+    if depth_maps is not None and thresholds is not None:
+        raise InputError("--thresholds: depth maps have their own, 5, 10, 20 and 50 mm")
+    points = read_cloud(cloud).points_m
+    if reference is None:
+        figures, definitions = _against_depths(points, depth_maps, cameras)
+    else:
+        figures, definitions = _against_reference(
+            cloud, points, reference, cameras, bed_z, unit_m, thresholds, not no_icp, colours
+        )
+    _remark(figures)
+    if json:
+        why = {key: "camera positions were not given (--cameras)" for key, value in figures.items() if value is None}
+        why |= {key: "ICP was not wished for" for key in why if key.startswith("icp_")}
+        why |= {key: "the model is no mesh" for key in why if key == "model_faults"}
+        units = {key: unit for key, (unit, _) in definitions.items()}
+        print_json(
+            figures | {"why": why, "units": units, "definitions": {k: text for k, (_, text) in definitions.items()}}
+        )
+        return
+    from rich.table import Table
+
+    table = Table(title=f"{cloud} against {reference or depth_maps}")
+    table.add_column("figure")
+    table.add_column("value", justify="right")
+    table.add_column("what it is")
+    for key, value in figures.items():
+        if not isinstance(value, (list, dict)) and key != "model_faults":
+            table.add_row(key, shown(value), definitions[key][1])
+    print_table(table)
+    for share in figures.get("shares", ()):
+        typer.echo(
+            f"within {share['threshold_mm']:.3g} mm: {share['accuracy_pct']:.1f} % of the model, "
+            f"{share['completeness_pct']:.1f} % of the truth, F {share['f_score']:.1f}"
+        )
+
+
+def _remark(figures: dict[str, Any]) -> None:
+    """Faults of the meshes, and thresholds that say nothing of so small a thing, on standard error."""
+    from wakewise.vision.evaluation.soundness import MeshFaults
+    from wakewise.vision.evaluation.thresholds import TELLING_PCT
+
+    for key, name in (("reference_faults", "reference"), ("model_faults", "model")):
+        for words in MeshFaults(**figures[key]).words() if figures.get(key) else ():
+            typer.echo(f"wakewise: {name}: {words}", err=True)
+    extent = figures.get("extent_mm")
+    if extent is not None and "completeness_pct" in figures and 0.01 * TELLING_PCT * extent < 3.0:
+        typer.echo(
+            f"wakewise: 3 mm are {300.0 / extent:.0f} % of this object's {extent:.0f} mm: completeness_pct, f_score "
+            "and success say little, see the shares (--thresholds)",
+            err=True,
+        )
+
+
+def _against_reference(
+    cloud: Path,
+    points: Array,
+    reference: Path,
+    cameras: Path | None,
+    bed_z: float | None,
+    unit_m: float,
+    thresholds: str | None,
+    icp: bool,
+    colours: Path | None,
+) -> Figures:
+    """Against a mesh, or against a cloud where the file has no faces."""
+    from wakewise.core.errors import StageError
+    from wakewise.core.optional_dependencies import need
+
+    need("wakewise evaluate", "photos", only=("embreex", "small_gicp"))
+    import numpy as np
+
+    from wakewise.vision.evaluation import error_colours
+    from wakewise.vision.reconstruction import Cloud as Points
+    from wakewise.vision.reconstruction import write_cloud
+
+    try:
+        figures, definitions, aligned, error_mm = _measured(
+            cloud, points, reference, cameras, bed_z, unit_m, thresholds, icp
+        )
+    except StageError as fault:
+        if bed_z is not None:
+            raise
+        raise StageError(f"{fault}; if the model holds the bed that the object stands on, say where: --bed-z") from None
+    if colours is not None:
+        none = np.zeros_like(aligned)
+        write_cloud(colours, Points(points_m=aligned, normals=none, colours=error_colours(error_mm)))
+    return figures, definitions
+
+
+def _measured(
+    cloud: Path,
+    points: Array,
+    reference: Path,
+    cameras: Path | None,
+    bed_z: float | None,
+    unit_m: float,
+    thresholds: str | None,
+    icp: bool,
+) -> tuple[dict[str, Any], dict[str, tuple[str, str]], Array, Array]:
+    """Figures, definitions, the aligned model and its errors in mm."""
+    import numpy as np
+
+    from wakewise.scene.targets import read_mesh
+    from wakewise.scene.targets.mesh import READABLE_SUFFIXES, FacelessFileError
+    from wakewise.vision.evaluation import (
+        CLOUD_DEFINITIONS,
+        MESH_REFERENCE_DEFINITIONS,
+        SURFACE_DEFINITIONS,
+        Crop,
+        compare_clouds,
+        compare_surface,
+        extent_m,
+        mesh_faults,
+        read_thresholds,
+        suspicious_scale,
+    )
+    from wakewise.vision.evaluation.surface import suspicious_extent
+    from wakewise.vision.reconstruction import read_cloud, read_reference_cameras
+
+    mesh = None
+    if reference.suffix.lower() in READABLE_SUFFIXES or not reference.is_file():
+        try:
+            mesh = read_mesh(reference)
+        except FacelessFileError:
+            mesh = None
+    if mesh is None:
+        if cameras is not None:
+            raise InputError(f"--cameras: what they saw of {reference} is not known, it has no faces")
+        truth = unit_m * read_cloud(reference).points_m
+        if (words := suspicious_extent(points, truth)) is not None:
+            raise InputError(f"{words} (--unit-m)")
+        wanted = read_thresholds(thresholds, 1e3 * extent_m(truth))
+        found = compare_clouds(points, truth, wanted, bed_z_m=bed_z, icp=icp)
+        figures = dataclasses.asdict(found.score) | {"shares": [dataclasses.asdict(one) for one in found.shares]}
+        return figures, CLOUD_DEFINITIONS, found.points_W_m, found.error_mm
+    if unit_m != 1.0:
+        mesh = dataclasses.replace(mesh, vertices_m=unit_m * mesh.vertices_m)
+    suspicion = suspicious_scale(points, mesh)
+    if suspicion is not None:
+        raise InputError(f"{suspicion} (--unit-m)")
+    centres = np.array(list(read_reference_cameras(cameras).values())) if cameras else None
+    extent_mm = 1e3 * extent_m(mesh.vertices_m)
+    wanted = read_thresholds(thresholds, extent_mm)
+    try:
+        compared = compare_surface(
+            points, mesh, crop=Crop(bed_z_m=bed_z), camera_centres_W_m=centres, icp=icp, thresholds_mm=wanted
+        )
+    except InputError as fault:
+        raise InputError(f"{fault}; --bed-z {bed_z:g} is its height, z down" if bed_z is not None else fault) from None
+    try:
+        own: dict[str, int] | None = dataclasses.asdict(mesh_faults(read_mesh(cloud)))
+    except InputError:
+        own = None
+    more = {
+        "extent_mm": extent_mm,
+        "shares": [dataclasses.asdict(one) for one in compared.shares],
+        "reference_faults": dataclasses.asdict(mesh_faults(mesh)),
+        "model_faults": own,
+    }
+    definitions = SURFACE_DEFINITIONS | MESH_REFERENCE_DEFINITIONS
+    return dataclasses.asdict(compared.score) | more, definitions, compared.points_W_m, compared.error_mm
+
+
+def _against_depths(points: Array, depth_maps: Path | None, cameras: Path | None) -> Figures:
+    from wakewise.vision.evaluation import DEPTH_DEFINITIONS, compare_depths, read_depth_views
+
+    if depth_maps is None or cameras is None:
+        raise InputError("--depth-maps: needs --cameras FOLDER with the .camera files that the maps belong to")
+    return dataclasses.asdict(compare_depths(points, read_depth_views(depth_maps, cameras))), DEPTH_DEFINITIONS

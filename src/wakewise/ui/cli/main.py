@@ -1,0 +1,258 @@
+"""The `wakewise` command: joins the commands, and turns errors into one line and an exit code."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from functools import cache
+from types import TracebackType
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from wakewise import __version__
+from wakewise.core.errors import InputError, MissingExtra, WakewiseError, environment_failure
+from wakewise.core.jit import cache_folder
+from wakewise.ui.cli import (
+    allocate,
+    calibrate,
+    campaign,
+    cockpit,
+    colour,
+    compare,
+    evaluate,
+    export,
+    film,
+    reconstruct,
+    scan,
+    tank,
+    target,
+    vehicle,
+    wake,
+    warm,
+    world,
+)
+from wakewise.ui.cli.commands import FLIGHT, PANELS, PHOTOGRAPHS, STUDIES, VEHICLES, Command, installed_commands
+from wakewise.ui.cli.console import INTERRUPTED
+
+_COMMANDS = (
+    Command(FLIGHT, "scan", scan.scan),
+    Command(FLIGHT, "compare", compare.compare),
+    Command(FLIGHT, "cockpit", cockpit.cockpit),
+    Command(FLIGHT, "film", film.film),
+    Command(FLIGHT, "export", export.export),
+    Command(FLIGHT, "world", world.app),
+    Command(FLIGHT, "tank", tank.app),
+    Command(FLIGHT, "target", target.app),
+    Command(PHOTOGRAPHS, "reconstruct", reconstruct.reconstruct_photos),
+    Command(PHOTOGRAPHS, "evaluate", evaluate.evaluate),
+    Command(PHOTOGRAPHS, "calibrate", calibrate.calibrate),
+    Command(PHOTOGRAPHS, "colour", colour.colour),
+    Command(VEHICLES, "vehicle", vehicle.app),
+    Command(VEHICLES, "allocate", allocate.allocate),
+    Command(VEHICLES, "wake", wake.app),
+    Command(STUDIES, "campaign", campaign.app),
+    Command(STUDIES, "warm", warm.warm),
+    *installed_commands(),
+)
+
+
+class _Panels(TyperGroup):
+    """A group whose help lists its commands by panel, panels in the order of `PANELS`."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002  (its base passes it)
+        """Write a section for each panel."""
+        width = max(len(command.name) for command in _COMMANDS if command.parent in PANELS)
+        for panel in PANELS:
+            names = [command.name for command in _COMMANDS if command.parent == panel]
+            with formatter.section(panel):
+                formatter.write_dl(
+                    [
+                        (f"{name:<{width}}", self.commands[name].get_short_help_str(formatter.width - 6 - width))
+                        for name in names
+                    ]
+                )
+
+
+app = typer.Typer(
+    name="wakewise",
+    cls=_Panels,
+    help="Fly over-actuated underwater vehicles so gently that what they photograph stays undisturbed.",
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+_GROUPS = {"": app} | {command.name: command.run for command in _COMMANDS if isinstance(command.run, typer.Typer)}
+for _command in _COMMANDS:
+    _panel = _command.parent if _command.parent in PANELS else None
+    _parent = _GROUPS["" if _panel else _command.parent]
+    if isinstance(_command.run, typer.Typer):
+        _parent.add_typer(_command.run, name=_command.name, rich_help_panel=_panel)
+    else:
+        _parent.command(_command.name, rich_help_panel=_panel)(_command.run)
+
+_INTERRUPTED = 130
+_TERMINATED = 143
+_terminated = False
+_STOPPED = "stopped; what was finished is kept, run the same command again to go on"
+
+
+def _show_version(value: bool) -> None:
+    if value:
+        typer.echo(f"wakewise {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    context: typer.Context,
+    version: bool = typer.Option(  # noqa: ARG001  (its callback does the work)
+        False, "--version", callback=_show_version, is_eager=True, help="Show the version and exit."
+    ),
+) -> None:
+    """Fly over-actuated underwater vehicles so gently that what they photograph stays undisturbed."""
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+@cache
+def _commands() -> Any:
+    """All commands with their options, put together once however many are run in a process."""
+    return typer.main.get_command(app)
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code.
+
+    0 done, 1 failed on good input, 2 bad input, 130 stopped by Ctrl-C, 143 ended by SIGTERM.
+    """
+    try:
+        code = _commands()(args=arguments, standalone_mode=False)
+        sys.stdout.flush()
+        if code == _INTERRUPTED:  # Ctrl-C inside a command
+            return _stopped()
+        return code if isinstance(code, int) else 0
+    except (KeyboardInterrupt, typer.Abort):
+        return _stopped()
+    except Exception as fault:
+        if _made_of_interrupt(fault):
+            return _stopped()
+        code = _refused(fault)
+        if code is not None:
+            return code
+        if INTERRUPTED.is_set():  # swallowed on its way by a library, which then failed at what it had left undone
+            return _stopped()
+        raise
+
+
+def _made_of_interrupt(fault: BaseException | None) -> bool:
+    """Whether an error was made of Ctrl-C, as Python 3.11 makes a RuntimeError of one that comes within a class."""
+    while fault is not None and not isinstance(fault, KeyboardInterrupt):
+        fault = fault.__cause__
+    return fault is not None
+
+
+def _refused(fault: Exception) -> int | None:
+    """Say an error that is foreseen in one line and give its exit code; None where it is not."""
+    match fault:
+        case typer.TyperException():
+            _say(_how_many(fault) or fault.format_message())
+            return 2
+        case InputError() | MissingExtra():
+            _say(str(fault))
+            return 2
+        case ModuleNotFoundError():
+            from wakewise.core.optional_dependencies import missing_extra
+
+            refusal = missing_extra("this command", fault)
+            if refusal is not None:
+                _say(str(refusal))
+            return None if refusal is None else 2
+        case WakewiseError():
+            _say(str(fault))
+        case BrokenPipeError():  # nobody reads on, as after `| head`
+            _close_output()
+        case _:
+            failure = environment_failure(fault)
+            if failure is None:
+                return None
+            _say(f"cannot write: {failure}" if isinstance(fault, OSError) and fault.filename is None else str(failure))
+            if isinstance(fault, OSError):
+                _close_output()
+    return 1
+
+
+def _how_many(fault: typer.TyperException) -> str | None:
+    """What an option of several values lacks: of too few, the next option is taken for one and told of as no number."""
+    option = getattr(fault, "param", None)
+    count = getattr(option, "nargs", 1)
+    if option is None or count < 2:
+        return None
+    return f"{option.opts[0]}: needs {count} numbers, {option.metavar}; one of those given is none"
+
+
+def _say(message: str) -> None:
+    line = " ".join(message.split())
+    with suppress(OSError):  # standard error may lie on the full disk, too
+        print(f"wakewise: {line}", file=sys.stderr)
+
+
+def _stopped() -> int:
+    _say(_STOPPED)
+    return _TERMINATED if _terminated else _INTERRUPTED
+
+
+def _close_output() -> None:
+    """Drop what could not be written, else Python tries again at its end and tells of it in words of its own."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _terminate(*_: Any) -> None:
+    """End as after Ctrl-C, so that whatever is half-done is tidied up; a second SIGTERM does not disturb that."""
+    global _terminated  # noqa: PLW0603
+    _terminated = True
+    INTERRUPTED.set()
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    raise KeyboardInterrupt
+
+
+def _interrupt(*_: Any) -> None:
+    """Ctrl-C: remembered as well as raised, since libraries that try imports or call back from C may swallow it."""
+    INTERRUPTED.set()
+    raise KeyboardInterrupt
+
+
+def _unraisable(fault: sys.UnraisableHookArgs) -> None:
+    """Ctrl-C in a call back from C cannot be raised there; it is remembered, and no stack needs to tell of it."""
+    if not isinstance(fault.exc_value, KeyboardInterrupt):
+        sys.__unraisablehook__(fault)
+
+
+def _uncaught(kind: type[BaseException], fault: BaseException, trace: TracebackType | None) -> None:
+    """The same where C prints what it cannot raise: of Python's own code none but `run` would let Ctrl-C through."""
+    if not issubclass(kind, KeyboardInterrupt):
+        sys.__excepthook__(kind, fault, trace)
+
+
+def main() -> None:
+    """Entry point of the installed command."""
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a figure with a sign that the terminal lacks is still a figure
+        sys.stdout.reconfigure(errors="replace")
+    signal.signal(signal.SIGTERM, _terminate)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a job in the background has it ignored
+        signal.signal(signal.SIGINT, _interrupt)
+    sys.unraisablehook, sys.excepthook = _unraisable, _uncaught
+    if cache_folder.CHOSEN is not None:
+        _say(f"compiled code is kept in {cache_folder.CHOSEN}: the package's folder and the user's cache are read-only")
+    code = run()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is said: an impatient Ctrl-C must not end it with a stack
+    sys.exit(code)

@@ -1,0 +1,182 @@
+"""What may be asked of `wakewise reconstruct` besides photographs and cameras."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from wakewise.core.errors import InputError
+
+if TYPE_CHECKING:
+    from wakewise.vision.reconstruction import Model, Wishes
+
+Until = Literal["sparse", "dense", "mesh"]
+
+BarOption = Annotated[
+    list[str] | None,
+    typer.Option("--bar", metavar="A,B,LENGTH[,SIGMA]", help="Distance between the middles of targets A and B in m, "
+                 "and its uncertainty; gives scale. May be repeated.", show_default=False),
+]  # fmt: skip
+BarsFile = Annotated[
+    Path | None,
+    typer.Option("--bars", metavar="FILE", help="YAML file of bars, targets' family and size, ChArUco board "
+                 "(docs/scale.md).", show_default=False),
+]  # fmt: skip
+FixesOption = Annotated[
+    str | None,
+    typer.Option("--fixes", metavar="FILE|exif", help="Where photos were taken, as GPS or a depth gauge tells it: a "
+                 "CSV with name,depth_m and lat_deg,lon_deg or north_m,east_m, or what their EXIF holds; gives scale, "
+                 "as sure as it can, where nothing better does.", show_default=False),
+]  # fmt: skip
+MasksOption = Annotated[
+    Path | None,
+    typer.Option("--masks", metavar="FOLDER", help="Images named like the photos, black where nothing is to be looked "
+                 "at; else the photos' own transparency.", show_default=False),
+]  # fmt: skip
+Crop = Annotated[
+    tuple[float, float, float, float, float, float] | None,
+    typer.Option("--crop", metavar="X0 Y0 Z0 X1 Y1 Z1", help="Keep of cloud and mesh what lies in this box, in the "
+                 "model's units (m where it has scale).", show_default=False),
+]  # fmt: skip
+UntilOption = Annotated[Until | None, typer.Option("--until", help="Last stage; mesh if not said.", show_default=False)]
+
+LookOption = Annotated[
+    bool, typer.Option("--look", help="Look at the photos only: sharpness, light, overlap, what to shoot again.")
+]
+
+
+def wishes_of(
+    bar: list[str] | None,
+    bars: Path | None,
+    masks: Path | None,
+    crop: tuple[float, float, float, float, float, float] | None,
+    until: Until | None,
+    fixes: str | None,
+    photos: Path,
+) -> Wishes:
+    """All of them, checked; `photos` are those of which fixes are read."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    from wakewise.vision.reconstruction import Box, Wishes
+    from wakewise.vision.reconstruction.scale import Bars, exif_fixes, parse_bar, read_bars, read_fixes
+
+    given = None if bars is None else read_bars(bars)
+    if bar:
+        listed = tuple(parse_bar(words) for words in bar)
+        given = Bars(bars=listed) if given is None else replace(given, bars=(*given.bars, *listed))
+    if masks is not None and not masks.is_dir():
+        raise InputError(f"--masks {masks}: is no folder; masks are images in a folder, named like the photos")
+    weak = None if fixes is None else exif_fixes(photos) if fixes == "exif" else read_fixes(Path(fixes))
+    return Wishes(
+        bars=given,
+        fixes=weak,
+        masks=masks,
+        crop=None if crop is None else Box(low=np.array(crop[:3]), high=np.array(crop[3:])),
+        until=until or "mesh",
+    )
+
+
+def frames_of(photos: Path, out: Path) -> Path:
+    """The folder of photographs: what was given, or frames of the film that was given, which are counted."""
+    from wakewise.ui.cli.console import Bars as Progress
+    from wakewise.vision.reconstruction.film_frames import is_film, take_frames
+
+    if not is_film(photos):
+        return photos
+    with Progress().stage("frames") as progress:
+        folder, said = take_frames(photos, out, progress)
+    for line in said.lines():
+        typer.echo(f"wakewise: {line}", err=True)
+    return folder
+
+
+def look_first(photos: Path, out: Path, threads: int, json: bool) -> None:
+    """Leave `out/look.html` and `look.json`, and say what to shoot again."""
+    from wakewise.core.files import write_json
+    from wakewise.core.optional_dependencies import need
+    from wakewise.ui.cli.console import Bars as Progress
+    from wakewise.ui.cli.console import print_json, write_page
+    from wakewise.ui.reports.look import write_look
+    from wakewise.vision.reconstruction.look import look_at
+
+    need("wakewise reconstruct --look", "reports")
+    if out.resolve() == photos.resolve():
+        raise InputError(f"{out}: is the folder of the photos, the look must go elsewhere")
+    with Progress().stage("look") as progress:
+        look, thumbs = look_at(photos, threads, progress)
+    write_json(out / "look.json", look.summary())
+    page = write_page("page", lambda: write_look(look, thumbs, out / "look.html", photos.resolve().name))
+    if json:
+        print_json(look.summary())
+        return
+    again = sum(bool(photo.faults) for photo in look.photos)
+    typer.echo(f"{len(look.photos)} photos, {look.groups[0]} hang together, {again} to look at again")
+    for line in look.advice:
+        typer.echo(f"  {line}")
+    if page:
+        typer.echo(f"page: {out / 'look.html'}")
+
+
+def write_report_of(out: Path, photos: Path) -> None:
+    """Leave `out/report.html`; without the packages that it needs, say so."""
+    from wakewise.core.optional_dependencies import has, how_to_install
+    from wakewise.ui.cli.console import write_page
+
+    if not has("reports"):
+        typer.echo(f"wakewise: no report, as it needs {how_to_install('reports')}", err=True)
+        return
+    from wakewise.ui.reports.photo_model import write_model_report
+
+    write_page("report", lambda: write_model_report(out, photos))
+
+
+def scale_lines(model: Model) -> list[str]:
+    """What bars and fixes say, a line each."""
+    return [*_bar_lines(model.scale_bars), *_fix_lines(model.scale_fixes)]
+
+
+def _fix_lines(said: dict[str, Any] | None) -> list[str]:
+    if said is None:
+        return []
+    sure = "open" if said["uncertainty_pct"] is None else f"uncertain by {said['uncertainty_pct']:.1f} %"
+    if said["model_off_pct"] is not None:
+        head = f"scale: by fixes, lengths are {said['model_off_pct']:+.1f} % off ({sure})"
+        if said["why"] is not None:
+            head = f"scale: fixes cannot check it, {said['why']}"
+    elif said["used"]:
+        north = "" if said["north_known"] else ", which way is north is not known"
+        head = f"scale: by fixes of {said['photos']} photos, {sure}; the third axis is down{north}"
+    else:
+        head = f"scale: none, {said['why']}"
+    rms = [
+        f"{said[key]:.2g} m {words}"
+        for key, words in (("horizontal_rms_m", "horizontally"), ("depth_rms_m", "in depth"))
+        if said[key] is not None
+    ]
+    lines = [head, f"  fixes are off by {', '.join(rms)}, rms"]
+    if said["far"]:
+        lines.append(f"  {len(said['far'])} fixes do not fit: {', '.join(said['far'][:3])}")
+    return lines
+
+
+def _bar_lines(said: dict[str, Any] | None) -> list[str]:
+    if said is None:
+        return []
+    head = f"scale: by {len(said['bars'])} bars, uncertain by {said['uncertainty_pct']:.3f} %"
+    if not said["used"]:
+        head = (
+            f"scale: from reference cameras; by the bars, lengths are {said['model_off_pct']:+.3f} % off "
+            f"(uncertain by {said['uncertainty_pct']:.3f} %)"
+        )
+    lines = [head.replace("1 bars", "1 bar")]
+    for bar in said["bars"]:
+        check = "" if bar["check_pct"] is None else f", {bar['check_pct']:+.3f} % from what the others say"
+        lines.append(
+            f"  bar {bar['name']}: {1e3 * bar['found_m']:.2f} mm, stated {1e3 * bar['length_m']:.2f} ± "
+            f"{1e3 * bar['sigma_m']:.2f} mm{check}"
+        )
+    return lines

@@ -1,0 +1,137 @@
+"""`wakewise scan`: fly, photograph, reconstruct, evaluate, report."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from wakewise.ui.cli.console import Bars, no_report, print_json, print_table, reasons_once, shown, unit_beside
+from wakewise.ui.cli.options import (
+    Json,
+    Out,
+    Preset,
+    ScenarioFile,
+    Seed,
+    Sets,
+    TargetName,
+    TargetSize,
+    Vehicle,
+    World,
+    default_folder,
+    overrides,
+)
+
+if TYPE_CHECKING:
+    from wakewise.operation import Scenario
+
+Method = Annotated[
+    str | None,
+    typer.Option(
+        "--method",
+        help="dp, bow-rule, manual, ardusub, pseudo-inverse, unaware, smooth, linear, instant, wake-aware, a plug-in, "
+        "or package.module:make.",
+        show_default=False,
+    ),
+]
+
+Resume = Annotated[
+    Path | None,
+    typer.Option(
+        "--resume",
+        metavar="FOLDER",
+        help="Go on with what a folder holds, as its scenario.yaml says: a trial cut short, a flight by hand.",
+        show_default=False,
+    ),
+]
+
+_HEADLINES = (
+    "success",
+    "rmse_mm",
+    "completeness_pct",
+    "completeness_visible_pct",
+    "f_score",
+    "registered_images",
+    "target_speed_mean_m_s",
+    "exposure_speed_mean_m_s",
+    "bed_speed_p95_m_s",
+    "turbidity_mean_per_m",
+    "position_rmse_mm",
+    "energy_kJ",
+    "solve_ms_median",
+    "collisions",
+    "wall_s",
+)
+
+
+def scan(
+    scenario: ScenarioFile = None,
+    preset: Preset = "quick",
+    out: Out = None,
+    method: Method = None,
+    target: TargetName = None,
+    target_size: TargetSize = None,
+    vehicle: Vehicle = None,
+    world: World = None,
+    seed: Seed = None,
+    sets: Sets = None,
+    resume: Resume = None,
+    json: Json = False,
+) -> None:
+    """Fly layered orbits round a target, photograph it, reconstruct it, measure the model, write a report.
+
+    Stages that are done are skipped, so running the same command again continues where it stopped; --resume needs no
+    more than the folder.
+    """
+    from wakewise.core.optional_dependencies import need
+
+    need("wakewise scan", "photos", "reports", "logs")
+    from wakewise.api import trial
+    from wakewise.core.errors import InputError
+    from wakewise.operation import load_scenario, read_scenario
+
+    changes = overrides(
+        sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, method=method, world=world
+    )
+    if resume is None:
+        resolved = load_scenario(preset, scenario, changes)
+        folder = out or default_folder(resolved, resolved.method)
+    else:
+        if scenario is not None or out is not None or changes:
+            raise InputError("--resume: goes on as the folder says, so give nothing beside it but --json")
+        resolved, folder = read_scenario(resume / "scenario.yaml"), resume
+    result = trial(resolved, folder, Bars(), print_json if json else partial(_print_figures, resolved))
+    if not json:
+        _say_trim(folder)
+    if no_report(result.report_fault) and not json:
+        typer.echo(f"report: {result.report}")
+
+
+def _say_trim(folder: Path) -> None:
+    """What the flight's hover says of the ballast, where it is worth a block."""
+    from wakewise.core.errors import InputError
+    from wakewise.operation.flight_trim import folder_trim
+
+    try:
+        _, found = folder_trim(folder)
+    except InputError:  # no hover in it, or a vehicle that was given in Python
+        return
+    if found.worth:
+        typer.echo(f"before the next flight: {found.words}; wakewise vehicle trim --flight {folder} --write FILE")
+
+
+def _print_figures(scenario: Scenario, figures: dict[str, Any]) -> None:
+    """The headlines of a trial as a table, and why some are missing."""
+    from rich.table import Table
+
+    table = Table(title=f"{scenario.method}, {Path(scenario.target.kind).stem}, seed {scenario.seed}")
+    table.add_column("figure")
+    table.add_column("value", justify="right")
+    table.add_column("unit")
+    for key in _HEADLINES:
+        table.add_row(key, shown(figures[key]), unit_beside(key, figures["units"][key]))
+    print_table(table)
+    for line in reasons_once(figures["why"], _HEADLINES):
+        typer.echo(line)

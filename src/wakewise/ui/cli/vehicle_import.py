@@ -1,0 +1,239 @@
+"""`wakewise vehicle import`: a vehicle file of another project, what it says, and what it does not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from wakewise.core.errors import InputError
+from wakewise.ui.cli.console import plain, print_json, print_table, shown
+from wakewise.ui.cli.options import Json
+
+if TYPE_CHECKING:
+    from wakewise.robot.vehicles import VehicleDraft
+    from wakewise.robot.vehicles.mixing import Comparison
+
+File = Annotated[
+    Path,
+    typer.Argument(help="URDF, xacro, Gazebo SDF, Stonefish .scn, YAML with a matrix; or a vehicle file to complete."),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        help="Write what was found as a vehicle file, what a flight needs beside as comments to fill in.",
+        show_default=False,
+    ),
+]
+Like = Annotated[
+    str | None,
+    typer.Option(
+        "--like",
+        metavar="NAME",
+        help="Estimate what is missing after this vehicle, scaled by mass; each such group is marked estimate: true.",
+        show_default=False,
+    ),
+]
+Frame = Annotated[str, typer.Option("--frame", help="Body axes of the file: auto, FLU or FRD.")]
+Thrust = Annotated[
+    str,
+    typer.Option(
+        "--thrust-direction",
+        help="auto (the format's rule), reversed, or an axis of each thruster's own frame: +x, -x, +y, -y, +z, -z.",
+    ),
+]
+Matrix = Annotated[
+    Path | None,
+    typer.Option("--matrix", help="Matrix that the project ships, to hold against the geometry.", show_default=False),
+]
+Packages = Annotated[
+    list[str] | None, typer.Option("--package", metavar="NAME=DIR", help="Where a package is; may be repeated.")
+]
+Arguments = Annotated[
+    list[str] | None, typer.Option("--arg", metavar="NAME:=VALUE", help="A xacro argument; may be repeated.")
+]
+Rows = Annotated[
+    str | None,
+    typer.Option(
+        "--rows",
+        metavar="NAMES",
+        help="What the six rows of a matrix are, in the file's order, such as roll,pitch,yaw,x,y,z.",
+        show_default=False,
+    ),
+]
+Skip = Annotated[bool, typer.Option("--skip-missing", help="Leave out xacro includes that are not there.")]
+
+
+def import_file(
+    file: File,
+    out: Out = None,
+    frame: Frame = "auto",
+    thrust_direction: Thrust = "auto",
+    matrix: Matrix = None,
+    package: Packages = None,
+    arg: Arguments = None,
+    skip_missing: Skip = False,
+    rows: Rows = None,
+    like: Like = None,
+    json: Json = False,
+) -> None:
+    """Import a vehicle file of another project; say what it holds, what was decided, and what is missing.
+
+    docs/vehicle-file.md explains every field of what --out writes.
+    """
+    from wakewise.core.files import write_text
+    from wakewise.robot.importers import find_vehicle
+    from wakewise.robot.vehicles import blanks, completed, draft_yaml, load_draft
+    from wakewise.robot.vehicles.mixing import compare_matrix
+
+    if out is not None:
+        if out.is_dir():
+            raise InputError(f"--out {out}: is a folder, must be a file")
+        if out.suffix not in (".yaml", ".yml"):
+            raise InputError(f"--out {out}: must end in .yaml, by which a vehicle file is known")
+    draft = find_vehicle(
+        str(file),
+        convention=frame,
+        thrust=thrust_direction,
+        matrix=matrix,
+        packages={name: Path(folder) for name, folder in pairs(package, "=", "--package NAME=DIR").items()},
+        arguments=pairs(arg, ":=", "--arg NAME:=VALUE"),
+        skip_missing=skip_missing,
+        rows=rows,
+    )
+    draft = draft if like is None else completed(draft, load_draft(like))
+    comparison = None
+    if draft.thrusters and draft.shipped_matrix is not None:
+        comparison = compare_matrix(draft, draft.shipped_matrix, str(matrix or file))
+    if out is not None:
+        write_text(out, draft_yaml(draft, blanks(draft)))
+    if json:
+        print_json(_facts(draft, comparison, out))
+    else:
+        _tell(draft, comparison, out)
+
+
+def pairs(given: list[str] | None, mark: str, form: str) -> dict[str, str]:
+    """Names and values of a repeated option.
+
+    Raises
+    ------
+    InputError
+        If one has no name or no mark between the two.
+    """
+    pairs: dict[str, str] = {}
+    for text in given or []:
+        name, found, value = text.partition(mark)
+        if not found or not name:
+            raise InputError(f"{text!r}: allowed form {form}")
+        pairs[name] = value
+    return pairs
+
+
+def _said(draft: VehicleDraft, topic: str) -> str | None:
+    return next((note.removeprefix(topic) for note in draft.notes if note.startswith(topic)), None)
+
+
+def _facts(draft: VehicleDraft, comparison: Comparison | None, out: Path | None) -> dict[str, Any]:
+    from wakewise.robot.vehicles import allocation_rank
+
+    has_matrix = bool(draft.thrusters) or draft.shipped_matrix is not None
+    numbers = {name: value for name, value, _ in _numbers(draft)}
+    return {
+        "name": draft.name,
+        "source": draft.source,
+        "frame": _said(draft, "frame: "),
+        "thrust_direction": _said(draft, "thrust direction: "),
+        "thrusters": [
+            {
+                "name": t.name,
+                "position_m": t.p_BT_m.tolist(),
+                "axis": t.axis_B.tolist(),
+                "max_forward_N": t.max_forward_N,
+                "max_reverse_N": t.max_reverse_N,
+                "disk_area_m2": t.disk_area_m2,
+                "time_constant_s": t.time_constant_s,
+            }
+            for t in draft.thrusters
+        ],
+        **numbers,
+        "allocation_matrix": draft.allocation_matrix.tolist() if has_matrix else None,
+        "rank": allocation_rank(draft) if has_matrix else None,
+        "missing": list(draft.missing),
+        "mixing_disagreements": None
+        if comparison is None
+        else [
+            {"thruster": d.name, "axis": d.row, "stated": d.stated, "geometry": d.geometry, "fault": d.fault}
+            for d in comparison.disagreements
+        ],
+        "notes": list(draft.notes),
+        "why": _why(has_matrix, comparison),
+        "out": None if out is None else str(out),
+    }
+
+
+def _why(has_matrix: bool, comparison: Comparison | None) -> dict[str, str]:
+    why = {"unknown values": "null where the file says nothing; see missing"}
+    if not has_matrix:
+        why["rank"] = "the file holds neither thrusters nor a matrix"
+    if comparison is None:
+        why["mixing_disagreements"] = "needs thruster geometry and a stated matrix; give one with --matrix"
+    return why
+
+
+def _numbers(draft: VehicleDraft) -> list[tuple[str, Any, str]]:
+    """Field, value as JSON holds it, and the value as people read it."""
+    rows: list[tuple[str, Any, str]] = []
+    for name in ("mass_kg", "displaced_volume_m3", "camera_fov_rad"):
+        value = getattr(draft, name)
+        rows.append((name, value, "—" if value is None else f"{value:.6g}"))
+    for name in ("size_m", "p_BG_m", "p_BB_m"):
+        value = getattr(draft, name)
+        rows.append((name, None if value is None else value.tolist(), "—" if value is None else _row(value)))
+    for name in ("inertia_kg_m2", "added_mass", "linear_damping", "quadratic_damping"):
+        value = getattr(draft, name)
+        diagonal = "—" if value is None else _row(value.diagonal()) + " (diagonal)"
+        rows.append((name, None if value is None else value.tolist(), diagonal))
+    return rows
+
+
+def _row(values: Any) -> str:
+    return "  ".join(f"{value:.5g}" for value in values)
+
+
+def _tell(draft: VehicleDraft, comparison: Comparison | None, out: Path | None) -> None:
+    from rich.table import Table
+
+    typer.echo(f"{draft.title}\n")
+    table = Table(title="found (body frame: x forward, y right, z down)")
+    table.add_column("field")
+    table.add_column("value")
+    for name, _, text in _numbers(draft):
+        table.add_row(name, text)
+    print_table(table)
+    if draft.thrusters:
+        table = Table(title="thrusters")
+        for column in ("name", "x m", "y m", "z m", "force axis", "forward N", "reverse N", "disk m2", "lag s"):
+            table.add_column(column, justify="left" if column in ("name", "force axis") else "right")
+        for t in draft.thrusters:
+            axis = " ".join(f"{value:+z.3f}" for value in t.axis_B)
+            limits = (t.max_forward_N, t.max_reverse_N, t.disk_area_m2, t.time_constant_s)
+            table.add_row(plain(t.name), *(f"{v:z.3f}" for v in t.p_BT_m), axis, *(shown(v) for v in limits))
+        print_table(table)
+    for note in draft.notes:
+        typer.echo(f"  {note}")
+    typer.echo(f"missing: {', '.join(draft.missing) or 'nothing'}")
+    if comparison is not None:
+        typer.echo(f"stated matrix: {comparison.agree} of {comparison.compared} entries agree with the geometry")
+        for disagreement in comparison.disagreements:
+            typer.echo(f"  {disagreement.text}")
+        for note in comparison.notes:
+            typer.echo(f"  {note}")
+    estimates = [origin for origin in draft.provenance if origin.estimate]
+    for origin in estimates:
+        typer.echo(f"estimate: {origin.group.replace('_', ' ')}: {' '.join(origin.source.split())}")
+    if out is not None:
+        how = "; its fields marked Missing are to be filled in (docs/vehicle-file.md)" if draft.missing else ""
+        typer.echo(f"written: {out}{how}")

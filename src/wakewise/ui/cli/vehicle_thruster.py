@@ -1,0 +1,133 @@
+"""`wakewise vehicle thruster` and `wakewise vehicle lag`: what a thruster makes of a pulse, and how fast it follows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from wakewise.ui.cli.console import print_json, print_table, shown
+from wakewise.ui.cli.options import Json
+
+Table = Annotated[
+    str,
+    typer.Argument(
+        help="Thrust curve of the library (t200) or path of a CSV with columns supply_V, pwm_us, thrust_N or "
+        "force_kgf, and if known rpm, power_W, current_A, voltage_V."
+    ),
+]
+Supply = Annotated[
+    float | None,
+    typer.Option("--supply-V", help="Supply voltage, within the table; 16, or the nearest there is, if not given."),
+]
+Thrusts = Annotated[
+    list[float] | None, typer.Option("--thrust", metavar="N", help="Wished thrust to look up; may be repeated.")
+]
+Pulses = Annotated[list[float] | None, typer.Option("--pwm", metavar="US", help="Pulse to look up; may be repeated.")]
+Plot = Annotated[
+    Path | None, typer.Option("--plot", help="Also write an SVG drawing to this file.", show_default=False)
+]
+Data = Annotated[
+    Path,
+    typer.Argument(
+        help="CSV of a measured step with columns time_s, command and thrust_N. The command is a commanded thrust, or "
+        "the square of a commanded speed or voltage."
+    ),
+]
+Average = Annotated[
+    float | None,
+    typer.Option(
+        "--average-s",
+        help="Compare averages over this time; 0 for raw samples, one period of the propeller's ripple if not given.",
+        show_default=False,
+    ),
+]
+
+
+def thruster(
+    table: Table = "t200",
+    supply_V: Supply = None,
+    thrust: Thrusts = None,
+    pwm: Pulses = None,
+    plot: Plot = None,
+    json: Json = False,
+) -> None:
+    """Show a thrust curve: limits, deadband, and pulses, thrusts, speed and power both ways."""
+    from wakewise.core.files import write_text
+    from wakewise.robot.thrusters.curve_library import load_curve
+    from wakewise.robot.thrusters.thruster_facts import curve_facts, usual_voltage
+    from wakewise.ui.reports.vehicle.thrust_drawing import curve_svg
+
+    curve = load_curve(table)
+    facts = curve_facts(curve, usual_voltage(curve) if supply_V is None else supply_V, thrust or (), pwm or ())
+    if plot is not None:
+        write_text(plot, curve_svg(curve, facts["supply_V"]))
+    if json:
+        print_json(facts)
+        return
+    voltages = ", ".join(f"{value:g}" for value in facts["voltages_V"])
+    typer.echo(f"{facts['name']} at {facts['supply_V']:g} V (table: {voltages} V)")
+    typer.echo(f"limits {facts['limits_N'][0]:z.2f} to {facts['limits_N'][1]:+z.2f} N")
+    typer.echo(f"no thrust from {facts['deadband_us'][0]:g} to {facts['deadband_us'][1]:g} us, both included")
+    low, high = facts["first_step_N"]
+    typer.echo(f"smallest thrusts held {low:z.2f} and {high:+z.2f} N; a smaller wish becomes that or none, by half")
+    _print_rows("curve", facts["table"])
+    if facts["thrusts"]:
+        _print_rows("for wished thrusts", facts["thrusts"], wished=True)
+    if facts["pulses"]:
+        _print_rows("for pulses", facts["pulses"])
+    for note in (*facts["notes"], *facts["why"].values()):
+        typer.echo(f"note: {note}")
+    typer.echo(f"source: {facts['source']}")
+    if plot is not None:
+        typer.echo(f"drawing: {plot}")
+
+
+def lag(data: Data, average_s: Average = None, json: Json = False) -> None:
+    """Identify a thruster's lag and dead time from a measured step."""
+    from wakewise.robot.thrusters.lag_fit import identify_lag
+    from wakewise.robot.thrusters.step_file import read_step
+    from wakewise.robot.thrusters.thruster_facts import lag_facts
+
+    facts = lag_facts(identify_lag(*read_step(data), average_s=average_s))
+    if json:
+        print_json(facts)
+        return
+    typer.echo(f"{facts['model']}, after dead time\n")
+    for name, estimate in facts["estimates"].items():
+        error = estimate["standard_error"]
+        spread = "not bounded by the data" if error is None else f"standard error {shown(error)}"
+        unit = "" if estimate["unit"] == "1" else estimate["unit"]
+        typer.echo(f"  {name:<18}{estimate['value']:>10.4g}  {unit:<22}{spread}")
+    typer.echo(f"\nmean delay {facts['mean_delay_s']:.4g} s by the fit", nl=False)
+    measured = facts["measured_delay_s"]
+    if measured is None:
+        typer.echo(f"; by area none: {facts['why']['measured_delay_s']}")
+    else:
+        typer.echo(f", {measured:.4g} s by area (standard error {facts['measured_delay_error_s']:.2g} s)")
+    start, end = facts["window_s"]
+    typer.echo(f"R2 {facts['r2_raw']:.4f} against raw samples, from {start:g} to {end:g} s")
+    if facts["average_s"] > 0.0:
+        typer.echo(
+            f"R2 {facts['r2']:.4f} against averages over {facts['average_s']:.3g} s, which themselves reach", nl=False
+        )
+        typer.echo(f" {facts['r2_ceiling']:.4f} against the raw samples")
+    for model in facts["models"]:
+        typer.echo(f"  {model['name']:<34}averaged R2 {model['r2']:.4f}   BIC {model['bic']:.1f}")
+
+
+def _print_rows(title: str, rows: list[dict[str, Any]], *, wished: bool = False) -> None:
+    from rich.table import Table as RichTable
+
+    printed = RichTable(title=title)
+    for column in (*(("wished N",) if wished else ()), "pulse us", "thrust N", "rpm", "power W"):
+        printed.add_column(column, justify="right")
+    for row in rows:
+        figures = [row["pwm_us"], row["thrust_N"], row["rpm"], row["power_W"]]
+        cells = [
+            "—" if value is None else f"{value:z.{digits}f}"
+            for value, digits in zip(figures, (0, 2, 0, 1), strict=True)
+        ]
+        printed.add_row(*((f"{row['wished_N']:z.2f}",) if wished else ()), *cells)
+    print_table(printed)

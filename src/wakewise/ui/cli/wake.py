@@ -1,0 +1,127 @@
+"""`wakewise wake`: calibrate a wake model to data."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from wakewise.ui.cli.console import print_json, print_table, shown
+from wakewise.ui.cli.options import Json, seed_option
+
+app = typer.Typer(
+    help="What a jet does to the water: calibrate a model, see how good each is.",
+    no_args_is_help=False,
+    rich_markup_mode=None,
+)
+
+Data = Annotated[
+    Path,
+    typer.Argument(
+        help="CSV file with columns x_m, r_m (or y_m, z_m), thrust_N, u_m_s, optionally v_m_s, w_m_s, "
+        "disk_diameter_m, in the jet's frame (x along the jet from the disk's middle); a text file of PIVlab, DaVis or "
+        "Tecplot with units in its names (x [mm], u [m/s]), of a plane through the jet's axis; or a folder of image "
+        "pairs *A, *B with a piv.yaml."
+    ),
+]
+Model = Annotated[str, typer.Option("--model", help="fitted, jet, jet-fitted or paper-calibrated.")]
+Diameter = Annotated[
+    float | None,
+    typer.Option("--disk-diameter-m", help="Diameter of the disk, if the CSV has no such column.", show_default=False),
+]
+Thrust = Annotated[
+    float | None,
+    typer.Option(
+        "--thrust", metavar="N", help="Thrust of all points in newtons, if no column says it.", show_default=False
+    ),
+]
+Held = Annotated[
+    list[float] | None,
+    typer.Option("--test-thrust", metavar="N", help="Hold this thrust out for the test; may be repeated. Else drawn."),
+]
+Seed = Annotated[int, typer.Option("--seed", callback=seed_option, help="Seed of the split and of the resamples.")]
+Resamples = Annotated[int, typer.Option("--bootstrap", min=0, max=10000, help="Resamples for the 95 % intervals.")]
+FitOut = Annotated[
+    Path | None, typer.Option("--out", help="Write the model here, for a scenario to take.", show_default=False)
+]
+
+
+@app.command("fit")
+def fit(
+    data: Data,
+    model: Model = "fitted",
+    disk_diameter_m: Diameter = None,
+    thrust: Thrust = None,
+    test_thrust: Held = None,
+    seed: Seed = 0,
+    bootstrap: Resamples = 200,
+    out: FitOut = None,
+    json: Json = False,
+) -> None:
+    """Calibrate a wake model: parameters with uncertainty, fitted on some thrusts and positions, tested on others.
+
+    The momentum flux of a jet is its thrust, which is printed as a share: 0.5 to 1.3 in water. What lies far outside is
+    refused, since a unit is another than the column's name says.
+    """
+    import numpy as np
+
+    from wakewise.core.errors import InputError
+    from wakewise.wake.calibration import calibrate, split_samples
+    from wakewise.wake.families import family
+    from wakewise.wake.fit_file import fit_figures, write_fit
+    from wakewise.wake.momentum import momentum_law
+    from wakewise.wake.samples import read_samples
+
+    chosen = family(model)
+    if data.is_dir():
+        from wakewise.vision.piv import samples_of_folder
+
+        if thrust is not None:
+            raise InputError(f"--thrust {thrust:g}: not with a folder of image pairs, whose piv.yaml says the thrust")
+        samples = samples_of_folder(data)
+    else:
+        samples = read_samples(data, disk_diameter_m, thrust)
+    rng = np.random.default_rng(seed)
+    split = split_samples(samples, rng, test_thrusts_N=tuple(test_thrust or ()))
+    found = calibrate(chosen, samples, rng, split=split, bootstrap=bootstrap)
+    law = momentum_law(samples, chosen.model(found.values))
+    if out is not None:
+        write_fit(out, found, data.name, samples.disk_diameter_m, law)
+    result = fit_figures(found) | {
+        "points": len(samples),
+        "disk_diameter_m": samples.disk_diameter_m,
+        "momentum_flux_over_thrust": asdict(law),
+    }
+    if json:
+        print_json(result | {"out": None if out is None else str(out)})
+        return
+    _show_fit(result, law.words)
+    if out is not None:
+        typer.echo(f"written: {out}")
+
+
+def _show_fit(result: dict[str, Any], law: str) -> None:
+    from rich.table import Table
+
+    table = Table(title=f"{result['model']}, {result['points']} points")
+    for column in ("parameter", "value", "standard error", "95 % of resamples"):
+        table.add_column(column, justify="left" if column == "parameter" else "right")
+    for name, figure in result["parameters"].items():
+        span = "—" if figure["low"] is None else f"{shown(figure['low'])} to {shown(figure['high'])}"
+        error = "held" if figure["held"] else shown(figure["standard_error"])
+        table.add_row(name, shown(figure["value"]), error, span)
+    print_table(table)
+    table = Table()
+    for column in ("", "R2 in A (core)", "R2 in B (wake)", "bias beyond 0.4 m, %", "points"):
+        table.add_column(column, justify="left" if not column else "right")
+    for part in ("train", "test"):
+        scores = result[part]
+        row = (shown(scores[key]) for key in ("r2_core", "r2_wake", "bias_far_pct", "points"))
+        table.add_row(part, *row)
+    print_table(table)
+    typer.echo(f"momentum flux over thrust: {law}")
+    typer.echo(f"split: {result['split']}")
+    for warning in result["warnings"]:
+        typer.echo(f"warning: {warning}")

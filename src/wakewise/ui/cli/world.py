@@ -1,0 +1,70 @@
+"""`wakewise world`: the worlds of the library, what each is made of, and what a seed draws from it."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import Annotated, Any
+
+import typer
+
+from wakewise.ui.cli.console import print_json, print_table
+from wakewise.ui.cli.options import Json, seed_option
+
+app = typer.Typer(help="Worlds: list, show what each is made of and why.", no_args_is_help=False, rich_markup_mode=None)
+
+Name = Annotated[str, typer.Argument(help="A world of the library; see `wakewise world list`.")]
+Seed = Annotated[
+    int | None, typer.Option("--seed", callback=seed_option, help="Show what this seed draws.", show_default=False)
+]
+_WIDTH = 100
+
+
+@app.command("list")
+def list_worlds(json: Json = False) -> None:
+    """List the worlds: what each is, and which one presets fly in."""
+    from wakewise.operation import load_scenario
+    from wakewise.operation.worlds.library import load_world, world_names
+
+    default = load_scenario("quick", None, {}).world
+    worlds = [load_world(name) for name in world_names()]
+    if json:
+        rows = [{"name": world.name, "title": world.file.title, "why": world.file.why} for world in worlds]
+        print_json({"worlds": rows, "default_world": default})
+        return
+    width = max(len(world.name) for world in worlds)
+    for world in worlds:
+        typer.echo(f"{world.name:<{width}}  {world.file.title}{' (of the presets)' if world.name == default else ''}")
+
+
+@app.command("show")
+def show(name: Name, seed: Seed = None, json: Json = False) -> None:
+    """Show a world: why it is flown, its fields, from where a seed draws them, and the source of each number."""
+    from rich.table import Table
+
+    from wakewise.operation.draws import values_of
+    from wakewise.operation.worlds.library import load_world
+
+    world = load_world(name)
+    drawn = values_of(world.draws, seed) if seed is not None else {}
+    if json:
+        fields: dict[str, Any] = {}
+        for dotted, entry in world.file.fields.items():
+            fields[dotted] = entry.model_dump(exclude_none=True)
+            if dotted in drawn:
+                fields[dotted]["drawn"] = drawn[dotted]
+        print_json({"name": name, "title": world.file.title, "why": world.file.why, "fields": fields, "seed": seed})
+        return
+    typer.echo(f"{name}: {world.file.title}\n")
+    typer.echo(textwrap.fill(world.file.why, _WIDTH) + "\n")
+    table = Table(show_lines=True)
+    for column in ("field", "value", *(() if seed is None else (f"seed {seed}",)), "source"):
+        table.add_column(column)
+    for dotted, entry in world.file.fields.items():
+        value = _shown(entry.value) if entry.draw is None else f"drawn: {entry.draw}"
+        now = () if seed is None else (_shown(drawn.get(dotted, entry.value)),)
+        table.add_row(dotted, value, *now, " ".join(entry.source.split()))
+    print_table(table)
+
+
+def _shown(value: Any) -> str:
+    return ", ".join(map(_shown, value)) if isinstance(value, list | tuple) else f"{value}"

@@ -1,0 +1,154 @@
+"""What the flight's own thread takes down at each step for whoever looks: little, and without waiting for anybody.
+
+Only there may the truth be asked, since the world moves in that thread. Everything else is computed from what is taken
+down here, in the server's.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import ScalarGrid, Witness
+from wakewise.operation.loop import Step
+from wakewise.robot.vehicles import Vehicle
+
+WINDOW_S = 10.0
+"""Deviation and savings are told over the last ten seconds."""
+SAMPLED_S = 0.1
+LOOKS_S = 2.0
+"""How long a look lasts."""
+TRUE_EVERY_S, SILT_EVERY_S = 0.5, 1.0
+MEAN_OF = 10
+"""Steps over which commanded thrusts are averaged for the gauges: small ones are sent as pulses."""
+_SOLVES = 3000
+_LEAST_ASKED_M_S = 0.005
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Moment:
+    """One step of a flight as it is shown.
+
+    `thrusts_N`, shape (n,), are the commanded ones in the mean of the last steps; `true_m_s`, shape (points,), the
+    speed that the thrusters gave the water at the gauges' points when it was last asked, None where nobody knows.
+    """
+
+    step: Step
+    thrusts_N: Array
+    asked_W_m_s: Array
+    velocity_W_m_s: Array
+    energy_J: float
+    power_W: float
+    true_m_s: Array | None
+    X_WC: Pose
+    silt: ScalarGrid | None
+
+
+class Lookout:
+    """Called as `(step, witness)` at each step; `now` is the newest moment, for any thread.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    points_W_m : ndarray, shape (n, 3)
+        Where the true water is asked, if the witness knows.
+    dt_s : float
+    given : callable
+        Called when the step's thrusts are on their way.
+    asked : callable
+        Velocity that is asked for in W, shape (3,).
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        points_W_m: Array,
+        dt_s: float,
+        given: Callable[[], None],
+        asked: Callable[[], Array],
+    ) -> None:
+        self._vehicle, self._points_W_m, self._dt_s = vehicle, points_W_m, dt_s
+        self._given, self._asked = given, asked
+        self._thrusts: deque[Array] = deque(maxlen=MEAN_OF)
+        self._solves_s = np.zeros(_SOLVES)
+        self._steps = 0
+        self._energy_J = 0.0
+        self._true: Array | None = None
+        self._silt: ScalarGrid | None = None
+        self._true_s = self._silt_s = self._sampled_s = -np.inf
+        self._followed: deque[tuple[Array, Array]] = deque(maxlen=round(WINDOW_S / SAMPLED_S))
+        self.now: Moment | None = None
+        self._looked_s = -np.inf
+
+    def look(self) -> None:
+        """Somebody looks: for a while the true water is asked, too."""
+        self._looked_s = time.monotonic()
+
+    @property
+    def looked_at(self) -> bool:
+        """Whether somebody has looked of late."""
+        return time.monotonic() - self._looked_s < LOOKS_S
+
+    def __call__(self, step: Step, witness: Witness | None) -> None:
+        """Take down a step."""
+        self._given()
+        now_s = step.time_s
+        self._thrusts.append(step.command.thrusts_N)
+        self._solves_s[self._steps % _SOLVES] = step.solve_s
+        self._steps += 1
+        state = step.truth.state if step.truth is not None else step.estimate
+        power_W = step.truth.power_W if step.truth is not None else float("nan")
+        self._energy_J += power_W * self._dt_s
+        asked_W = self._asked()
+        velocity_W = state.X_WB.R @ state.nu_B[:3]
+        if now_s >= self._sampled_s + SAMPLED_S - 1e-9:
+            self._sampled_s = now_s
+            self._followed.append((asked_W, velocity_W))
+        if witness is not None and self.looked_at:
+            self._ask(now_s, witness)
+        tilt_rad = step.truth.tilt_rad if step.truth is not None else step.tilt_rad
+        self.now = Moment(
+            step=step,
+            thrusts_N=np.mean(self._thrusts, axis=0),
+            asked_W_m_s=asked_W,
+            velocity_W_m_s=velocity_W,
+            energy_J=self._energy_J,
+            power_W=power_W,
+            true_m_s=self._true,
+            X_WC=state.X_WB @ self._vehicle.X_BC_at(tilt_rad),
+            silt=self._silt,
+        )
+
+    def _ask(self, now_s: float, witness: Witness) -> None:
+        """Ask for the true water, now and then."""
+        if now_s >= self._silt_s + SILT_EVERY_S:
+            self._silt_s, self._silt = now_s, witness.silt()
+        elif now_s >= self._true_s + TRUE_EVERY_S:
+            self._true_s = now_s
+            excess = getattr(witness, "excess_velocity", None)
+            if excess is not None:
+                self._true = np.linalg.norm(excess(self._points_W_m), axis=1)
+
+    @property
+    def solve_ms_p99(self) -> float:
+        """Control's thread CPU in a step, 99th percentile of the last minute."""
+        known = self._solves_s[: min(self._steps, _SOLVES)]
+        return 1e3 * float(np.percentile(known, 99)) if len(known) else 0.0
+
+    @property
+    def deviation_pct(self) -> float | None:
+        """Root mean square of velocity less what was asked, over that of what was asked; None of hands off."""
+        followed = list(self._followed)
+        if not followed:
+            return None
+        asked, had = (np.array(column) for column in zip(*followed, strict=True))
+        wished = float(np.mean(np.sum(asked**2, axis=1)))
+        if wished < _LEAST_ASKED_M_S**2:
+            return None
+        return 100.0 * float(np.sqrt(np.mean(np.sum((had - asked) ** 2, axis=1)) / wished))

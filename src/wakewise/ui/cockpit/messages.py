@@ -1,0 +1,217 @@
+"""What a page may say, read strictly: a message of known type and shape, or one line that says what is wrong with it.
+
+Nothing that comes over the wire raises: what cannot be used becomes `Amiss`, which the server answers and counts. Axes
+of the sticks are the exception to strictness: numbers of any size, and what is no number (NaN), are made harmless by
+`wakewise.operation.teleop.input.controls.shaped`, as for any other device.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from wakewise.core.arrays import Array
+from wakewise.operation.teleop.input.controls import ACTIONS, CONTROL_AXES, shaped
+
+MOST_BYTES = 65536
+"""A longer message ends the connection (websockets does that while it reads)."""
+_WORD = 64  # characters of a name, a token, an id
+_LARGEST = 2**53  # the largest whole number that JavaScript counts to
+_FIELDS = 16
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hello:
+    """The first message of a client; `lease`: of the helm, that it had before its connection was lost."""
+
+    token: str | None
+    name: str
+    wants: Literal["helm", "watch"]
+    lease: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class HelmWish:
+    """A client asks for the helm, or gives it back."""
+
+    want: bool
+    force: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Consent:
+    """The holder's answer to client `to`, who asked for the helm."""
+
+    to: str
+    yes: bool
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sticks:
+    """Axes made harmless, shape (5,), with their number and the client's own clock in ms."""
+
+    seq: int
+    t_ms: float
+    axes: Array
+    lease: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Press:
+    """One of `wakewise.operation.teleop.input.controls.ACTIONS`."""
+
+    what: str
+    lease: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeskChange:
+    """Settings of the desk, whose values the desk itself judges."""
+
+    changes: dict[str, str | float | bool]
+    lease: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Seen:
+    """A picture has been shown."""
+
+    frame: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Amiss:
+    """What is wrong with a message, in one line."""
+
+    why: str
+
+
+Message = Hello | HelmWish | Consent | Sticks | Press | DeskChange | Seen
+
+
+class _Wrong(Exception):  # noqa: N818  (it never leaves this file)
+    pass
+
+
+def read_message(raw: str | bytes) -> Message | Amiss:
+    """Read one message; never raises."""
+    if isinstance(raw, bytes):
+        return Amiss(why="a binary message: only text is read here")
+    try:
+        told = json.loads(raw)
+    except (ValueError, RecursionError):
+        return Amiss(why="not JSON")
+    if not isinstance(told, dict):
+        return Amiss(why="not an object with a type")
+    kind = told.get("type")
+    reader = _READERS.get(kind) if isinstance(kind, str) else None
+    if reader is None:
+        return Amiss(why=f"type: {_shown(kind)}, allowed {', '.join(_READERS)}")
+    try:
+        return reader(told)
+    except _Wrong as fault:
+        return Amiss(why=f"{kind}: {fault}")
+
+
+def _hello(told: dict[str, Any]) -> Hello:
+    wants = told.get("wants", "watch")
+    if wants not in ("helm", "watch"):
+        raise _Wrong(f"wants {_shown(wants)}, allowed helm, watch")
+    token, lease = (None if told.get(field) is None else _word(told, field) for field in ("token", "lease"))
+    name = "".join(c for c in _word({"name": "somebody"} | told, "name") if c.isprintable()).strip()
+    return Hello(token=token, name=name or "somebody", wants=wants, lease=lease)
+
+
+def _helm(told: dict[str, Any]) -> HelmWish:
+    return HelmWish(want=_flag(told, "want"), force=_flag({"force": False} | told, "force"))
+
+
+def _consent(told: dict[str, Any]) -> Consent:
+    return Consent(to=_word(told, "to"), yes=_flag(told, "yes"))
+
+
+def _sticks(told: dict[str, Any]) -> Sticks:
+    axes = told.get("axes")
+    if not isinstance(axes, list) or len(axes) != len(CONTROL_AXES):
+        raise _Wrong(f"axes must be {len(CONTROL_AXES)} numbers")
+    t_ms = _number(told.get("t"), "t")
+    if not abs(t_ms) <= _LARGEST:  # what is no number, too
+        raise _Wrong("t must be a time in ms")
+    values = [_number(value, "axes") for value in axes]
+    return Sticks(seq=_whole(told, "seq"), t_ms=t_ms, axes=shaped(values), lease=_word(told, "lease"))
+
+
+def _press(told: dict[str, Any]) -> Press:
+    what = told.get("what")
+    if what not in ACTIONS:
+        raise _Wrong(f"what {_shown(what)}, allowed {', '.join(ACTIONS)}")
+    return Press(what=what, lease=_word(told, "lease"))
+
+
+def _desk(told: dict[str, Any]) -> DeskChange:
+    changes = told.get("set")
+    if not isinstance(changes, dict) or not 0 < len(changes) <= _FIELDS:
+        raise _Wrong("set must be an object of fields and values")
+    for name, value in changes.items():
+        if not isinstance(value, str | int | float) or (isinstance(value, str) and len(value) > _WORD):
+            raise _Wrong(f"set.{_shown(name)} must be a number, a word or true or false")
+        if not isinstance(value, str | bool):
+            changes[name] = _number(value, "set")
+    return DeskChange(changes=changes, lease=_word(told, "lease"))
+
+
+def _seen(told: dict[str, Any]) -> Seen:
+    return Seen(frame=_whole(told, "frame"))
+
+
+_READERS: dict[str, Callable[[dict[str, Any]], Message]] = {
+    "hello": _hello,
+    "helm": _helm,
+    "consent": _consent,
+    "sticks": _sticks,
+    "press": _press,
+    "desk": _desk,
+    "seen": _seen,
+}
+
+
+def _number(value: Any, field: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise _Wrong(f"{field} must be a number, not {_shown(value)}")
+    try:
+        return float(value)
+    except OverflowError:  # a whole number of more than 308 digits
+        return float("inf") if value > 0 else float("-inf")
+
+
+def _whole(told: dict[str, Any], field: str) -> int:
+    value = told.get(field)
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= _LARGEST:
+        raise _Wrong(f"{field} must be a whole number from 0, not {_shown(value)}")
+    return value
+
+
+def _word(told: dict[str, Any], field: str) -> str:
+    value = told.get(field)
+    if not isinstance(value, str) or len(value) > _WORD:
+        raise _Wrong(f"{field} must be a text of at most {_WORD} characters, not {_shown(value)}")
+    return value
+
+
+def _flag(told: dict[str, Any], field: str) -> bool:
+    value = told.get(field)
+    if not isinstance(value, bool):
+        raise _Wrong(f"{field} must be true or false, not {_shown(value)}")
+    return value
+
+
+def _shown(value: Any) -> str:
+    """A value as it is told back: short, on one line, and never a fault of its own."""
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) > _LARGEST:
+        return "a huge number"
+    if isinstance(value, dict | list):
+        return "an object" if isinstance(value, dict) else "a list"
+    words = ascii(value) if not isinstance(value, str) else ascii(value[:24])
+    return words[:40]

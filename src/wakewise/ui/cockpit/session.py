@@ -1,0 +1,354 @@
+"""From a scenario to flights that pages show and hands fly: one after the other, each with a folder of its own.
+
+A thread tends the session: it prepares the parts, lets the flight begin, follows its photographs and says what became
+of it. The flight has its own thread (`wakewise.operation.teleop.live`), pictures their own process, the server its own
+loop; none waits for another.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from wakewise.core.errors import StageError, WakewiseError
+from wakewise.operation import Parts, Scenario
+from wakewise.operation.teleop.assisted import AssistedPilot, assisted
+from wakewise.operation.teleop.desk import MODES, RANGES, WAYS, Desk, DeskState, regime
+from wakewise.operation.teleop.input.controls import CENTRED, ControlSource
+from wakewise.operation.teleop.live import LiveFlight
+from wakewise.ui.cockpit.frames import LiveCamera, View
+from wakewise.ui.cockpit.gauges import Gauges
+from wakewise.ui.cockpit.guide import LiveGuide
+from wakewise.ui.cockpit.lookout import Lookout
+from wakewise.ui.cockpit.scene import Scene, open_scene
+from wakewise.ui.cockpit.seat import Seat
+from wakewise.ui.cockpit.show import Note, Picture
+from wakewise.ui.cockpit.state import Instruments, described, number, rounded, told_scenario
+
+TENDED_S, SCENE_EVERY_S = 0.05, 0.2
+_MOST_NOTES = 200
+
+
+class Session:
+    """Flights of one scenario; the `Show` of a server.
+
+    Parameters
+    ----------
+    scenario : Scenario or Parts
+    folder : Path or None
+        Of the first flight; later ones get a number. None keeps nothing.
+    paced : bool
+        By the clock.
+    device : ControlSource, optional
+        Sticks at this computer.
+    pictures : bool
+        Whether the camera's picture is drawn.
+    guided : bool
+        Whether a coverage guide follows the photographs.
+    scene : bool
+        Whether viser's 3D scene is served beside the page, where viser is installed.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario | Parts,
+        folder: Path | None,
+        *,
+        paced: bool = True,
+        device: ControlSource | None = None,
+        pictures: bool = True,
+        guided: bool = True,
+        scene: bool = False,
+    ) -> None:
+        self._parts = scenario if isinstance(scenario, Parts) else scenario.parts()
+        self.seat, self.desk = Seat(device=device), Desk(DeskState(watch_target=False))
+        self._device, self._scene_wanted = device, scene
+        self._scene: Scene | None = None
+        self._fallback: str | None = None
+        self.folder, self._paced, self._guided = folder, paced, guided
+        self.flown: list[Path] = []
+        self.flights = 0
+        self.fault: BaseException | None = None
+        self._camera = LiveCamera(self._parts.scenario, self._parts.given.get("target")) if pictures else None
+        self._live: LiveFlight | None = None
+        self._pilot: AssistedPilot | None = None
+        self._gauges: Gauges | None = None
+        self._lookout: Lookout | None = None
+        self._instruments: Instruments | None = None
+        self._guide: LiveGuide | None = None
+        self._described: dict[str, Any] = {}
+        self._preparing: str | None = "making the parts of the flight"
+        self._edition = 0
+        self._notes: deque[Note] = deque(maxlen=_MOST_NOTES)
+        self._photos, self._pictures = 0, 0
+        self._silt_shown: object = None
+        self._shown_s = -np.inf
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._tend, name="session")
+        self._began_s = time.monotonic()
+
+    def start(self) -> None:
+        """Prepare and fly, in threads of its own."""
+        self._began_s = time.monotonic()
+        if self._camera is not None:
+            self._camera.start()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the flight, wait until its folder is written, and end all threads."""
+        self._over.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        if self._camera is not None:
+            self._camera.close()
+        if self._scene is not None:
+            self._scene.close()
+            self._scene = None
+
+    @property
+    def preparing(self) -> str | None:
+        """What is being prepared; None while a flight is on."""
+        return self._preparing
+
+    @property
+    def running(self) -> bool:
+        """Whether the session goes on, with a flight or between two."""
+        return self._thread.is_alive()
+
+    @property
+    def flying(self) -> bool:
+        """Whether the vehicle flies."""
+        return self._preparing is None
+
+    @property
+    def live(self) -> LiveFlight | None:
+        """The flight that is on, or the last one."""
+        return self._live
+
+    @property
+    def lookout(self) -> Lookout | None:
+        """What that flight's thread takes down."""
+        return self._lookout
+
+    @property
+    def edition(self) -> int:
+        """Grows when `welcome` has something new to say."""
+        return self._edition
+
+    def welcome(self) -> dict[str, Any]:
+        """What a client needs once; vehicle and target are empty while they are being made."""
+        nothing = {
+            "scenario": told_scenario(self._parts),
+            "vehicle": {"name": self._parts.scenario.vehicle, "thrusters": []},
+            "target": {"points_W_m": [], "centre_W_m": [0.0, 0.0, 0.0], "radius_m": 0.0},
+        }
+        ranges = {name: list(ends) for name, ends in RANGES.items()} | {"mode": list(MODES), "method": list(WAYS)}
+        told = nothing | self._described
+        url = None if self._scene is None else self._scene.url
+        return told | {"desk": self._desk() | {"ranges": ranges}, "scene_url": url, "preparing": self._preparing}
+
+    def state(self) -> dict[str, Any] | None:
+        """How the flight stands; None before the first step."""
+        lookout, instruments, live, pilot = self._lookout, self._instruments, self._live, self._pilot
+        if lookout is None or instruments is None or live is None or pilot is None or not self.flying:
+            return None
+        lookout.look()
+        now = lookout.now
+        if now is None:
+            return None
+        controls, step = pilot.controls or CENTRED, now.step
+        X_WC = step.estimate.X_WB @ live.parts.vehicle.X_BC_at(step.tilt_rad)
+        return instruments.read(now) | {
+            "mode": self.desk.state.mode,
+            "desk": self._desk(),
+            "controls": rounded(controls.axes, 3),
+            "coverage": self._guide.told(X_WC) if self._guide is not None else None,
+            "photos": len(live.exposures),
+            "loop": {
+                "behind_ms": number(1e3 * live.behind_s, 2),
+                "solve_ms_p99": number(lookout.solve_ms_p99, 2),
+                "stick_to_thrust_ms_p99": number(self.seat.stick_to_thrust_ms_p99, 1),
+            },
+        }
+
+    def notes(self) -> Sequence[Note]:
+        """What has happened since the last call."""
+        told = []
+        while self._notes:
+            told.append(self._notes.popleft())
+        return told
+
+    def set_desk(self, changes: dict[str, Any]) -> None:
+        """Change settings of the desk; raises InputError where a value is out of range."""
+        self.desk.set(**changes)
+
+    def picture(self) -> Picture | None:
+        """What the camera sees now."""
+        now = self._lookout.now if self._lookout is not None else None
+        if now is None or self._camera is None:
+            return None
+        silt = now.silt if now.silt is not self._silt_shown else None
+        try:
+            jpeg = self._camera.draw(View(X_WC=now.X_WC, silt=silt))
+        except StageError as fault:
+            self._say(f"{fault}; the flight goes on without it", "error")
+            self._camera = None
+            return None
+        if jpeg is None:
+            return None
+        self._silt_shown = now.silt
+        self._pictures += 1
+        return Picture(number=self._pictures, time_s=now.step.time_s, jpeg=jpeg)
+
+    def _tend(self) -> None:
+        try:
+            while not self._over.is_set():
+                self._fly()
+                self._await_next()
+        except WakewiseError as fault:
+            self._end(fault)
+        except Exception as fault:  # a flight that cannot begin is told of like one that ended
+            self._end(fault)
+
+    def _fly(self) -> None:
+        """One flight, from its preparation to its folder."""
+        live = self._prepare()
+        if self._over.is_set():
+            return
+        live.start()
+        while live.running and live.latest is None:
+            self._say_preparing(live.preparing or "the first step")
+            self._over.wait(TENDED_S)
+        if live.latest is not None:
+            self._say(f"first light {time.monotonic() - self._began_s:.1f} s after the start")
+            self._say_preparing(None)
+            self._open_scene(live)
+        while live.running and not self._over.wait(TENDED_S):
+            self._follow(live)
+            self._show_scene()
+        live.stop()
+        live.join()
+        self._follow(live)
+        self._close(live)
+
+    def _prepare(self) -> LiveFlight:
+        self._say_preparing("making the parts of the flight")
+        parts = self._parts
+        self.flights += 1
+        if self._gauges is None:
+            self._gauges = Gauges.of(parts)
+            self._described = described(parts, self._gauges)
+        self._say_preparing("making pilot and controllers")
+        flown = assisted(parts, self.seat, self.desk)
+        pilot = cast("AssistedPilot", flown.pilot)
+        self._gauges.disturbances(parts.start, np.full(len(parts.vehicle.thrusters), 0.1))  # kernels are read now
+        self._gauges.predicted_m_s(parts.start, np.full(len(parts.vehicle.thrusters), 0.1))
+        lookout = Lookout(
+            parts.vehicle,
+            self._gauges.true_points_W_m,
+            1.0 / parts.control.rate_hz,
+            self.seat.flown,
+            lambda: pilot.velocity_W_m_s,
+        )
+        self._photos = 0
+        if self._guided:
+            self._say_preparing("looking for views of the target")
+            self._guide = LiveGuide(parts)
+        live = LiveFlight(flown, folder=self._free_folder(), paced=self._paced, watch=lookout)
+        self._pilot, self._lookout, self._live = pilot, lookout, live
+        self._instruments = Instruments(self._gauges, lookout)
+        return live
+
+    def _follow(self, live: LiveFlight) -> None:
+        """Hand on what the pilot says, and photographs to the guide."""
+        assert self._pilot is not None
+        for note in self._pilot.notes():
+            self._notes.append(Note(text=note.text, level=note.level, time_s=note.time_s))
+        for level, text in getattr(self._device, "notes", tuple)():
+            self._say(text, level)
+        fallback = None if live.latest is None else live.latest.command.fallback
+        if fallback != self._fallback:
+            self._fallback = fallback
+            self._say(f"fallback: {fallback}" if fallback else "no fallback any more", "warn" if fallback else "info")
+        exposures = live.exposures
+        for exposure in exposures[self._photos :]:
+            self._photos += 1
+            said = self._guide.saw(exposure.X_WC_est) if self._guide is not None else None
+            self._say(f"photograph {self._photos}{f': {said}' if said else ''}", time_s=exposure.time_s)
+
+    def _open_scene(self, live: LiveFlight) -> None:
+        """Serve the 3D scene, after the first light, which it would keep waiting."""
+        if self._scene_wanted and self._scene is None and self._gauges is not None:
+            self._scene = open_scene(live.parts.vehicle, self._gauges.points_W_m)
+            self._scene_wanted = self._scene is not None
+            self._edition += 1
+
+    def _show_scene(self) -> None:
+        """Bring the scene up to date now and then, while somebody looks at the page."""
+        lookout, instruments, now_s = self._lookout, self._instruments, time.monotonic()
+        if self._scene is None or lookout is None or instruments is None or lookout.now is None:
+            return
+        if now_s < self._shown_s + SCENE_EVERY_S or not lookout.looked_at:
+            return
+        self._shown_s, step = now_s, lookout.now.step
+        self._scene.show(step.estimate.X_WB, lookout.now.thrusts_N, instruments.predicted_m_s)
+
+    def _close(self, live: LiveFlight) -> None:
+        """Say what became of a flight."""
+        if live.fault is not None:
+            self.fault = live.fault
+            self._say(f"the flight ended: {live.fault}", "error")
+        if live.folder is not None and (live.folder / "steps.parquet").exists():
+            self.flown.append(live.folder)
+            self._say(f"the flight is over; it is kept in {live.folder}")
+        self.desk.set(mode="hold")
+
+    def _await_next(self) -> None:
+        """Wait until somebody with the helm asks for another flight."""
+        if self._over.is_set():
+            return
+        self._say_preparing("the flight is over; hold, scan or operator begins another")
+        while not self._over.wait(TENDED_S):
+            controls = self.seat.read(0.0)
+            asked = [what for what in (controls.pressed if controls is not None else ()) if what in MODES]
+            if asked:
+                self.desk.press(asked[-1])
+                self._began_s = time.monotonic()
+                return
+
+    def _free_folder(self) -> Path | None:
+        """The folder of the next flight: the one given, or with the first number that is free."""
+        if self.folder is None:
+            return None
+        count, folder = 1, self.folder
+        while (folder / "scenario.yaml").exists():
+            count += 1
+            folder = self.folder.with_name(f"{self.folder.name}-{count}")
+        return folder
+
+    def _end(self, fault: BaseException) -> None:
+        self.fault = fault
+        words = " ".join(str(fault).split()) or type(fault).__name__
+        self._say(f"no flight: {words}", "error")
+        self._say_preparing(f"no flight: {words}")
+        self._over.set()
+
+    def _say(self, text: str, level: str = "info", time_s: float | None = None) -> None:
+        at_s = self._live.time_s if time_s is None and self._live is not None else time_s
+        self._notes.append(Note(text=text, level=level, time_s=at_s or 0.0))
+
+    def _say_preparing(self, what: str | None) -> None:
+        if what != self._preparing:
+            self._preparing = what
+            self._edition += 1
+
+    def _desk(self) -> dict[str, Any]:
+        state = self.desk.state
+        return asdict(state) | {"regime": regime(state.w_track)}

@@ -1,0 +1,138 @@
+"""What is sent: a flight's parts once, and ten times a second how it stands, as plain numbers for JSON.
+
+Numbers are rounded to what can be seen; one that is not finite is null.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.core.geometry import euler_from_quat
+from wakewise.operation import Parts
+from wakewise.simulation.tank.measuring import STILL_M_S
+from wakewise.ui.cockpit.gauges import Gauges
+from wakewise.ui.cockpit.lookout import SAMPLED_S, WINDOW_S, Lookout, Moment
+
+POINTS_EVERY, GAUGES_EVERY = 5, 2
+"""States between two looks at the water of every point, and at D: with a current these cost the most."""
+
+
+def described(parts: Parts, gauges: Gauges) -> dict[str, Any]:
+    """Scenario, vehicle and target, as a client is told when it comes."""
+    scenario, vehicle, target = parts.scenario, parts.vehicle, parts.found_target
+    return {
+        "scenario": told_scenario(parts),
+        "vehicle": {
+            "name": vehicle.name,
+            "thrusters": [
+                {
+                    "name": thruster.name,
+                    "position_B_m": rounded(thruster.p_BT_m, 4),
+                    "axis_B": rounded(thruster.axis_B, 4),
+                    "limit_N": rounded((-thruster.max_reverse_N, thruster.max_forward_N), 2),
+                }
+                for thruster in vehicle.thrusters
+            ],
+        },
+        "target": {
+            "points_W_m": [rounded(point, 4) for point in gauges.points_W_m],
+            "centre_W_m": rounded(target.centre_W_m, 4),
+            "radius_m": number(target.radius_m, 4),
+            "bed_z_m": number(target.bed_z_m, 4),
+            "depth_m": number(scenario.tank.size_m[2], 3),
+        },
+    }
+
+
+def told_scenario(parts: Parts) -> dict[str, Any]:
+    """What a scenario is called, known before any of its parts is made."""
+    scenario = parts.scenario
+    return {
+        "name": scenario.name,
+        "world": scenario.world,
+        "method": scenario.method,
+        "target": scenario.target.kind,
+        "seed": scenario.seed,
+    }
+
+
+class Instruments:
+    """Makes a state of a moment; one for each flight. `predicted_m_s` is the wash at the gauges' points, as last read.
+
+    Parameters
+    ----------
+    gauges : Gauges
+    lookout : Lookout
+    """
+
+    def __init__(self, gauges: Gauges, lookout: Lookout) -> None:
+        self._gauges, self._lookout = gauges, lookout
+        self._both: deque[tuple[float, float]] = deque(maxlen=round(WINDOW_S / SAMPLED_S / GAUGES_EVERY))
+        self.predicted_m_s = np.zeros(len(gauges.points_W_m))
+        self._now = (math.nan, math.nan)
+        self._count = 0
+
+    def read(self, now: Moment) -> dict[str, Any]:
+        """How the flight stands, but for what desk, helm, coverage and photographs add."""
+        step, estimate = now.step, now.step.estimate
+        if self._count % GAUGES_EVERY == 0:
+            self._now = self._gauges.disturbances(estimate, now.thrusts_N)
+            if math.isfinite(sum(self._now)):
+                self._both.append(self._now)
+        flown, direct = self._now
+        if self._count % POINTS_EVERY == 0:
+            self.predicted_m_s = self._gauges.predicted_m_s(estimate, now.thrusts_N)
+        self._count += 1
+        roll, pitch, heading = (math.degrees(angle) for angle in euler_from_quat(estimate.X_WB.q))
+        R_BW = estimate.X_WB.R.T
+        return {
+            "time_s": number(step.time_s, 2),
+            "thrusts_N": rounded(step.command.thrusts_N, 3),
+            "commanded_m_s": rounded(R_BW @ now.asked_W_m_s, 4),
+            "velocity_m_s": rounded(R_BW @ now.velocity_W_m_s, 4),
+            "deviation_pct": number(self._lookout.deviation_pct, 1),
+            "disturbance": number(flown, 8),
+            "direct_disturbance": number(direct, 8),
+            "rms_m_s": number(self._gauges.rms_m_s(flown), 6),
+            "direct_rms_m_s": number(self._gauges.rms_m_s(direct), 6),
+            "saved_pct": number(self.saved_pct, 1),
+            "predicted_m_s": rounded(self.predicted_m_s, 4),
+            "true_m_s": None if now.true_m_s is None else rounded(now.true_m_s, 4),
+            "depth_m": number(float(estimate.X_WB.p_m[2]), 3),
+            "roll_deg": number(roll, 2),
+            "pitch_deg": number(pitch, 2),
+            "heading_deg": number(heading % 360.0, 2),
+            "tilt_deg": number(math.degrees(step.tilt_rad), 2),
+            "power_W": number(now.power_W, 1),
+            "energy_J": number(now.energy_J, 1),
+            "position_W_m": rounded(estimate.X_WB.p_m, 4),
+            "goal_W_m": rounded(step.goal.X_WB.p_m, 4),
+            "fallback": step.command.fallback,
+        }
+
+    @property
+    def saved_pct(self) -> float | None:
+        """How much less D the flown thrusts made than direct allocation over ten seconds; None where that leaves the
+        water as good as still (`STILL_M_S`), so that there is nothing to save.
+        """
+        if not self._both:
+            return None
+        flown, direct = np.mean(self._both, axis=0)
+        still = self._gauges.rms_m_s(float(direct)) < STILL_M_S
+        return None if still else 100.0 * (1.0 - float(flown / direct))
+
+
+def number(value: float | None, digits: int) -> float | None:
+    """A number that JSON has, or None."""
+    return None if value is None or not math.isfinite(value) else round(float(value), digits)
+
+
+def rounded(values: Iterable[float] | Array, digits: int) -> list[float | None]:
+    """Numbers that JSON has."""
+    return [number(value, digits) for value in np.asarray(values, dtype=np.float64).tolist()]

@@ -1,0 +1,155 @@
+"""The part of a trial's report that shows its model: in 3D, in the photographs' colours, by its errors."""
+
+from __future__ import annotations
+
+from wakewise.core.arrays import Array
+from wakewise.ui.reports import figures
+from wakewise.ui.reports.draft import Draft
+from wakewise.ui.reports.errors import CloudErrors, ModelErrors, cloud_errors, model_errors
+from wakewise.ui.reports.ink import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, error_colours
+from wakewise.ui.reports.looks import coloured_model
+from wakewise.ui.reports.page import absence, chip, error_scale, missing, panel, pictures, plot, scene_box, section
+from wakewise.ui.reports.scene3d import CAMERA_RGB, HULL_RGB, PATH_RGB, PLANNED_RGB, scene_html
+from wakewise.ui.reports.trial import Surface, Trial
+from wakewise.ui.reports.views import OUTLOOK, SIDES, Drawing, Frame, coverage_colours, draw_cloud, draw_surface
+from wakewise.ui.reports.words import number
+
+VIEW_PIXELS = 360
+
+
+def before_mesh(trial: Trial, draft: Draft) -> None:
+    """Make what of the part shows neither mesh nor colours."""
+    cloud = draft.once("cloud", lambda: cloud_errors(trial))
+    if cloud is not None:
+        _covered(trial, cloud, draft)
+        _spread(cloud, draft)
+
+
+def before_colours(trial: Trial, draft: Draft) -> None:
+    """Make what of the part shows the mesh but not its colours."""
+    errors = _errors(trial, draft)
+    if errors is not None and trial.truth is not None:
+        _accuracy(trial.truth, errors, draft)
+
+
+def _errors(trial: Trial, draft: Draft) -> ModelErrors | None:
+    cloud = draft.once("cloud", lambda: cloud_errors(trial))
+    return draft.once("errors", lambda: None if cloud is None else model_errors(trial, cloud))
+
+
+def _covered(trial: Trial, cloud: CloudErrors, draft: Draft) -> list[str]:
+    """The truth by its distance to the cloud, from all sides."""
+
+    def make() -> list[str]:
+        if trial.truth is None:
+            return []
+        frame = Frame.around(trial.truth.vertices_m[cloud.counts])
+        colours = coverage_colours(cloud.coverage_m, cloud.counts)
+        return draw_surface(trial.truth, colours, SIDES, frame, VIEW_PIXELS)
+
+    return draft.once("covered", make)
+
+
+def _accuracy(truth: Surface, errors: ModelErrors, draft: Draft) -> list[str]:
+    """The mesh, or else the cloud, by its distance to the truth, from all sides."""
+    frame = Frame.around(truth.vertices_m[errors.counts])
+
+    def make() -> list[str]:
+        if errors.model is not None and errors.model_accuracy_m is not None:
+            return draw_surface(errors.model, error_colours(errors.model_accuracy_m), SIDES, frame, VIEW_PIXELS)
+        return draw_cloud(errors.points_m, error_colours(errors.accuracy_m), SIDES, frame, VIEW_PIXELS)
+
+    return draft.once("accuracy", make)
+
+
+def _spread(errors: CloudErrors, draft: Draft) -> str:
+    return draft.once(
+        "spread",
+        lambda: plot(
+            figures.error_histogram(errors),
+            "distribution of errors",
+            f"From {number(len(errors.points_m))} points of the cloud, thinned to one per 0.8 mm. The last bar holds "
+            "everything beyond.",
+            narrow=figures.error_histogram(errors, narrow=True),
+        ),
+    )
+
+
+def model_section(trial: Trial, draft: Draft) -> str:
+    """HTML of the part; what `draft` holds is taken from there."""
+    errors = _errors(trial, draft)
+    coloured = coloured_model(trial)
+    drawing = None if coloured is None else Drawing(coloured[0])
+    scene = _scene(trial, errors, _poster(trial, errors, coloured, drawing))
+    if errors is None or trial.truth is None:
+        why = absence(trial, "dense.ply", "truth.ply")
+        gap = missing("the model's error", why)
+        return section("model", "The model", "There is nothing to measure.", scene + gap)
+    aligned = "after rigid alignment to the truth" if errors.fine_aligned else "as it came, without fine alignment"
+    return section(
+        "model",
+        "The model",
+        f"How far the reconstruction is from the true surface, {aligned}. What stands less than 10 mm above the bed "
+        "does not count: sand touches it.",
+        scene
+        + _in_colour(coloured, drawing)
+        + panel(
+            "Accuracy",
+            "The reconstruction, coloured by its distance to the true surface.",
+            error_scale("error (mm)", ((OVER_LIMIT, "more"),)),
+            pictures(_accuracy(trial.truth, errors, draft), SIDES, "model"),
+        )
+        + panel(
+            "Completeness",
+            "The true surface, coloured by its distance to the nearest reconstructed point.",
+            error_scale("distance (mm)", ((NOT_COVERED, "not covered"), (NOT_COUNTED, "does not count"))),
+            pictures(_covered(trial, errors, draft), SIDES, "true surface"),
+        )
+        + _spread(errors, draft),
+    )
+
+
+def _poster(
+    trial: Trial, errors: ModelErrors | None, coloured: tuple[Surface, Array] | None, drawing: Drawing | None
+) -> str:
+    """The model as the 3D scene opens on it, for as long as the scene loads; empty where there is none."""
+    if trial.truth is None:
+        return ""
+    frame = Frame.around(trial.truth.vertices_m)
+    if coloured is not None and drawing is not None:
+        return drawing.pictures(coloured[1], (OUTLOOK,), frame, VIEW_PIXELS)[0]
+    if errors is not None and errors.model is not None and errors.model_accuracy_m is not None:
+        return draw_surface(errors.model, error_colours(errors.model_accuracy_m), (OUTLOOK,), frame, VIEW_PIXELS)[0]
+    return ""
+
+
+def _in_colour(coloured: tuple[Surface, Array] | None, drawing: Drawing | None) -> str:
+    if coloured is None or drawing is None:
+        return ""
+    surface, colours = coloured
+    views = drawing.pictures(colours, SIDES, Frame.around(surface.vertices_m), VIEW_PIXELS)
+    text = "The model in the colours of its photographs, as mesh.glb has it for other programs."
+    return panel("Likeness", text, "", pictures(views, SIDES, "model in colour"))
+
+
+def _scene(trial: Trial, errors: ModelErrors | None, poster: str) -> str:
+    """The 3D scene, opened on the model, and what its layers are."""
+    html = scene_html(trial, errors)
+    if html is None:
+        return missing("the 3D scene", absence(trial, "steps.parquet", "images.csv", "truth.ply"))
+    legend = "".join(
+        chip("rgb({},{},{})".format(*colour), name)
+        for colour, name in (
+            (PATH_RGB, "path"),
+            (CAMERA_RGB, "photographs"),
+            (PLANNED_RGB, "planned viewpoints"),
+            (HULL_RGB, "vehicle"),
+        )
+    )
+    if errors is not None:
+        legend = error_scale("model by error (mm)") + legend
+    hint = (
+        '<span class="hint">Drag to turn, scroll to come closer. The button at the lower right switches layers on and '
+        "off: the model by its error, photographs, path, and the vehicle, which flies when you press play.</span>"
+    )
+    return scene_box(html, hint + legend, poster)

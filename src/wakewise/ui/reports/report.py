@@ -1,0 +1,325 @@
+"""The report of one trial: a single HTML page for people who fly and people who measure."""
+
+from __future__ import annotations
+
+import shlex
+from html import escape
+from pathlib import Path
+
+from wakewise.core.files import write_text
+from wakewise.ui.reports import figures
+from wakewise.ui.reports.coverage import coverage_html
+from wakewise.ui.reports.draft import Draft
+from wakewise.ui.reports.limits import limits_section
+from wakewise.ui.reports.looks import colours_html, film_html
+from wakewise.ui.reports.model import before_colours, before_mesh, model_section
+from wakewise.ui.reports.page import absence, fold, missing, plot, prose, section, tile, whole_page
+from wakewise.ui.reports.photos import contact_sheet
+from wakewise.ui.reports.scene3d import vehicle_of
+from wakewise.ui.reports.trial import Trial, read_trial
+from wakewise.ui.reports.trim import trim_html
+from wakewise.ui.reports.words import grouped, number, shown, unit, verdict
+from wakewise.ui.reports.yardstick import yardstick_html
+from wakewise.vision.evaluation.surface import SUCCESS_COMPLETENESS_PCT, SUCCESS_RMSE_MM
+
+PARTS = (
+    ("yardstick", "Yardstick"),
+    ("model", "Model"),
+    ("flown", "Flown"),
+    ("seen", "Seen"),
+    ("water", "Water"),
+    ("limits", "Limits"),
+    ("figures", "Figures"),
+    ("again", "Reproduce"),
+)
+
+
+def begin_report(trial: Path, draft: Draft, missing: str) -> None:
+    """Make the parts of a report that can be made before its folder is whole.
+
+    Parameters
+    ----------
+    trial : Path
+    draft : Draft
+        Takes them; give it to `write_report` then.
+    missing : {"mesh", "colours"}
+        What is still being made: the mesh and its colours, or the colours alone.
+
+    Raises
+    ------
+    InputError
+        As `write_report`.
+    """
+    read = read_trial(trial)
+    _seen_photographs(read, draft)
+    coverage_html(read, draft)
+    _flown(read, draft)
+    _water(read, draft)
+    before_mesh(read, draft)
+    if missing == "colours":
+        before_colours(read, draft)
+        draft.once("seen", lambda: colours_html(read))
+
+
+def write_report(trial: Path, draft: Draft | None = None) -> Path:
+    """Write report.html into a trial folder and give its path; `draft` holds the parts that are made already.
+
+    The page is one file that opens with no network. A part of the folder that is missing leaves a gap that says why.
+
+    Raises
+    ------
+    InputError
+        If `trial` is not a folder or holds nothing of a trial.
+    """
+    read = read_trial(trial)
+    path = trial / "report.html"
+    write_text(path, report_page(read, draft))
+    return path
+
+
+def report_page(trial: Trial, draft: Draft | None = None) -> str:
+    """HTML of the whole report; `draft` holds the parts that are made already."""
+    draft = draft or Draft()
+    calm = yardstick_html(trial)
+    parts = [part for part in PARTS if calm or part[0] != "yardstick"]
+    links = "".join(f'<a href="#{anchor}">{title}</a>' for anchor, title in parts)
+    body = (
+        f'<header class="top">{_headline(trial)}</header><nav class="parts" aria-label="parts"><div>{links}</div></nav>'
+        f"<main>{calm}{model_section(trial, draft)}{_flown(trial, draft)}{_seen(trial, draft)}"
+        f"{_water(trial, draft)}{limits_section({trial.name: trial})}{_figures(trial)}{_again(trial)}</main>"
+        f"<footer>{_footer(trial)}</footer>"
+    )
+    return whole_page(f"{trial.name} · Wakewise", body)
+
+
+def _headline(trial: Trial) -> str:
+    said = verdict(trial, named=True)
+    state = {True: "good", False: "bad", None: ""}[said.good]
+    reasons = "".join(f'<p class="why">{prose(line)}</p>' for line in said.reasons)
+    facts = [("trial", trial.name), ("method", trial.method), ("seed", trial.seed)]
+    facts += [(key, str(trial.scenario[key])) for key in ("vehicle",) if trial.scenario.get(key)]
+    eyebrow = "".join(f"<span>{name} <b>{escape(value)}</b></span>" for name, value in facts)
+    foreign = f'<p class="outside">{escape(_capital(trial.outside))}.</p>' if trial.outside else ""
+    return (
+        f'<p class="eyebrow">{eyebrow}</p><h1 class="{state}"><span class="mark"></span>{escape(said.headline)}</h1>'
+        f'{foreign}{reasons}<dl class="tiles">{_tiles(trial)}</dl>'
+    )
+
+
+def _tiles(trial: Trial) -> str:
+    metrics = trial.metrics
+
+    def one(name: str, key: str, unit_name: str, note: str, scale: float = 1.0, ok: bool | None = None) -> str:
+        value = metrics.number(key)
+        if value is None:
+            return tile(name, "–", "", _short(metrics.why.get(key, "not recorded")))
+        state = "" if ok is None else "ok" if ok else "off"
+        return tile(name, number(scale * value), unit_name, note, state)
+
+    rmse, covered = metrics.number("rmse_mm"), metrics.number("completeness_pct")
+    registered, images = metrics.number("registered_images"), metrics.number("images")
+    photos = tile("photographs placed", "–", "", _short(metrics.why.get("registered_images", "not recorded")))
+    if registered is not None:
+        of = "" if images is None else f"of {images:.0f}"
+        photos = tile("photographs placed", f"{registered:.0f}", of, "registered in the model")
+    during = metrics.number("exposure_speed_mean_m_s")
+    return (
+        one(
+            "RMSE", "rmse_mm", "mm", f"limit {SUCCESS_RMSE_MM:g} mm",
+            ok=None if rmse is None else rmse < SUCCESS_RMSE_MM,
+        )
+        + one(
+            "surface within 3 mm", "completeness_pct", "%", f"limit {SUCCESS_COMPLETENESS_PCT:g} %",
+            ok=None if covered is None else covered > SUCCESS_COMPLETENESS_PCT,
+        )
+        + photos
+        + one(
+            "water at the target", "target_speed_mean_m_s", "mm/s",
+            "wash, mean" if during is None else f"wash, mean; {number(1e3 * during)} while exposing", scale=1e3,
+        )
+        + one("position error", "position_rmse_mm", "mm", "rms, from where it was wished to be")
+        + one("flight", "duration_s", "s", _energy(trial))
+    )  # fmt: skip
+
+
+def _short(why: str) -> str:
+    """A reason for a tile: the header has said why there is no model."""
+    return "no model" if why.startswith("no model") else why
+
+
+def _capital(words: str) -> str:
+    return words[:1].upper() + words[1:]
+
+
+def _energy(trial: Trial) -> str:
+    energy = trial.metrics.number("energy_kJ")
+    return "duration" if energy is None else f"{number(energy)} kJ in the thrusters"
+
+
+def _flown(trial: Trial, draft: Draft) -> str:
+    return draft.once("flown", lambda: _flown_section(trial))
+
+
+def _flown_section(trial: Trial) -> str:
+    legs = [name for name, _, _ in figures.legs(trial)]
+    orbits = len({name for name in legs if name.startswith("orbit")})
+    duration = trial.metrics.number("duration_s")
+    lead = "The path that the vehicle really took and the photographs where they were really taken."
+    if orbits:
+        lead = (
+            (f"{orbits} orbits" if orbits > 1 else "One orbit")
+            + ("" if duration is None else f" in {number(duration)} s")
+            + ". "
+            + lead
+        )
+    return section(
+        "flown",
+        "What was flown",
+        lead,
+        trim_html(trial)
+        + film_html(trial)
+        + plot(
+            figures.plan_and_side(trial),
+            "flight from above and from the side",
+            "Arrows point where the camera looked; crosses are the planned viewpoints.",
+            absence(trial, "steps.parquet", "images.csv"),
+            narrow=figures.plan_and_side(trial, narrow=True),
+        ),
+    )
+
+
+def _leg_of(trial: Trial, time_s: float) -> str:
+    """Leg on which a photograph was taken; shutters open just where an orbit begins and ends, so orbits go first."""
+    near_s = 0.05
+    names = [name for name, start, stop in figures.legs(trial) if start - near_s <= time_s <= stop + near_s]
+    return next((name for name in names if name.startswith("orbit")), names[0] if names else "")
+
+
+def _seen_photographs(trial: Trial, draft: Draft) -> str:
+    leg_of = {i: _leg_of(trial, shot.time_s) for i, shot in enumerate(trial.photographs)}
+    return draft.once("photographs", lambda: contact_sheet(trial, leg_of))
+
+
+def _seen(trial: Trial, draft: Draft) -> str:
+    if not trial.photographs:
+        gap = missing("the photographs", absence(trial, "images.csv"))
+        return section("seen", "What was seen", "No photographs are on record.", gap)
+    lead = (
+        f"{len(trial.photographs)} photographs in the order they were taken"
+        '<span class="on-screen">; a click enlarges</span>. Sharpness is that of the target as it '
+        "appears in the picture (variance of the Laplacian), so compare it between photographs of the same orbit."
+    )
+    return section(
+        "seen",
+        "What was seen",
+        lead,
+        _seen_photographs(trial, draft) + coverage_html(trial, draft) + draft.once("seen", lambda: colours_html(trial)),
+    )
+
+
+def _water(trial: Trial, draft: Draft) -> str:
+    return draft.once("water", lambda: _water_section(trial))
+
+
+def _water_section(trial: Trial) -> str:
+    gap = absence(trial, "steps.parquet")
+    exposures = len(figures.exposure_times(trial))
+    vehicle = vehicle_of(trial)
+    names = [] if vehicle is None else [thruster.name for thruster in vehicle.thrusters]
+    ticks = f" Orange ticks mark the {exposures} exposures." if exposures else ""
+    return section(
+        "water",
+        "What the water did",
+        "Speeds are the excess over the same flow without the vehicle: what its jets and its hull's wake did.",
+        plot(
+            figures.water_over_time(trial),
+            "water and position over time",
+            f"Shading separates the legs.{ticks} D is no measurement: it is the controller's own wake model, asked how "
+            "fast the jets move the points that its method watches (weighted sum of squared speeds).",
+            gap,
+            narrow=figures.water_over_time(trial, narrow=True),
+        )
+        + plot(
+            figures.thrust_strip(trial, names),
+            "thrusts over time",
+            "Orange pushes along the thruster's axis, blue against it; the stronger the colour, the harder. Bars: root "
+            "mean square over the flight.",
+            gap,
+            narrow=figures.thrust_strip(trial, names, narrow=True),
+        ),
+    )
+
+
+def _figures(trial: Trial) -> str:
+    metrics = trial.metrics
+    if not metrics.values:
+        gap = missing("the figures", absence(trial, "metrics.json"))
+        return section("figures", "The figures", "No figures are on record.", gap)
+    tables = []
+    told: set[str] = set()
+    for group, keys in grouped(metrics).items():
+        rows = "".join(_row(trial, key, told) for key in keys)
+        table = (
+            '<table class="figures"><colgroup><col class="key"><col class="val"><col class="unit"><col></colgroup>'
+            '<thead><tr><th>key</th><th class="num">value</th><th>unit</th><th>definition</th></tr></thead>'
+            f"<tbody>{rows}</tbody></table>"
+        )
+        tables.append(fold(group, table, f"{len(keys)} figures"))
+    lead = "Everything in metrics.json. A figure that could not be computed says why."
+    return section("figures", "The figures", lead, "".join(tables))
+
+
+def _row(trial: Trial, key: str, told: set[str]) -> str:
+    """One figure; `told` are the reasons that the rows above have given, which are not given again."""
+    metrics = trial.metrics
+    value, text = metrics.values[key], prose(str(metrics.definitions.get(key, "")))
+    cell = '<span class="null">–</span>' if value is None else escape(shown(value))
+    if value is None:
+        why = str(metrics.why.get(key, "no reason was given"))
+        said = "not computed, for the reason above" if why in told else f"not computed: {why}"
+        told.add(why)
+        text = f'{text}{"<br>" if text else ""}<span class="why-null">{prose(said)}</span>'
+    return (
+        f'<tr><td class="key">{escape(key)}</td><td class="num">{cell}</td><td class="unit">'
+        f'{escape(unit(metrics, key))}</td><td class="text">{text}</td></tr>'
+    )
+
+
+def _again(trial: Trial) -> str:
+    versions = trial.scenario.get("versions")
+    known = [f"{name} {value}" for name, value in versions.items()] if isinstance(versions, dict) else []
+    # The scenario's first lines name, as comments, the versions that ran it.
+    for line in trial.scenario_text.splitlines():
+        if not line.startswith("#"):
+            break
+        known.append(line.lstrip("# ").strip())
+    command = f"wakewise scan {shlex.quote(f'{trial.name}/scenario.yaml')} --out {shlex.quote(f'{trial.name}-again')}"
+    how = "The scenario file holds every setting; the same seed gives the same flight."
+    if trial.scenario.get("replaced"):
+        command = f"ww.trial(parts.replace(...), {trial.name + '-again'!r})"
+        how = (
+            "Some parts were given in Python, which a scenario file cannot hold: run the script that gave them. The "
+            "file has every other setting; the same seed and parts give the same flight."
+        )
+    facts = [("seed", trial.seed), ("method", trial.method), ("versions", ", ".join(known) or "not recorded")]
+    listed = "".join(f"<dt>{name}</dt><dd>{escape(value)}</dd>" for name, value in facts)
+    scenario = missing("the scenario", absence(trial, "scenario.yaml"))
+    if trial.scenario_text:
+        scenario = (
+            f"<details><summary>scenario.yaml, everything resolved</summary><pre>{escape(trial.scenario_text)}</pre>"
+            "</details>"
+        )
+    gaps = "".join(f"<li><code>{escape(name)}</code> {escape(why)}</li>" for name, why in trial.missing.items())
+    note = f"<h3>Parts that this report had to do without</h3><ul>{gaps}</ul>" if gaps else ""
+    return section(
+        "again",
+        "How to reproduce it",
+        how,
+        f'<pre class="command">{escape(command)}</pre><dl class="facts">{listed}</dl>{scenario}{note}',
+    )
+
+
+def _footer(trial: Trial) -> str:
+    simulated = "tank" in trial.scenario
+    said = "Vehicle, water and photographs of this trial are simulated. " if simulated else ""
+    return f"{said}World axes are north, east, down; heights in pictures are above the bed. Made by Wakewise."

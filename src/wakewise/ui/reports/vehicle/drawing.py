@@ -1,0 +1,260 @@
+"""A drawing of a vehicle from above, from starboard and from ahead: thrusters, jets of positive thrust, camera view."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Callable
+from html import escape
+
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.robot.vehicles.check import AnyVehicle, actuation
+from wakewise.robot.vehicles.describe import as_draft
+from wakewise.robot.vehicles.draft import VehicleDraft
+from wakewise.ui.reports.vehicle.drawing_marks import (
+    FRAME,
+    HULL,
+    INK,
+    JET,
+    MUTED,
+    Sizes,
+    View,
+    arrow,
+    badge,
+    buoyancy_mark,
+    camera_mark,
+    camera_marks,
+    centre_marks,
+    gravity_mark,
+    hull_half_m,
+    label_place,
+    text,
+    thruster_marks,
+)
+
+WIDTH, MARGIN, GAP, PAD, HEAD = 1080.0, 24.0, 16.0, 18.0, 40.0
+TALLEST = 700.0
+"""Height that the two rows of panels may take together."""
+
+NARROWEST_CELL = 300.0
+"""Room that the legend needs beside the view from above."""
+
+
+def drawing_svg(vehicle: AnyVehicle, *, titled: bool = True) -> str:
+    """Draw a vehicle as one self-contained SVG in three views to one scale.
+
+    Arrows and the streams around them are the jets of positive thrust, opposite to the force on the vehicle; a dot in
+    a ring is a jet toward the reader and a cross one away from the reader. What a draft does not state is left out or
+    dashed. `titled` puts the name and a line of figures on top.
+
+    Raises
+    ------
+    InputError
+        If the vehicle has no thruster places, that is, only a matrix.
+    """
+    draft = as_draft(vehicle)
+    if not draft.thrusters:
+        raise InputError(f"drawing of {draft.name}: its file holds a matrix but no places of thrusters")
+    sizes = _sizes(draft)
+    heading = _heading(draft) if titled else []
+    top = MARGIN + 18.0 * len(heading) + (14.0 if heading else 0.0)
+    views, height, cell = _views(draft, sizes, top)
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:.0f} {height:.0f}" role="img" '
+        f'font-family="system-ui, -apple-system, Segoe UI, Roboto, sans-serif" font-size="12" fill="{INK}">',
+        f"<title>{escape(draft.title)}, seen from above, from starboard and from ahead</title>",
+        f'<rect width="{WIDTH:.0f}" height="{height:.0f}" fill="#ffffff"/>',
+    ]
+    for line, (words, size, weight, colour) in enumerate(heading):
+        parts.append(text(MARGIN, MARGIN + 14.0 + 18.0 * line, words, size=size, weight=weight, colour=colour))
+    for number, view in enumerate(views):
+        parts += _panel(draft, view, sizes, number)
+    parts += [*_legend(draft, sizes, cell, views[0].px_per_m), "</svg>"]
+    return "\n".join(parts) + "\n"
+
+
+def _heading(draft: VehicleDraft) -> list[tuple[str, int, int, str]]:
+    lines = [(draft.title, 19, 650, INK), (_summary(draft), 12, 400, MUTED), (actuation(draft), 12, 400, MUTED)]
+    if draft.missing:
+        stated = textwrap.wrap(f"Not stated by its file: {', '.join(draft.missing)}.", 150)
+        lines += [(line, 12, 400, "#b4232c") for line in stated]
+    return lines
+
+
+def _summary(draft: VehicleDraft) -> str:
+    said = []
+    if draft.size_m is not None:
+        said.append(" x ".join(f"{1000.0 * s:.0f}" for s in draft.size_m) + " mm")
+    if draft.mass_kg is not None:
+        said.append(f"{draft.mass_kg:g} kg")
+    said.append(f"{len(draft.thrusters)} thrusters")
+    limits = draft.thrust_limits_N
+    if limits is not None:
+        said.append(f"up to {limits[1].max():g} N forward and {-limits[0].min():g} N reverse each")
+    return ", ".join(said)
+
+
+def _sizes(draft: VehicleDraft) -> Sizes:
+    half = hull_half_m(draft)
+    areas = [t.disk_area_m2 for t in draft.thrusters if t.disk_area_m2 is not None]
+    disk = 2.0 * math.sqrt(max(areas) / math.pi) if areas else 0.16 * float(half[:2].min())
+    return Sizes(
+        disk_m=disk,
+        disk_stated=len(areas) == len(draft.thrusters),
+        jet_m=max(1.6 * disk, 0.42 * float(half[0])),
+        cone_m=0.5 * float(half[0]),
+    )
+
+
+def _views(
+    draft: VehicleDraft, sizes: Sizes, top: float
+) -> tuple[list[View], float, tuple[float, float, float, float]]:
+    """Three panels to one scale, the page's height, and the box that is left for the legend."""
+    low, high = _extent(draft, sizes)
+    span = high - low
+    scale = (WIDTH - 2.0 * MARGIN - GAP - 4.0 * PAD) / float(span[0] + span[1])
+    scale = min(scale, (TALLEST - GAP - 2.0 * (HEAD + PAD)) / float(span[1] + span[2]))
+    scale = min(scale, (WIDTH - 2.0 * MARGIN - GAP - 2.0 * PAD - NARROWEST_CELL) / float(span[0]))
+    right_width = max(NARROWEST_CELL, span[1] * scale + 2.0 * PAD)
+    left_width = WIDTH - 2.0 * MARGIN - GAP - right_width
+    upper, lower = span[1] * scale + HEAD + PAD, span[2] * scale + HEAD + PAD
+    right, down = MARGIN + left_width + GAP, top + upper + GAP
+    x, y, z = np.eye(3)
+
+    def panel(
+        title: str, right_B: Array, down_B: Array, toward_B: Array, box: tuple[float, float, float, float]
+    ) -> View:
+        middle = 0.5 * (low + high)
+        return View(
+            title=title,
+            right_B=right_B,
+            down_B=down_B,
+            toward_B=toward_B,
+            origin_px=(
+                box[0] + 0.5 * box[2] - float(right_B @ middle) * scale,
+                box[1] + HEAD + 0.5 * (box[3] - HEAD - PAD) - float(down_B @ middle) * scale,
+            ),
+            box_px=box,
+            px_per_m=scale,
+        )
+
+    views = [
+        panel("From above", x, y, -z, (MARGIN, top, left_width, upper)),
+        panel("From starboard", x, z, y, (MARGIN, down, left_width, lower)),
+        panel("From ahead", -y, z, x, (right, down, right_width, lower)),
+    ]
+    return views, down + lower + MARGIN, (right, top, right_width, upper)
+
+
+def _extent(draft: VehicleDraft, sizes: Sizes) -> tuple[Array, Array]:
+    """Lowest and highest body coordinates that the drawing must show, with room for labels."""
+    half = hull_half_m(draft)
+    points = [half, -half]
+    for thruster in draft.thrusters:
+        wide = 0.5 * sizes.disk_m * 1.6
+        points += [thruster.p_BT_m + wide, thruster.p_BT_m - wide, thruster.p_BT_m - sizes.jet_m * thruster.axis_B]
+    if draft.X_BC is not None:
+        points.append(draft.X_BC.p_m + sizes.cone_m * draft.X_BC.R[:, 2])
+    low, high = np.min(points, axis=0), np.max(points, axis=0)
+    # Symmetric sideways, so that the middle of the vehicle is the middle of the panel.
+    reach = max(float(high[1]), float(-low[1]))
+    low[1], high[1] = -reach, reach
+    edge = 0.04 * float((high - low).max())
+    return low - edge, high + edge
+
+
+def _panel(draft: VehicleDraft, view: View, sizes: Sizes, number: int) -> list[str]:
+    left, top, width, height = view.box_px
+    parts = [
+        f'<rect x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}" rx="10" fill="#ffffff" '
+        f'stroke="{FRAME}"/>',
+        text(left + 14, top + 21, view.title, weight=600, size=13),
+        *_axes(view, left + width - 62, top + 16),
+    ]
+    half = hull_half_m(draft)
+    x, y = view.origin_px
+    across = float(np.abs(view.right_B) @ half) * view.px_per_m
+    along = float(np.abs(view.down_B) @ half) * view.px_per_m
+    dash = "" if draft.size_m is not None else ' stroke-dasharray="5 4"'
+    parts.append(
+        f'<rect x="{x - across:.1f}" y="{y - along:.1f}" width="{2 * across:.1f}" height="{2 * along:.1f}" rx="12" '
+        f'fill="{HULL}" stroke="#9fb0bf" stroke-width="1.2"{dash}/>'
+    )
+    parts += camera_marks(draft, view, sizes)
+    # Furthest from the reader first, so that near thrusters lie on top.
+    order = np.argsort([float(t.p_BT_m @ view.toward_B) for t in draft.thrusters], kind="stable")
+    labels: dict[tuple[int, int], list[int]] = {}
+    for index in map(int, order):
+        parts += thruster_marks(draft, view, index, sizes, f"jet-{number}-{index}")
+        labels.setdefault(label_place(draft, view, index, sizes), []).append(index + 1)
+    parts += centre_marks(draft, view)
+    for (px, py), numbers in labels.items():
+        parts += badge(px, py, "·".join(str(n) for n in sorted(numbers)))
+    return parts
+
+
+def _axes(view: View, x: float, y: float) -> list[str]:
+    """Which body axes the panel shows, as a small corner; a negative axis points the other way."""
+    across, down = int(np.argmax(np.abs(view.right_B))), int(np.argmax(np.abs(view.down_B)))
+    sign = float(np.sign(view.right_B[across]))
+    corner = x if sign > 0.0 else x + 24.0
+    return [
+        arrow(corner, y, corner + 24.0 * sign, y, MUTED, head=5.0),
+        arrow(corner, y, corner, y + 24.0, MUTED, head=5.0),
+        text(corner + 32.0 * sign, y + 4, "xyz"[across], colour=MUTED, size=11, anchor="middle"),
+        text(corner - 10.0 * sign, y + 24, "xyz"[down], colour=MUTED, size=11, anchor="middle"),
+    ]
+
+
+def _legend(draft: VehicleDraft, sizes: Sizes, box: tuple[float, float, float, float], px_per_m: float) -> list[str]:
+    left, top, _, height = box
+    x = left + 20.0
+    ring = f'<circle cx="{x:.1f}" cy="{{y:.1f}}" r="7" fill="#ffffff" stroke="{INK}" stroke-width="1.5"/>'
+    rows: list[tuple[Callable[[float], str], str]] = [
+        (lambda y: arrow(x - 12, y, x + 14, y, JET), "jet of positive thrust (the water's way)"),
+        (
+            lambda y: ring.format(y=y) + f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.4" fill="{JET}"/>',
+            "jet toward you",
+        ),
+        (
+            lambda y: (
+                ring.format(y=y) + f'<path d="M{x - 3:.1f} {y - 3:.1f}l6 6m0 -6l-6 6" stroke="{JET}" stroke-width="2"/>'
+            ),
+            "jet away from you",
+        ),
+    ]
+    if draft.X_BC is not None:
+        fov = "" if draft.camera_fov_rad is None else f", {math.degrees(draft.camera_fov_rad):.0f} degrees across"
+        rows.append((lambda y: camera_mark(x, y), f"camera{fov}"))
+    if draft.p_BG_m is not None:
+        rows.append((lambda y: gravity_mark(x, y), "centre of gravity"))
+    if draft.p_BB_m is not None:
+        rows.append((lambda y: buoyancy_mark(x, y), "centre of buoyancy"))
+    dashed = [
+        word for word, stated in (("size", draft.size_m is not None), ("propellers", sizes.disk_stated)) if not stated
+    ]
+    if dashed:
+        line = f'<path d="M{x - 12:.1f} {{y:.1f}}h26" stroke="{INK}" stroke-width="1.5" stroke-dasharray="4 3"/>'
+        rows.append((lambda y: line.format(y=y), f"{' and '.join(dashed)} not stated, drawn to show"))
+    step = min(25.0, (height - 80.0) / len(rows))
+    parts = []
+    for row, (mark, words) in enumerate(rows):
+        y = top + 30.0 + row * step
+        parts += [mark(y), text(x + 28, y + 4, words, colour=MUTED)]
+    return [*parts, *_scale_bar(x - 12, top + height - 16.0, px_per_m)]
+
+
+def _scale_bar(x: float, y: float, px_per_m: float) -> list[str]:
+    """A bar of 1, 2 or 5 times a power of ten, 60 to 150 pixels long."""
+    wanted_m = 60.0 / px_per_m
+    power = 10.0 ** math.floor(math.log10(wanted_m))
+    length_m = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= wanted_m)
+    length = length_m * px_per_m
+    said = f"{1000.0 * length_m:.0f} mm" if length_m < 1.0 else f"{length_m:g} m"
+    return [
+        f'<path d="M{x:.1f} {y - 4:.1f}v8m0 -4h{length:.1f}m0 -4v8" fill="none" stroke="{INK}" stroke-width="1.5"/>',
+        text(x + length + 10, y + 4, said, colour=MUTED),
+    ]

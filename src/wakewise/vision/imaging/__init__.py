@@ -1,0 +1,65 @@
+"""What the camera would have seen: a lit and textured scene, the water between, motion blur and sensor noise.
+
+`Scene.build` sets the target on its bed, `render` draws it as if there were no water, and `photograph` adds water,
+silt, flakes, the camera's motion while the shutter is open and the sensor. Everything is a function of the true
+poses, the true silt and a seed.
+
+Start reading in `photograph.py` (one photograph, step by step) and `scene.py` (what stands there). `camera.py`,
+`lens.py` and `camera_model.py` are the camera, also behind a flat port; `renderer.py`, `shading.py`, `texture.py`,
+`lighting.py`, `panels.py` and `daylight.py` the picture without water, `bed_view.py`, `height_field.py` and
+`nearby.py` what makes it fast; `optics.py`, `forward_scatter.py`, `grids.py` and `particles.py` the water,
+`metering.py`, `blur.py` and `sensor.py` the exposure.
+"""
+
+from typing import TYPE_CHECKING
+
+from wakewise.core.lazy_imports import lazy_door
+
+if TYPE_CHECKING:
+    from wakewise.vision.imaging.blur import Shutter, motion_blur, motion_px, pose_at
+    from wakewise.vision.imaging.camera import Camera, FlatPort, LensCamera, PinholeCamera
+    from wakewise.vision.imaging.camera_model import Calibration, calibrate
+    from wakewise.vision.imaging.optics import (
+        SiltOptics,
+        WaterOptics,
+        haze_between,
+        through_water,
+        water_optics,
+        water_types,
+    )
+    from wakewise.vision.imaging.panels import Panels
+    from wakewise.vision.imaging.photograph import Photo, photograph, photograph_of, sharpness
+    from wakewise.vision.imaging.renderer import Lights, Render, render
+    from wakewise.vision.imaging.scene import Scene
+    from wakewise.vision.imaging.settings import ImagingSettings
+
+__all__ = [
+    "Calibration",
+    "Camera",
+    "FlatPort",
+    "ImagingSettings",
+    "LensCamera",
+    "Lights",
+    "Panels",
+    "Photo",
+    "PinholeCamera",
+    "Render",
+    "Scene",
+    "Shutter",
+    "SiltOptics",
+    "WaterOptics",
+    "calibrate",
+    "haze_between",
+    "motion_blur",
+    "motion_px",
+    "photograph",
+    "photograph_of",
+    "pose_at",
+    "render",
+    "sharpness",
+    "through_water",
+    "water_optics",
+    "water_types",
+]
+
+lazy_door(__name__, "photos")

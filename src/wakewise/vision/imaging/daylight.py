@@ -1,0 +1,123 @@
+"""Light from above on every vertex, with the shade that target and stones cast: baked once per scene.
+
+Under water the sky is squeezed into Snell's window, 48.6 deg about the zenith for a refractive index of 4/3, and dim
+diffuse light comes from outside of it (Mobley, Light and Water, Academic Press 1994, section 4.2). The shares used here
+are a choice for a shallow tank under a bright overcast sky, not a measurement.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
+from numpy.typing import NDArray
+
+from wakewise.core.arrays import Array, IntArray
+from wakewise.vision.imaging.panels import Panels
+
+SNELL_SIN = 0.75
+"""Sine of the half angle of Snell's window."""
+OUTSIDE_SHARE = 0.15
+"""Radiance outside of Snell's window relative to inside."""
+BED_REFLECTANCE = 0.36
+TARGET_REFLECTANCE = 0.2
+RAYS_TOTAL = 2_500_000
+"""Rays spent on a scene; large meshes get fewer per vertex, at least 8."""
+
+
+def sky_radiance(up: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Radiance from a direction whose upward component is `up`, relative to what gives a level surface irradiance 1.
+
+    Radiance is counted in units of irradiance / pi, so that its cosine-weighted mean over a hemisphere is the
+    irradiance. Downward directions see the lit bed.
+    """
+    inside_sin2 = SNELL_SIN**2
+    window = 1.0 / (inside_sin2 + OUTSIDE_SHARE * (1.0 - inside_sin2))
+    cos_edge = math.sqrt(1.0 - inside_sin2)
+    return np.where(up >= cos_edge, window, np.where(up >= 0.0, OUTSIDE_SHARE * window, BED_REFLECTANCE))
+
+
+def bake_light(
+    parts: Sequence[tuple[Array, IntArray]], normals: Sequence[Array], near_m: float, panels: Panels, foot_W_m: Array
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Irradiance by sky and by panels on both sides of each vertex of target, bed and stones, shape (n, 2) each.
+
+    Each is 1 on a level open surface at the foot. What bed and target throw back is the same share of either. The bed
+    has one side that is seen, column 0.
+
+    Parameters
+    ----------
+    parts : vertices (m) and faces of target, bed and stones, in the scene's frame
+    normals : their unit vertex normals
+    near_m : float
+        Bed vertices farther than this from the foot are taken as unshaded.
+    panels : Panels
+    foot_W_m : ndarray, shape (3,)
+        Origin of the scene's frame in the world.
+    """
+    occluder = EmbreeScene()
+    for vertices, faces in (parts[0], parts[2]):
+        if len(faces):
+            TriangleMesh(occluder, np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int32))
+    down = np.array([[0.0, 0.0, -1.0]])
+    at_foot = float(panels.irradiance(foot_W_m[None], down)[0])
+    per_unit = 1.0 / at_foot if at_foot > 0.0 else 0.0
+    skies, lamps = [], []
+    for k, ((vertices, faces), normal) in enumerate(zip(parts, normals, strict=True)):
+        sky, lamp = np.zeros((len(vertices), 2), np.float32), np.zeros((len(vertices), 2), np.float32)
+        lit = np.arange(len(vertices))
+        if k == 1:
+            sky[:] = np.clip(0.5 - 0.5 * normal[:, 2:], 0.0, 1.0)
+            near = np.hypot(vertices[:, 0], vertices[:, 1]) < near_m
+            lit, far = np.flatnonzero(near), np.flatnonzero(~near)
+            lamp[far] = per_unit * panels.irradiance(vertices[far] + foot_W_m, normal[far])[:, None]
+        sides = (1.0, -1.0) if k == 0 else (1.0,)
+        rays = int(np.clip(RAYS_TOTAL // max(1, len(lit) * len(sides) * len(parts)), 8, 64))
+        for side, sign in enumerate(sides):
+            points, outward = vertices[lit], sign * normal[lit]
+            direct, thrown_back = _irradiance(occluder, points, outward, rays)
+            sky[lit, side] = direct + thrown_back
+            lamp[lit, side] = per_unit * panels.irradiance(points + foot_W_m, outward, occluder, foot_W_m) + thrown_back
+        skies.append(_smooth(sky, faces) if len(faces) else sky)
+        lamps.append(_smooth(lamp, faces) if len(faces) else lamp)
+    return np.concatenate(skies).astype(np.float32), np.concatenate(lamps).astype(np.float32)
+
+
+def _irradiance(
+    occluder: EmbreeScene, points: Array, normals: Array, rays: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean radiance of the sky, and of bed and target, over a cosine-weighted hemisphere of `rays` directions, (n,)."""
+    # The same golden-angle spiral everywhere, turned by a vertex's own angle so that no pattern shows.
+    k = np.arange(rays)
+    radius = np.sqrt((k + 0.5) / rays)
+    direct, thrown_back = np.zeros(len(points)), np.zeros(len(points))
+    helper = np.where(np.abs(normals[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    tangent = np.cross(normals, helper)
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-12)
+    bitangent = np.cross(normals, tangent)
+    turn = np.arange(len(points)) * 2.399963
+    start = np.ascontiguousarray(points + 3e-4 * normals, np.float32)
+    for i in range(rays):
+        a = turn + 2.399963 * k[i]
+        out = math.sqrt(1.0 - radius[i] ** 2)
+        way = radius[i] * (np.cos(a)[:, None] * tangent + np.sin(a)[:, None] * bitangent) + out * normals
+        hit = occluder.run(start, np.ascontiguousarray(way, np.float32), query="OCCLUDED") >= 0
+        radiance, up = sky_radiance(-way[:, 2]), way[:, 2] <= 0.0
+        direct += np.where(~hit & up, radiance, 0.0)
+        thrown_back += np.where(hit, TARGET_REFLECTANCE * 0.5, np.where(up, 0.0, radiance))
+    return direct / rays, thrown_back / rays
+
+
+def _smooth(light: NDArray[np.float32], faces: IntArray, passes: int = 2) -> NDArray[np.float32]:
+    """Average each vertex with the corners of its faces, to quieten the few rays per vertex."""
+    n = len(light)
+    corner = faces.ravel()
+    count = np.maximum(np.bincount(corner, minlength=n), 1)
+    for _ in range(passes):
+        face_mean = light[faces].mean(axis=1)
+        columns = [np.bincount(corner, np.repeat(face_mean[:, k], 3), minlength=n) / count for k in range(2)]
+        light = np.stack(columns, axis=1).astype(np.float32)
+    return light

@@ -1,0 +1,164 @@
+"""One photograph: the scene through silty water, over the time the shutter is open, on a noisy sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import FlakeCloud, ScalarGrid
+from wakewise.vision.imaging.blur import motion_blur, pose_at
+from wakewise.vision.imaging.camera import Camera
+from wakewise.vision.imaging.metering import Chosen, automatic
+from wakewise.vision.imaging.optics import SiltOptics, haze_between, through_water
+from wakewise.vision.imaging.particles import draw_flakes, flakes_before
+from wakewise.vision.imaging.renderer import Image, Render, render
+from wakewise.vision.imaging.scene import Scene
+from wakewise.vision.imaging.sensor import expose
+from wakewise.vision.imaging.settings import ELECTRONS_PER_S, FLAKES_PER_KG, READ_NOISE_E, ImagingSettings
+
+BALANCE_M = 0.25
+"""White balance: a grey card at this range in clear water comes out grey, so that farther things turn bluish."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Photo:
+    """A photograph and what is known about it.
+
+    `image` (h, w, 3) uint8 RGB; `sharpness` see `sharpness`, None if the target is not in view; `turbidity_per_m` mean
+    attenuation by silt along the rays to the target, or over the whole image if the target is not in view; `exposure_s`
+    and `gain`, the signal of a white card in unit light, as they were set or chosen.
+    """
+
+    image: NDArray[np.uint8]
+    sharpness: float | None
+    turbidity_per_m: float
+    exposure_s: float
+    gain: float
+
+
+def photograph(
+    scene: Scene | Sequence[Scene],
+    camera: Camera,
+    poses: Sequence[Pose],
+    silt: ScalarGrid | None,
+    settings: ImagingSettings,
+    rng: np.random.Generator,
+    grains: SiltOptics | None = None,
+    before: Sequence[Pose] = (),
+    drifting: FlakeCloud | None = None,
+) -> Photo:
+    """Take one photograph.
+
+    Parameters
+    ----------
+    scene : Scene or sequence of Scene
+        Several show a target that moves: how it stands at instants evenly spaced over the exposure, an odd number.
+    camera : Camera
+        `settings.camera()`, or another one.
+    poses : sequence of Pose
+        True X_WC at instants evenly spaced over `settings.window_s`, the exposure and the readout, the first and last
+        at its ends; one means no motion.
+    silt : ScalarGrid or None
+        Concentration in kg/m3.
+    settings : ImagingSettings
+    rng : Generator
+        Draws flakes and noise, nothing else.
+    grains : SiltOptics, optional
+        What the silt is made of; pale 20 um carbonate mud if not given.
+    before : sequence of Pose
+        True X_WC before, `METERED_EVERY_S` apart, oldest first, for automatic exposure; without them it goes by the
+        photograph's own view.
+    drifting : FlakeCloud, optional
+        Flakes that other photographs show too, where the water has brought them; all are drawn here if not given.
+
+    Raises
+    ------
+    InputError
+        If there is no pose, or the silt is negative somewhere.
+    """
+    scenes = [scene] if isinstance(scene, Scene) else list(scene)
+    views = [render(each, camera, pose_at(poses, 0.5), settings.lights(), settings.samples) for each in scenes]
+    view = views[0] if len(views) == 1 else mean_view(views)
+    chosen = None
+    if settings.auto_exposure:
+        balance = white_balance(settings)
+        metered = before or (pose_at(poses, 0.5),)
+        chosen = automatic(scenes[0], metered, silt, settings, grains or SiltOptics(), balance)
+    return photograph_of(view, camera, poses, silt, settings, rng, grains, chosen, drifting)
+
+
+def white_balance(settings: ImagingSettings) -> Array:
+    """Factors of red, green and blue, shape (3,)."""
+    return np.asarray(np.exp(settings.water().signal_per_m * BALANCE_M))
+
+
+def photograph_of(
+    view: Render,
+    camera: Camera,
+    poses: Sequence[Pose],
+    silt: ScalarGrid | None,
+    settings: ImagingSettings,
+    rng: np.random.Generator,
+    grains: SiltOptics | None = None,
+    chosen: Chosen | None = None,
+    drifting: FlakeCloud | None = None,
+) -> Photo:
+    """As `photograph`, from a render of the middle of the exposure that is there already.
+
+    Exposure and gain are those `chosen`, or those of the settings.
+    """
+    taken = chosen or Chosen(exposure_s=settings.exposure_s, gain=settings.gain, amplification=1.0)
+    shutter = settings.shutter(taken.exposure_s)
+    if silt is not None and silt.values.size and float(silt.values.min()) < 0.0:
+        raise InputError(f"silt: concentration {float(silt.values.min()):g} kg/m3, must not be negative")
+    middle = pose_at(poses, 0.5)
+    lights, water = settings.lights(), settings.water()
+    grains = grains or SiltOptics()
+    haze = haze_between(camera, middle, water, grains, silt, lights)
+    radiance, silt_per_m = through_water(view, camera, haze, water, lights.from_above, grains)
+    radiance = motion_blur(radiance, view.depth_m, camera, poses, shutter)
+    flakes = flakes_before(camera, middle, silt, settings.flakes_per_m3, FLAKES_PER_KG, rng, drifting)
+    radiance = draw_flakes(radiance, view.depth_m, camera, poses, flakes, settings.window_s, water, lights, shutter)
+    # Unamplified, a full well is a saturated signal; amplified, a part of it.
+    well_e = ELECTRONS_PER_S * settings.exposure_s / taken.amplification
+    image = expose(radiance, taken.gain * white_balance(settings), well_e, READ_NOISE_E, rng)
+    on_target = view.target_fraction >= 0.5
+    return Photo(
+        image=image,
+        sharpness=sharpness(image, view.target_fraction),
+        turbidity_per_m=float(np.mean(silt_per_m[on_target] if on_target.any() else silt_per_m)),
+        exposure_s=taken.exposure_s,
+        gain=taken.gain,
+    )
+
+
+def mean_view(views: Sequence[Render]) -> Render:
+    """Light of views of a moving scene from one place, in the mean; depth is that of the middle one."""
+    return Render(
+        radiance=np.mean([view.radiance for view in views], axis=0, dtype=np.float32),
+        lamp_radiance=np.mean([view.lamp_radiance for view in views], axis=0, dtype=np.float32),
+        depth_m=views[len(views) // 2].depth_m,
+        target_fraction=np.mean([view.target_fraction for view in views], axis=0, dtype=np.float32),
+    )
+
+
+def sharpness(image: NDArray[np.uint8], target_fraction: Image) -> float | None:
+    """Variance of the Laplacian over the target, in grey levels squared; None if no pixel is half filled by it.
+
+    The grey image (0-255) is smoothed first with a Gaussian of 1 px, so that sensor noise counts for little.
+    """
+    rows, columns = np.nonzero(target_fraction >= 0.5)
+    if len(rows) == 0:
+        return None
+    pad = 6
+    box = np.s_[max(0, rows.min() - pad) : rows.max() + pad + 1, max(0, columns.min() - pad) : columns.max() + pad + 1]
+    grey = cv2.cvtColor(image[box], cv2.COLOR_RGB2GRAY).astype(np.float32)
+    edges = cv2.Laplacian(cv2.GaussianBlur(grey, (0, 0), 1.0), cv2.CV_32F)
+    return float(np.var(edges[target_fraction[box] >= 0.5]))

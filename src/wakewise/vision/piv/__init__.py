@@ -1,0 +1,32 @@
+"""Virtual particle image velocimetry: tracers in a flow, a light sheet, a camera, and the processing of real pairs."""
+
+from wakewise.vision.piv.correlation import correlate
+from wakewise.vision.piv.folder import PivFolder, read_pairs, read_piv_settings, samples_of_folder, samples_of_vectors
+from wakewise.vision.piv.images import CameraSettings, ImagePair, photograph_pair, picture
+from wakewise.vision.piv.processing import Engine, displacements, has_openpiv
+from wakewise.vision.piv.tracers import Sheet, TracerSettings, carried, relaxation_s, seed_sheet, settling_speed_m_s
+from wakewise.vision.piv.vectors import Displacements, averaged
+
+__all__ = [
+    "CameraSettings",
+    "Displacements",
+    "Engine",
+    "ImagePair",
+    "PivFolder",
+    "Sheet",
+    "TracerSettings",
+    "averaged",
+    "carried",
+    "correlate",
+    "displacements",
+    "has_openpiv",
+    "photograph_pair",
+    "picture",
+    "read_pairs",
+    "read_piv_settings",
+    "relaxation_s",
+    "samples_of_folder",
+    "samples_of_vectors",
+    "seed_sheet",
+    "settling_speed_m_s",
+]

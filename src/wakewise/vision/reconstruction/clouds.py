@@ -1,0 +1,103 @@
+"""Points and surfaces on disk as binary PLY, readable by every viewer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from wakewise.core.arrays import Array, BoolArray, IntArray, freeze
+from wakewise.core.checks import path_of
+from wakewise.core.errors import InputError
+from wakewise.core.files import whole_file
+from wakewise.core.sizes import broken_ply
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Cloud:
+    """Points in m with unit normals and colours (red, green, blue, 0 to 1), each of shape (n, 3)."""
+
+    points_m: Array
+    normals: Array
+    colours: Array
+
+    def __post_init__(self) -> None:
+        freeze(self, points_m=(None, 3), normals=(None, 3), colours=(None, 3))
+
+    def only(self, kept: BoolArray) -> Cloud:
+        """The points that a mask of shape (n,) keeps."""
+        return Cloud(points_m=self.points_m[kept], normals=self.normals[kept], colours=self.colours[kept])
+
+
+_FIELDS = [(k, "<f4") for k in ("x", "y", "z", "nx", "ny", "nz")] + [(k, "u1") for k in ("red", "green", "blue")]
+
+
+def write_cloud(path: Path, cloud: Cloud) -> None:
+    """Write a binary PLY file, whole or not at all."""
+    rows = np.empty(len(cloud.points_m), dtype=_FIELDS)
+    for k, name in enumerate(("x", "y", "z")):
+        rows[name] = cloud.points_m[:, k]
+        rows["n" + name] = cloud.normals[:, k]
+    for k, name in enumerate(("red", "green", "blue")):
+        rows[name] = np.clip(np.rint(255 * cloud.colours[:, k]), 0, 255)
+    words = {"<f4": "float", "u1": "uchar"}
+    properties = "".join(f"property {words[kind]} {name}\n" for name, kind in _FIELDS)
+    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(rows)}\n{properties}end_header\n"
+    with whole_file(path) as temporary:
+        temporary.write_bytes(header.encode("ascii") + rows.tobytes())
+
+
+def read_cloud(path: Path) -> Cloud:
+    """Read points from a PLY file or any other that holds points or a mesh; grey and without normals where none are.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, is no point file, or holds no finite points.
+    """
+    path = path_of(path, "cloud")
+    if not path.is_file():
+        raise InputError(f"{path}: does not exist; a file of points is needed (.ply)")
+    try:
+        broken = broken_ply(path)
+        loaded = trimesh.load(path, process=False) if broken is None else None
+    except (ValueError, KeyError, IndexError, TypeError, NotImplementedError, OSError):
+        raise InputError(f"{path}: is no file of points that can be read; a PLY file is one, for example") from None
+    if broken is not None:
+        raise InputError(f"{path}: was cut short, {broken}")
+    points = np.asarray(getattr(loaded, "vertices", np.zeros((0, 3))), dtype=np.float64).reshape(-1, 3)
+    if len(points) == 0 or not np.all(np.isfinite(points)):
+        raise InputError(f"{path}: holds {len(points)} points, needs at least one and all finite")
+    return Cloud(points_m=points, normals=_normals(loaded, len(points)), colours=_colours(loaded, len(points)))
+
+
+def _raw(loaded: object, names: tuple[str, ...], count: int) -> Array | None:
+    """Columns of a PLY file's vertex table, if they are there."""
+    metadata = getattr(loaded, "metadata", {}).get("_ply_raw", {})
+    table = metadata.get("vertex", {}).get("data")
+    if table is None or getattr(table, "dtype", None) is None or table.dtype.names is None:
+        return None
+    if not set(names) <= set(table.dtype.names) or len(table) != count:
+        return None
+    return np.stack([np.asarray(table[name], dtype=np.float64).reshape(-1) for name in names], axis=1)
+
+
+def _normals(loaded: object, count: int) -> Array:
+    found = _raw(loaded, ("nx", "ny", "nz"), count)
+    return found if found is not None and np.all(np.isfinite(found)) else np.zeros((count, 3))
+
+
+def _colours(loaded: object, count: int) -> Array:
+    found = _raw(loaded, ("red", "green", "blue"), count)
+    return found / 255.0 if found is not None else np.full((count, 3), 0.5)
+
+
+def write_mesh(path: Path, vertices_m: Array, faces: IntArray, colours: Array) -> None:
+    """Write a coloured triangle mesh as binary PLY, whole or not at all; colours 0 to 1, shape (n, 3)."""
+    opaque = np.concatenate([np.clip(np.rint(255 * colours), 0, 255), np.full((len(colours), 1), 255)], axis=1)
+    mesh = trimesh.Trimesh(vertices_m, faces, vertex_colors=opaque.astype(np.uint8), process=False)
+    data = mesh.export(file_type="ply")
+    with whole_file(path) as temporary:
+        temporary.write_bytes(data)

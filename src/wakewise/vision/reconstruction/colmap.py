@@ -1,0 +1,222 @@
+"""COLMAP's blocking calls, quiet, watched and stoppable.
+
+The one door to pycolmap: whoever needs it takes it from here, without the signal handlers that it sets on import.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager, suppress
+from pathlib import Path
+from typing import Any, TypeVar
+
+import pycolmap
+
+from wakewise.core.errors import EnvironmentFailure, StageError
+
+__all__ = [
+    "RESERVE_MB",
+    "be_quiet",
+    "call",
+    "call_apart",
+    "keep_sigterm",
+    "no_stderr",
+    "pycolmap",
+    "settle",
+    "workroom",
+]
+
+T = TypeVar("T")
+# Room that a disk must keep while COLMAP writes its database: what it writes in about a second.
+RESERVE_MB = 16.0
+# Linux's file system in memory, and the largest database that is put there.
+MEMORY, MOST_IN_MEMORY = Path("/dev/shm"), 200e6
+
+
+def be_quiet() -> None:
+    """Only fatal messages; everything else would land between the lines of a progress bar or of JSON."""
+    pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL.value
+
+
+def keep_sigterm() -> None:
+    """Give SIGTERM back to who had it: COLMAP's log took it on import, to print a stack and end without tidying up."""
+    with suppress(ValueError):  # only the main thread may
+        signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGTERM))
+
+
+be_quiet()
+keep_sigterm()
+
+
+def call(work: Callable[..., T], what: str, watch: Callable[[], None] = lambda: None, *, disk: Path | None = None) -> T:
+    """Run a COLMAP call in a thread, calling `watch` now and then; an interrupt cancels it and waits for its end.
+
+    Parameters
+    ----------
+    work : callable
+        Takes `cancellation_token`.
+    what : str
+        Name of the stage, for messages.
+    disk : Path, optional
+        Folder that the call writes to. COLMAP ends the whole process when its database finds no room, so the call is
+        cancelled when another program leaves less than `RESERVE_MB` there.
+
+    Raises
+    ------
+    StageError
+        If COLMAP fails, with its reason in one line.
+    EnvironmentFailure
+        If the disk fills.
+    OSError
+        If a file cannot be read or written.
+    """
+    token = pycolmap.CancellationToken()
+    result: list[T] = []
+    failure: list[Exception] = []
+    # Not the thread itself: a join with a time limit that is interrupted leaves a running thread looking dead in
+    # CPython 3.11, and its database was removed under its hands.
+    ended = threading.Event()
+
+    def body() -> None:
+        try:
+            be_quiet()  # a bundle adjustment on its own makes COLMAP talk again
+            result.append(work(cancellation_token=token))
+        except (RuntimeError, ValueError, IndexError, TypeError, OSError) as error:
+            failure.append(error)
+        finally:
+            ended.set()
+
+    thread = threading.Thread(target=body, name=what)
+    try:
+        thread.start()
+        watch()
+        while not ended.wait(0.25 if disk is None else 0.05):
+            watch()
+            if disk is not None and not ended.is_set() and (free := shutil.disk_usage(disk).free / 1e6) < RESERVE_MB:
+                raise EnvironmentFailure(
+                    f"{what}: the disk of {disk} is full, {free:.0f} MB are left and {RESERVE_MB:g} MB needed; the "
+                    "stages before it are kept"
+                )
+    finally:
+        token.cancel()
+        _see_out(thread, ended)
+    if failure:
+        if isinstance(failure[0], OSError):
+            raise failure[0]
+        reason = " ".join(str(failure[0]).split())[:200]
+        raise StageError(f"{what}: COLMAP stopped: {reason}") from failure[0]
+    return result[0]
+
+
+def call_apart(what: str, function: str, *arguments: Any, watch: Callable[[], None] = lambda: None) -> None:
+    """Run a function of pycolmap that cannot be cancelled in a process of its own, which an interrupt ends at once.
+
+    Parameters
+    ----------
+    what : str
+        Name of the stage, for messages.
+    function : str
+        Its name; it takes and leaves files.
+    arguments
+        Paths, and options of pycolmap's own.
+
+    Raises
+    ------
+    StageError
+        If it fails, with its reason in one line.
+    """
+    order: bytes | None = pickle.dumps((function, arguments))
+    # Its own session: a terminal's Ctrl-C goes to whoever waits for it, and that ends it.
+    child = subprocess.Popen(
+        [sys.executable, "-c", _APART],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    )
+    told = b""
+    try:
+        while True:
+            try:
+                _, told = child.communicate(order, timeout=0.25)
+                break
+            except subprocess.TimeoutExpired:
+                order = None  # it has it
+                watch()
+    finally:
+        child.kill()
+        child.communicate()
+    if child.returncode != 0:
+        last = told.decode(errors="replace").strip().splitlines()[-1:] or [f"exit code {child.returncode}"]
+        raise StageError(f"{what}: COLMAP stopped: {' '.join(last[0].split())[:200]}")
+
+
+_APART = """
+import pickle, sys
+import pycolmap
+pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL.value
+function, arguments = pickle.load(sys.stdin.buffer)
+getattr(pycolmap, function)(*arguments)
+"""
+
+
+def _see_out(thread: threading.Thread, ended: threading.Event) -> None:
+    """Wait for a cancelled call to come back, however often the user presses Ctrl-C meanwhile."""
+    while thread.ident is not None and not ended.is_set():
+        with suppress(KeyboardInterrupt):
+            ended.wait(1.0)
+
+
+@contextmanager
+def workroom(beside: Path, size_bytes: float) -> Iterator[Path]:
+    """Folder for a database that COLMAP works in, removed afterwards: in memory if that is small beside what is there.
+
+    COLMAP ends the whole process when its database finds no room, so it should not lie where others write. A large one,
+    or a system without a file system in memory, gets a folder next to `beside`.
+    """
+    where = beside.parent
+    roomy = size_bytes <= MOST_IN_MEMORY and os.access(MEMORY, os.W_OK)
+    if roomy and shutil.disk_usage(MEMORY).free > 2.0 * size_bytes + 1e6 * RESERVE_MB:
+        where = MEMORY
+    _sweep(where)
+    with tempfile.TemporaryDirectory(prefix=f".wakewise-{os.getpid()}-", dir=where) as folder:
+        yield Path(folder)
+
+
+def _sweep(where: Path) -> None:
+    """Remove the rooms of processes that were killed."""
+    for left in where.glob(".wakewise-*-*"):
+        process = left.name.split("-")[1]
+        if process.isdecimal() and not Path("/proc", process).exists():
+            shutil.rmtree(left, ignore_errors=True)
+
+
+@contextmanager
+def no_stderr() -> Iterator[None]:
+    """Send what compiled code writes to standard error nowhere; for code that knows no other way to be quiet."""
+    sys.stderr.flush()
+    kept = os.dup(2)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+
+
+def settle(database: Path) -> None:
+    """Fold the write-ahead log into the database, so that it is one file and can be renamed."""
+    with closing(sqlite3.connect(database)) as link:
+        link.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        link.execute("PRAGMA journal_mode=DELETE")

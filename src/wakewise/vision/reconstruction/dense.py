@@ -1,0 +1,197 @@
+"""Dense points from posed photos: photos and sparse/ in, dense.ply out."""
+
+from __future__ import annotations
+
+import tempfile
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import cv2
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.core.errors import StageError
+from wakewise.core.interfaces import Progress
+from wakewise.core.run_lock import half_done
+from wakewise.vision.reconstruction.cells import CellMeans
+from wakewise.vision.reconstruction.clouds import Cloud, write_cloud
+from wakewise.vision.reconstruction.depth_store import DepthStore
+from wakewise.vision.reconstruction.fusion import facing_normals, fuse, lonely
+from wakewise.vision.reconstruction.masks import masked
+from wakewise.vision.reconstruction.photos import Image, PhotoStore
+from wakewise.vision.reconstruction.settings import ReconstructionSettings
+from wakewise.vision.reconstruction.stereo import DepthMap, pair_depth, rectifiable
+from wakewise.vision.reconstruction.views import Ball, View, rank_partners, read_views
+
+# Depth maps of at most this many other photos vote on a point.
+AGREEMENT_PX = 1.0
+"""Largest disparity difference of depths that agree."""
+VOTING_PHOTOS = 8
+T = TypeVar("T")
+S = TypeVar("S")
+
+
+def densify(
+    folder: Path,
+    sparse: Path,
+    out: Path,
+    settings: ReconstructionSettings,
+    *,
+    region: Ball | None,
+    progress: Progress,
+    store: PhotoStore | None = None,
+) -> dict[str, Any]:
+    """Stereo on neighbouring photos, fused by agreement, thinned, cleaned; points with normals and colours.
+
+    Returns
+    -------
+    dict
+        dense_points, depth_maps, point_spacing_mm (in units of the model where it has no scale).
+
+    Raises
+    ------
+    StageError
+        If no depth survives.
+    """
+    views, points = read_views(sparse, region)
+    partners = rank_partners(views, points, region, most=2 * max(VOTING_PHOTOS, settings.stereo_partners))
+    scale = _scale(views, region, settings)
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)  # the threads are over photos and pairs
+    with tempfile.TemporaryDirectory(prefix=half_done("depths"), dir=out.parent) as scratch:
+        maps = DepthStore(Path(scratch))
+        try:
+            given = store or PhotoStore(folder)
+            spacing = _all_depths(maps, given, views, partners, region, settings, scale, progress)
+        finally:
+            cv2.setNumThreads(before)
+        cloud = _fuse_all(maps, partners, settings, spacing, progress) if len(maps) else np.zeros((0, 9))
+    if len(cloud) < 100:
+        raise StageError(f"dense: {len(cloud)} points survive from {len(maps)} depth maps, at least 100 must")
+    normals = facing_normals(cloud[:, :3], cloud[:, 6:9], settings.threads)
+    write_cloud(out, Cloud(points_m=cloud[:, :3], normals=normals, colours=cloud[:, 3:6]))
+    return {"dense_points": len(cloud), "depth_maps": len(maps), "point_spacing_mm": 1e3 * spacing}
+
+
+def _all_depths(
+    maps: DepthStore,
+    store: PhotoStore,
+    views: tuple[View, ...],
+    partners: list[list[int]],
+    region: Ball | None,
+    settings: ReconstructionSettings,
+    scale: float,
+    progress: Progress,
+) -> float:
+    """A depth map of every photo with each of its best partners, as far as they can be rectified.
+
+    Returns the usual distance between neighbouring rectified pixels at the surface's depth, in m; 0 without any.
+    """
+    jobs = []
+    for i, best in enumerate(partners):
+        good = [j for j in best if rectifiable(views[i], views[j])]
+        jobs += [(i, j) for j in good[: settings.stereo_partners]]
+    # Whole multiples, so that large photos need not lie in memory at a size that stereo does not look at.
+    shrink = max(1, int(1.0 / scale))
+    photos = list(in_order(lambda view: _load(store, view.name, shrink), views, settings.threads))
+    small = tuple(_shrunk(view, shrink) for view in views)
+
+    def one(job: tuple[int, int]) -> DepthMap | None:
+        found = pair_depth(small, photos, *job, region, scale * shrink, settings.stereo_paths)
+        if found is None or store.masks is None:
+            return found
+        return masked(found, small[found.first], store.masks.of(views[found.first].name))
+
+    spacings = []
+    for done, depth_map in enumerate(in_order(one, jobs, settings.threads)):
+        progress(done, 2 * len(jobs), "stereo")
+        if depth_map is not None:
+            maps.add(depth_map)
+            depth = depth_map.depth_m
+            if depth.any():
+                spacings.append(np.median(depth[depth > 0]) / depth_map.focal_px)
+    return float(np.median(spacings)) if spacings else 0.0
+
+
+def _load(store: PhotoStore, name: str, shrink: int) -> Image:
+    image = store.image(name)
+    if shrink == 1:
+        return image
+    height, width = (size - size % shrink for size in image.shape[:2])
+    small = cv2.resize(image[:height, :width], (width // shrink, height // shrink), interpolation=cv2.INTER_AREA)
+    return np.asarray(small, dtype=np.uint8)
+
+
+def _shrunk(view: View, shrink: int) -> View:
+    """The view with pixels `shrink` times as large; COLMAP's pixel positions scale about the photo's corner."""
+    if shrink == 1:
+        return view
+    return replace(
+        view,
+        width=view.width // shrink,
+        height=view.height // shrink,
+        focal_px=view.focal_px / shrink,
+        centre_px=view.centre_px / shrink,
+    )
+
+
+def _scale(views: tuple[View, ...], region: Ball | None, settings: ReconstructionSettings) -> float:
+    """Rectified pixels per photo pixel: a region is enlarged, whole frames are not; both are bounded in size."""
+    if region is None:
+        return min(1.0, settings.dense_px / max(max(view.width, view.height) for view in views))
+    wide = [2 * view.focal_px * region.radius_m / max(float(view.depth_of(region.centre_W_m)), 1e-9) for view in views]
+    return min(settings.dense_zoom, settings.dense_px / float(np.median(wide)))
+
+
+def _fuse_all(
+    maps: DepthStore,
+    partners: list[list[int]],
+    settings: ReconstructionSettings,
+    spacing: float,
+    progress: Progress,
+) -> Array:
+    """Points, colours and directions to the camera side by side, shape (n, 9)."""
+    photos = [maps.photos(k) for k in range(len(maps))]
+    alone = len({photo for both in photos for photo in both}) == 2
+
+    def of_one(index: int) -> Array:
+        first, second = photos[index]
+        voters = {first, *partners[first][:VOTING_PHOTOS]}
+        neighbours = [
+            k
+            for k, other in enumerate(photos)
+            if other[0] in voters
+            # The pair the other way round is no independent witness; of two photos it is the only one.
+            and (set(other) != {first, second} or (alone and other[0] != first))
+        ]
+        read = {k: maps.depths(k) for k in neighbours} | {index: maps.whole(index)}
+        return fuse(read, index, neighbours, 1 if alone else settings.agreeing_views, AGREEMENT_PX)
+
+    # Cells as they come, in the order of the maps, so that all points need not be in memory at once.
+    gathered = CellMeans(9, spacing)
+    for index, rows in enumerate(in_order(of_one, range(len(maps)), settings.threads)):
+        progress(len(maps) + index, 2 * len(maps), "fusion")
+        gathered.add(rows)
+    cloud, _ = gathered.means()
+    del gathered  # as large as the cloud and half as large again
+    return cloud[~lonely(cloud[:, :3], threads=settings.threads)]
+
+
+def in_order(work: Callable[[T], S], items: Iterable[T], threads: int) -> Iterator[S]:
+    """Results of work on each item, in order, from threads that are never more than a few items ahead of who asks."""
+    with ThreadPoolExecutor(threads) as pool:
+        waiting: deque[Future[S]] = deque()
+        try:
+            for item in items:
+                waiting.append(pool.submit(work, item))
+                if len(waiting) > 2 * threads:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise

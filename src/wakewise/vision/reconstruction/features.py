@@ -1,0 +1,335 @@
+"""Features of each photo and verified matches between photos: photos in, database.db out."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from wakewise.core.errors import InputError, StageError
+from wakewise.core.files import whole_file
+from wakewise.core.interfaces import Progress
+from wakewise.core.run_lock import half_done
+from wakewise.vision.reconstruction.colmap import call, pycolmap, settle, workroom
+from wakewise.vision.reconstruction.guided import Poses, match_by_poses
+from wakewise.vision.reconstruction.lens_groups import LensGroup, group_photos
+from wakewise.vision.reconstruction.lenses import Lens
+from wakewise.vision.reconstruction.look_alike import like_pairs, read_looks
+from wakewise.vision.reconstruction.masks import write_for_colmap
+from wakewise.vision.reconstruction.pairs import Pairs
+from wakewise.vision.reconstruction.photos import Photo, PhotoStore
+from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
+from wakewise.vision.reconstruction.sift import PEAK_THRESHOLD, folder_features, within
+
+T = TypeVar("T")
+FEW_FEATURES = 150
+FISHEYE_FOCAL = 0.4
+"""Where a fisheye's focal length is unknown: this much of the longer side, which is 180 deg across a 4:3 diagonal."""
+BYTES_PER_PX, ROOM_BYTES = 60.0, 6e9
+"""What the scales of a photo take for each of its pixels (43 to 54 measured), and those of all threads in all."""
+EXTRACTION_BATCHES, MATCHING_BATCHES, LEAST_PAIRS = 12, 8, 120
+"""Parts that the work is done in, for progress; descriptors are indexed anew in each, so few pairs are few parts."""
+
+
+def match_photos(
+    folder: Path,
+    photos: tuple[Photo, ...],
+    database: Path,
+    settings: ReconstructionSettings,
+    *,
+    focal_px: float | None,
+    pairs: Pairs,
+    progress: Progress,
+    store: PhotoStore | None = None,
+    lens: Lens | None = None,
+    poses: Poses | None = None,
+    groups: tuple[LensGroup, ...] | None = None,
+    may_be_none: bool = False,
+    look_alikes: int = 0,
+) -> dict[str, Any]:
+    """Find SIFT features, match and verify; write COLMAP's database whole.
+
+    Parameters
+    ----------
+    focal_px : float, optional
+        Focal length to start from, in pixels of these photos; else from EXIF or 1.2 times the longer side, of a
+        fisheye .4 times.
+    pairs : list of two photo names
+        What to match.
+    store : PhotoStore, optional
+        Photos that are decoded already.
+    lens : Lens, optional
+        The camera that took them all, instead of a focal length.
+    groups : tuple of LensGroup, optional
+        Which photos share a lens; found from the photos if not given.
+    poses : dict, optional
+        Rough R_WC, shape (3, 3), and p_WC_m, shape (3,), by photo name: pairs are matched along epipolar lines first,
+        and only those that do not verify among all features.
+    may_be_none : bool
+        Whether it is no failure that nothing matches, as where the cameras are known.
+    look_alikes : int
+        With how many others each is matched besides, because they look alike.
+
+    Returns
+    -------
+    dict
+        features_per_image, inlier_matches (verified, all pairs together), verified_pairs, pairs, posed_pairs (those
+        verified along epipolar lines).
+
+    Raises
+    ------
+    InputError
+        If a pair names a photo that is not there.
+    StageError
+        If no pair of photos could be verified.
+    """
+    names = [photo.name for photo in photos]
+    _check_pairs(names, pairs)
+    pycolmap.set_random_seed(RANDOM_SEED)
+    size = database_bytes(len(photos), len(pairs) + look_alikes * len(photos), settings)
+    with whole_file(database) as whole, workroom(database, size) as room:
+        work = room / "database.db"
+        work.touch()
+        lenses = group_photos(photos, lenses=lens) if groups is None else groups
+        store = store or PhotoStore(folder)
+        _extract(store, lenses, work, settings, focal_px, progress, room)
+        _check_all_there(work, folder, names)
+        if look_alikes:
+            pairs = sorted({*pairs, *like_pairs(read_looks(work), look_alikes)})
+        left = pairs if poses is None else match_by_poses(work, pairs, poses, settings.threads, progress)
+        match_pairs(work, settings, left, progress)
+        figures = _figures(work, len(photos)) | {"pairs": len(pairs), "posed_pairs": len(pairs) - len(left)}
+        settle(work)
+        shutil.copyfile(work, whole)
+        if figures["inlier_matches"] == 0 and not may_be_none:
+            count = figures["features_per_image"]
+            hint = ""
+            if count < FEW_FEATURES:
+                hint = "; so few come from dark, blurred or hazy photos"
+                if settings.detector == "colmap":
+                    hint += ", which detector=opencv brightens"
+            raise StageError(
+                f"matching: no two of the {len(photos)} photos show the same thing "
+                f"({count:.0f} features a photo, 0 verified matches{hint})"
+            )
+    return figures
+
+
+def database_bytes(photos: int, pairs: int, settings: ReconstructionSettings) -> float:
+    """Room for the database: 128 bytes of descriptor, up to 24 of keypoint, a few matches, twice; and a log."""
+    return 2.0 * settings.max_features * (152 * photos + 2 * pairs)
+
+
+def _check_all_there(database: Path, folder: Path, names: list[str]) -> None:
+    link = pycolmap.Database.open(database)
+    try:
+        known = {image.name for image in link.read_all_images()}
+    finally:
+        link.close()
+    for name in names:
+        if name not in known:
+            raise StageError(f"features: COLMAP cannot read {folder / name}; save it anew as PNG or remove it")
+
+
+def _check_pairs(names: list[str], pairs: Pairs) -> None:
+    known = set(names)
+    for pair in pairs:
+        for name in pair:
+            if name not in known:
+                raise InputError(f"pairs: {name} is not among the photos ({names[0]} ... {names[-1]})")
+
+
+def _extract(
+    store: PhotoStore,
+    groups: tuple[LensGroup, ...],
+    database: Path,
+    settings: ReconstructionSettings,
+    focal_px: float | None,
+    progress: Progress,
+    room: Path,
+) -> None:
+    """Features of all photos; those of one group share a camera. Masks are laid out in `room` for COLMAP."""
+    if focal_px is not None and len({(group.width, group.height) for group in groups}) > 1:
+        raise InputError("photos: have different sizes, so one focal length in pixels cannot hold for all of them")
+    done, total = 0, sum(len(group.photos) for group in groups)
+    for group in groups:
+        reader = pycolmap.ImageReaderOptions()
+        fisheye = settings.lens == "fisheye"
+        reader.camera_model = "RADIAL_FISHEYE" if fisheye else "SIMPLE_RADIAL"
+        if store.masks is not None:
+            write_for_colmap(store.masks, list(group.photos), room / "masks")
+            reader.mask_path = room / "masks"
+        focal = FISHEYE_FOCAL * max(group.width, group.height) if fisheye and focal_px is None else focal_px
+        if focal is not None:
+            reader.camera_params = f"{focal},{group.width / 2},{group.height / 2},{'0,0' if fisheye else '0'}"
+        if group.lens is not None:
+            reader.camera_model, reader.camera_params = group.lens.for_colmap()
+        work = _by_opencv if settings.detector == "opencv" else _by_colmap
+        here = settings.model_copy(update={"threads": threads_for(settings, group.width, group.height)})
+        work(store, list(group.photos), database, here, reader, partial(_tell, progress, done, total))
+        done += len(group.photos)
+    progress(done, total, "features")
+
+
+def threads_for(settings: ReconstructionSettings, width: int, height: int) -> int:
+    """Threads that may look for features in photos of this size, so that all of them fit into `ROOM_BYTES`."""
+    doubled = 4 if settings.first_octave == -1 else 1
+    return max(1, min(settings.threads, int(ROOM_BYTES / (BYTES_PER_PX * doubled * width * height))))
+
+
+def _tell(progress: Progress, before: int, total: int, done: int) -> None:
+    progress(before + done, total, "features")
+
+
+def _by_opencv(
+    store: PhotoStore,
+    names: list[str],
+    database: Path,
+    settings: ReconstructionSettings,
+    reader: pycolmap.ImageReaderOptions,
+    tell: Callable[[int], None],
+) -> None:
+    """List the photos in COLMAP's database and write OpenCV's features beside them."""
+    call(
+        lambda **_: pycolmap.import_images(
+            database, store.folder, camera_mode=pycolmap.CameraMode.SINGLE, image_names=names, options=reader
+        ),
+        "features",
+    )
+    # Found before the database is opened: two SQLite libraries must not meet in it, and an interrupt leaves it whole.
+    found = []
+    for k, features in enumerate(folder_features(store, names, settings)):
+        tell(k)
+        found.append(features if store.masks is None else within(features, store.masks.of(names[k])))
+    link = pycolmap.Database.open(database)
+    try:
+        for name, features in zip(names, found, strict=True):
+            image_id = link.read_image_with_name(name).image_id
+            link.write_keypoints(image_id, features.keypoints)
+            kind = pycolmap.FeatureExtractorType.SIFT
+            link.write_descriptors(image_id, pycolmap.FeatureDescriptors(kind, features.descriptors))
+    finally:
+        link.close()
+
+
+def _by_colmap(
+    store: PhotoStore,
+    names: list[str],
+    database: Path,
+    settings: ReconstructionSettings,
+    reader: pycolmap.ImageReaderOptions,
+    tell: Callable[[int], None],
+) -> None:
+    """COLMAP's own features."""
+    options = pycolmap.FeatureExtractionOptions()
+    options.num_threads = settings.threads
+    options.use_gpu = False
+    options.sift.max_num_features = settings.max_features
+    options.sift.first_octave = settings.first_octave
+    # COLMAP counts the contrast per scale of an octave, and has three.
+    options.sift.peak_threshold = PEAK_THRESHOLD / options.sift.octave_resolution
+    done = 0
+    for batch in _batches(names, EXTRACTION_BATCHES):
+        tell(done)
+        call(
+            partial(
+                pycolmap.extract_features,
+                database,
+                store.folder,
+                image_names=batch,
+                camera_mode=pycolmap.CameraMode.SINGLE,
+                reader_options=reader,
+                extraction_options=options,
+                device=pycolmap.Device.cpu,
+            ),
+            "features",
+            disk=database.parent,
+        )
+        done += len(batch)
+        if reader.existing_camera_id < 0 or done == len(batch):
+            link = pycolmap.Database.open(database)
+            read = [image.camera_id for image in link.read_all_images() if image.name in batch]
+            link.close()
+            if read:
+                reader.existing_camera_id = read[0]
+
+
+def match_pairs(
+    database: Path,
+    settings: ReconstructionSettings,
+    pairs: Pairs,
+    progress: Progress,
+) -> None:
+    """Match pairs of photos, by name, among all their features, and write what verifies into COLMAP's database."""
+    options = pycolmap.FeatureMatchingOptions()
+    options.num_threads = settings.threads
+    options.use_gpu = False
+    verification = pycolmap.TwoViewGeometryOptions()
+    verification.ransac.random_seed = RANDOM_SEED
+    pairing = pycolmap.ImportedPairingOptions()
+    # COLMAP's list of pairs is split at spaces, which names may have: numbers stand for them meanwhile.
+    ids = _renamed(database, lambda image: str(image.image_id))
+    done = 0
+    for batch in _batches(pairs, min(MATCHING_BATCHES, -(-len(pairs) // LEAST_PAIRS))):
+        progress(done, len(pairs), "matches")
+        with tempfile.TemporaryDirectory(prefix=half_done("pairs"), dir=database.parent) as scratch:
+            listing = Path(scratch) / "pairs.txt"
+            listing.write_text("".join(f"{ids[a]} {ids[b]}\n" for a, b in batch), encoding="utf-8")
+            pairing.match_list_path = str(listing)
+            call(
+                partial(
+                    pycolmap.match_image_pairs,
+                    database,
+                    matching_options=options,
+                    pairing_options=pairing,
+                    verification_options=verification,
+                    device=pycolmap.Device.cpu,
+                ),
+                "matching",
+                disk=database.parent,
+            )
+        done += len(batch)
+    names = {number: name for name, number in ids.items()}
+    _renamed(database, lambda image: names[image.name])
+    progress(done, len(pairs), "matches")
+
+
+def _renamed(database: Path, name: Callable[[pycolmap.Image], str]) -> dict[str, str]:
+    """Give every photo of the database another name; the new ones by the old ones."""
+    link = pycolmap.Database.open(database)
+    out = {}
+    try:
+        for image in link.read_all_images():
+            out[image.name] = name(image)
+            image.name = out[image.name]
+            link.update_image(image)
+    finally:
+        link.close()
+    return out
+
+
+def _batches(items: list[T], count: int) -> list[list[T]]:
+    """Split into at most `count` runs of nearly equal length.
+
+    COLMAP tells nothing on its way, and its database must not be looked at meanwhile: Python has an SQLite of its own,
+    and two in one process undo each other's locks (sqlite.org, How To Corrupt An SQLite Database File, section 2.2.1).
+    """
+    size = max(1, -(-len(items) // max(count, 1)))
+    return [items[k : k + size] for k in range(0, len(items), size)]
+
+
+def _figures(database: Path, photos: int) -> dict[str, Any]:
+    link = pycolmap.Database.open(database)
+    try:
+        return {
+            "features_per_image": link.num_keypoints() / photos,
+            "inlier_matches": int(link.num_inlier_matches()),
+            "verified_pairs": int(np.count_nonzero(link.read_two_view_geometry_num_inliers()[1])),
+        }
+    finally:
+        link.close()

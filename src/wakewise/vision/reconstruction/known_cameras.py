@@ -1,0 +1,255 @@
+"""Cameras that are known beforehand: pose and lens of each photograph, from COLMAP, nerfstudio, a table or Strecha."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.core.geometry import matrix_from_quat
+from wakewise.core.separators import other_separator
+from wakewise.vision.reconstruction.colmap_files import read_colmap
+from wakewise.vision.reconstruction.lenses import Lens
+from wakewise.vision.reconstruction.photos import Photo
+
+LEAST_CAMERAS = 2
+MOST_SKEW = 1e-3
+"""How far R'R may be from the unit matrix: more is no rotation, such as one with a scale in it."""
+_KINDS = (
+    "a folder of COLMAP's model (cameras and images, .txt or .bin), nerfstudio's transforms.json, a CSV file "
+    "(name,x_m,y_m,z_m,qw,qx,qy,qz and perhaps width,height,fx,fy,cx,cy,k1,k2,p1,p2) or a folder of .camera files"
+)
+_POSE = ("name", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
+_LENS = ("width", "height", "fx", "fy", "cx", "cy")
+_BEND, _FISHEYE_BEND = ("k1", "k2", "p1", "p2"), ("k1", "k2", "k3", "k4")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class KnownCameras:
+    """By photo name: R_WC, shape (3, 3), camera axes right, down, ahead; p_WC_m, shape (3,); the lens where known."""
+
+    rotations: dict[str, Array]
+    positions: dict[str, Array]
+    lenses: dict[str, Lens] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name, given in self.rotations.items():
+            R, place = np.asarray(given), np.asarray(self.positions[name])
+            straight = R.shape == (3, 3) and bool(np.isfinite(R).all()) and bool(np.isfinite(place).all())
+            if not straight or np.abs(R.T @ R - np.eye(3)).max() > MOST_SKEW or np.linalg.det(R) < 0.0:
+                raise InputError(f"camera of {name}: its pose is no rotation with a place, all of it finite")
+
+
+def read_known_cameras(path: Path) -> KnownCameras:
+    """Poses and lenses of photographs.
+
+    Parameters
+    ----------
+    path : Path
+        A folder with COLMAP's cameras and images (.txt or .bin; `sparse/0` below it is looked into, too), nerfstudio's
+        transforms.json or a folder that holds it (OpenGL axes: right, up, back), a CSV file, or a folder of Strecha's
+        .camera files.
+
+    Raises
+    ------
+    InputError
+        If nothing of these is there, or a file does not hold what it should.
+    """
+    if path.is_dir():
+        for folder in (path, path / "sparse" / "0", path / "sparse"):
+            if any((folder / f"images{suffix}").is_file() for suffix in (".bin", ".txt")):
+                poses, lenses = read_colmap(folder)
+                rotations = {name: pose[0] for name, pose in poses.items()}
+                return KnownCameras(
+                    rotations=rotations, positions={name: pose[1] for name, pose in poses.items()}, lenses=lenses
+                )
+        if (path / "transforms.json").is_file():
+            return _read_nerfstudio(path / "transforms.json")
+        files = sorted(path.glob("*.camera"))
+        if files:
+            return _read_strecha(files)
+        raise InputError(f"{path}: holds no cameras; needed is {_KINDS}")
+    if not path.is_file():
+        raise InputError(f"{path}: does not exist; needed is {_KINDS}")
+    if path.suffix.lower() == ".json":
+        return _read_nerfstudio(path)
+    return _read_table(path)
+
+
+def match_known(known: KnownCameras, photos: tuple[Photo, ...]) -> KnownCameras:
+    """Cameras by the photos' own names: a name fits whole, without folders, or without its suffix.
+
+    A lens of a photo of the same shape but another size, as of photographs that were made smaller, is scaled.
+
+    Raises
+    ------
+    InputError
+        If fewer than two photos have one, a name fits two cameras, or a lens has another shape than its photo.
+    """
+    by_file, by_stem = _by(known.positions, lambda p: p.name), _by(known.positions, lambda p: p.stem)
+    rotations, positions, lenses = {}, {}, {}
+    for photo in photos:
+        path = PurePosixPath(photo.name)
+        fits = [photo.name] if photo.name in known.positions else by_file.get(path.name) or by_stem.get(path.stem) or []
+        # A CSV of names without suffix: 0001.camera's name is 0001.jpg, whose stem is 0001.
+        if len(fits) > 1:
+            raise InputError(f"cameras: {photo.name} fits {fits[0]} and {fits[1]}; give the names with their folders")
+        if not fits:
+            continue
+        name = fits[0]
+        rotations[photo.name], positions[photo.name] = known.rotations[name], known.positions[name]
+        if name in known.lenses:
+            lenses[photo.name] = _fitted(known.lenses[name], photo)
+    if len(positions) < LEAST_CAMERAS:
+        example = f"{next(iter(known.positions))} for {photos[0].name}" if known.positions else "none given"
+        raise InputError(
+            f"cameras: {len(positions)} of {len(photos)} photos have one, at least {LEAST_CAMERAS} must; names must be "
+            f"the photos' names ({example})"
+        )
+    return KnownCameras(rotations=rotations, positions=positions, lenses=lenses)
+
+
+def _by(names: Iterable[str], part: Any) -> dict[str, list[str]]:
+    out: dict[str, list[str]] = {}
+    for name in names:
+        out.setdefault(part(PurePosixPath(name)), []).append(name)
+    return out
+
+
+def _fitted(lens: Lens, photo: Photo) -> Lens:
+    """The lens at the photo's size."""
+    if (lens.width, lens.height) == (photo.width, photo.height):
+        return lens
+    ratio = photo.width / lens.width
+    if abs(ratio * lens.height - photo.height) > 1.0:
+        raise InputError(
+            f"cameras: the lens of {photo.name} is of {lens.width} x {lens.height} px, the photo has {photo.width} x "
+            f"{photo.height}; it must have the same shape"
+        )
+    params = np.array(lens.params)
+    params[:4] *= ratio  # lengths in pixels; distortion is in units of depth
+    return replace(lens, width=photo.width, height=photo.height, params=params)
+
+
+def _read_nerfstudio(path: Path) -> KnownCameras:
+    try:
+        whole = json.loads(path.read_text(encoding="utf-8"))
+        frames = whole["frames"]
+    except (OSError, ValueError, KeyError, TypeError):
+        raise InputError(f"{path}: is no transforms.json of nerfstudio, which holds a list `frames`") from None
+    rotations, positions, lenses = {}, {}, {}
+    for k, frame in enumerate(frames if isinstance(frames, list) else []):
+        try:
+            name = PurePosixPath(str(frame["file_path"])).as_posix().removeprefix("./")
+            matrix = np.array(frame["transform_matrix"], dtype=np.float64)[:3, :4]
+            if matrix.shape != (3, 4):
+                raise ValueError(matrix.shape)
+            lens = _nerfstudio_lens({**whole, **frame})
+        except (KeyError, TypeError, ValueError, IndexError) as fault:
+            raise InputError(
+                f"{path}: frame {k} must hold file_path, transform_matrix (4 x 4) and a lens (fl_x, cx, cy, w, h, here "
+                f"or for all): {type(fault).__name__} {fault}"
+            ) from None
+        rotations[name] = matrix[:, :3] * [1.0, -1.0, -1.0]  # from OpenGL's axes
+        positions[name] = matrix[:, 3]
+        if lens is not None:
+            lenses[name] = lens
+    return KnownCameras(rotations=rotations, positions=positions, lenses=lenses)
+
+
+def _nerfstudio_lens(values: Mapping[str, Any]) -> Lens | None:
+    model = str(values.get("camera_model", "OPENCV"))
+    if model not in ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE", "OPENCV_FISHEYE"):
+        raise ValueError(f"camera_model {model}, allowed is OPENCV, PINHOLE or OPENCV_FISHEYE")
+    fisheye = model == "OPENCV_FISHEYE"
+    if "w" not in values or "h" not in values:
+        return None
+    width, height = int(values["w"]), int(values["h"])
+    if "fl_x" in values:
+        fx = float(values["fl_x"])
+    elif "camera_angle_x" in values:
+        half = 0.5 * float(values["camera_angle_x"])
+        fx = 0.5 * width / (half if fisheye else float(np.tan(half)))
+    else:
+        return None
+    params = [
+        fx,
+        float(values.get("fl_y", fx)),
+        float(values.get("cx", width / 2)),
+        float(values.get("cy", height / 2)),
+    ]
+    bend, others = (_FISHEYE_BEND, ("p1", "p2")) if fisheye else (_BEND, ("k3", "k4"))
+    params += [float(values.get(key, 0.0)) for key in bend]
+    for key in others:
+        if float(values.get(key, 0.0)) != 0.0:
+            raise ValueError(f"{key}, which the four coefficients of {model} do not have")
+    return Lens(width=width, height=height, params=np.array(params), fisheye=fisheye)
+
+
+def _read_table(path: Path) -> KnownCameras:
+    rotations, positions, lenses = {}, {}, {}
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            reader = csv.DictReader(file)
+            columns = reader.fieldnames or ()
+            missing = [column for column in _POSE if column not in columns]
+            if missing:
+                raise InputError(
+                    f"{path}: has no column {', '.join(missing)}{other_separator(columns)}; needed is {_KINDS}; "
+                    "places alone are for --reference-cameras"
+                )
+            some = [column for column in _LENS if column in columns]
+            if some and len(some) < len(_LENS):
+                raise InputError(f"{path}: has {', '.join(some)}; a lens needs all of {', '.join(_LENS)}")
+            for row in reader:
+                name = row["name"]
+                values = _numbers(path, reader.line_num, row, _POSE[1:])
+                if name in positions or not name or not np.linalg.norm(values[3:]) > 0.0:
+                    raise InputError(f"{path}: line {reader.line_num}: a name comes once, a quaternion is not 0")
+                positions[name], rotations[name] = values[:3], matrix_from_quat(values[3:])
+                if some:
+                    numbers = _numbers(path, reader.line_num, row, _LENS)
+                    bend = _numbers(path, reader.line_num, row, tuple(c for c in _BEND if c in columns))
+                    params = np.concatenate([numbers[2:], bend, np.zeros(4 - len(bend))])
+                    lenses[name] = Lens(width=int(numbers[0]), height=int(numbers[1]), params=params)
+    except (OSError, UnicodeDecodeError, csv.Error):
+        raise InputError(f"{path}: is no CSV text; needed is {_KINDS}") from None
+    return KnownCameras(rotations=rotations, positions=positions, lenses=lenses)
+
+
+def _numbers(path: Path, line: int, row: Mapping[str, str | None], columns: tuple[str, ...]) -> Array:
+    try:
+        values = np.array([float(row[column] or "") for column in columns])
+    except ValueError:
+        values = np.array([np.nan])
+    if not np.isfinite(values).all():
+        raise InputError(f"{path}: line {line}: {', '.join(columns)} must be numbers, all finite")
+    return values
+
+
+def _read_strecha(files: list[Path]) -> KnownCameras:
+    """K in three rows, a row of zeros, three rows of R_WC, the centre, the size (C. Strecha et al., CVPR 2008)."""
+    rotations, positions, lenses = {}, {}, {}
+    for path in files:
+        try:
+            rows = [[float(w) for w in line.split()] for line in path.read_text(encoding="utf-8").splitlines()]
+            rows = [row for row in rows if row]
+            K, R, centre, size = np.array(rows[:3]), np.array(rows[4:7]), np.array(rows[7]), rows[8]
+            if K.shape != (3, 3) or R.shape != (3, 3) or centre.shape != (3,) or len(size) != 2:
+                raise ValueError
+        except (OSError, ValueError, IndexError):
+            raise InputError(f"{path}: is no .camera file: K, a row of zeros, R (3 rows each), centre, size") from None
+        name = path.name.removesuffix(".camera")
+        # Printed with six digits: the nearest rotation.
+        u, _, vt = np.linalg.svd(R)
+        rotations[name], positions[name] = u @ vt, centre
+        params = np.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2], 0.0, 0.0, 0.0, 0.0])
+        lenses[name] = Lens(width=int(size[0]), height=int(size[1]), params=params)
+    return KnownCameras(rotations=rotations, positions=positions, lenses=lenses)

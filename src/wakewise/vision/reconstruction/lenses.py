@@ -1,0 +1,142 @@
+"""A calibrated camera as COLMAP's OPENCV or OPENCV_FISHEYE has it, from its cameras.txt or a calibration of ours."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.errors import InputError, StageError
+
+if TYPE_CHECKING:  # cameras.txt is read without COLMAP, too
+    from wakewise.vision.reconstruction.colmap import pycolmap
+
+# Which parameters of COLMAP's models are fx, fy, cx, cy, k1, k2, p1, p2, or of a fisheye's fx, fy, cx, cy, k1, k2, k3,
+# k4; -1 is a zero.
+LAYOUTS = {
+    "SIMPLE_PINHOLE": (0, 0, 1, 2, -1, -1, -1, -1),
+    "PINHOLE": (0, 1, 2, 3, -1, -1, -1, -1),
+    "SIMPLE_RADIAL": (0, 0, 1, 2, 3, -1, -1, -1),
+    "RADIAL": (0, 0, 1, 2, 3, 4, -1, -1),
+    "OPENCV": (0, 1, 2, 3, 4, 5, 6, 7),
+    "SIMPLE_RADIAL_FISHEYE": (0, 0, 1, 2, 3, -1, -1, -1),
+    "RADIAL_FISHEYE": (0, 0, 1, 2, 3, 4, -1, -1),
+    "OPENCV_FISHEYE": (0, 1, 2, 3, 4, 5, 6, 7),
+}
+_NEEDED = "COLMAP's cameras.txt with one camera, or the JSON of `wakewise calibrate --out`,"
+COUNTS = {name: max(layout) + 1 for name, layout in LAYOUTS.items()}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Lens:
+    """Image size in pixels and `params`, shape (8,): fx, fy, cx, cy in pixels (centres at +0.5), k1, k2, p1, p2.
+
+    Of a fisheye the last four are k1 to k4 (see `bending`).
+    """
+
+    width: int
+    height: int
+    params: Array
+    fisheye: bool = False
+
+    def __post_init__(self) -> None:
+        freeze(self, params=(8,))
+        if self.width < 1 or self.height < 1 or not (self.params[:2] > 0.0).all():
+            raise InputError(
+                f"camera: {self.width} x {self.height} px with focal lengths {self.params[0]:g} and "
+                f"{self.params[1]:g} px, all must be above 0"
+            )
+
+    def for_colmap(self) -> tuple[str, str]:
+        """COLMAP's model and its parameters: no more of them than it takes, as each will be fitted to the photos."""
+        fx, fy, cx, cy, *bend = (float(value) for value in self.params)
+        if self.fisheye:
+            return "OPENCV_FISHEYE", ",".join(repr(value) for value in (fx, fy, cx, cy, *bend))
+        if fx == fy and not any(bend):
+            return "SIMPLE_RADIAL", f"{fx!r},{cx!r},{cy!r},0"
+        return "OPENCV", ",".join(repr(value) for value in (fx, fy, cx, cy, *bend))
+
+    def numbers(self) -> list[float]:
+        """Size, parameters and kind as plain numbers."""
+        return [float(value) for value in (self.width, self.height, *self.params, self.fisheye)]
+
+
+def lens_of(camera: pycolmap.Camera) -> Lens:
+    """Lens of a camera of a sparse model.
+
+    Raises
+    ------
+    StageError
+        If its distortion is of another kind than OpenCV's.
+    """
+    name = str(camera.model.name)
+    if name not in LAYOUTS:
+        raise StageError(f"cameras: model {name} is not known here, allowed are {', '.join(LAYOUTS)}")
+    return lens_from(name, camera.width, camera.height, np.asarray(camera.params))
+
+
+def read_lens(path: Path) -> Lens:
+    """The camera of COLMAP's cameras.txt, given the file or a folder that holds it, or of what `calibrate` wrote.
+
+    Raises
+    ------
+    InputError
+        If nothing is there, it holds no camera or several, or the camera is not of a known model.
+    """
+    file = path / "cameras.txt" if path.is_dir() else path
+    if not file.is_file():
+        raise InputError(f"{file}: does not exist; {_NEEDED} is needed")
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        raise InputError(f"{file}: is no text file that can be read; {_NEEDED} is needed") from None
+    if file.suffix.lower() == ".json" or text.lstrip()[:1] in ("{", "["):
+        return _from_calibration(file, text)
+    lines = [line.split() for line in text.splitlines()]
+    rows = [words for words in lines if words and not words[0].startswith("#")]
+    if len(rows) != 1:
+        raise InputError(f"{file}: holds {len(rows)} cameras, must hold 1 (id, model, width, height, parameters)")
+    row = rows[0]
+    if len(row) < 4 or row[1] not in LAYOUTS:
+        found = row[1] if len(row) > 1 else " ".join(row)
+        raise InputError(f"{file}: camera model '{found[:40]}', allowed are {', '.join(LAYOUTS)}")
+    try:
+        width, height, params = int(row[2]), int(row[3]), np.array([float(word) for word in row[4:]])
+    except ValueError:
+        raise InputError(f"{file}: holds something that is no number where the camera's numbers must be") from None
+    if len(params) != COUNTS[row[1]] or not np.isfinite(params).all():
+        raise InputError(f"{file}: {len(params)} parameters, {row[1]} has {COUNTS[row[1]]}, all finite")
+    return lens_from(row[1], width, height, params)
+
+
+def _from_calibration(file: Path, text: str) -> Lens:
+    """The camera in what `wakewise calibrate --out` wrote."""
+    try:
+        tree = json.loads(text)
+    except ValueError:
+        raise InputError(f"{file}: is no whole JSON; {_NEEDED} is needed") from None
+    camera = tree.get("colmap") if isinstance(tree, dict) else None
+    if not isinstance(camera, dict):
+        if isinstance(tree, dict) and "focal_x_px" in tree:
+            raise InputError(f"{file}: is a calibration of an earlier version, calibrate again")
+        raise InputError(f"{file}: is no calibration; {_NEEDED} is needed")
+    model, params = camera.get("model"), camera.get("params")
+    size = [side for side in (camera.get("width"), camera.get("height")) if type(side) is int]
+    numbers = isinstance(params, list) and all(type(value) in (int, float) for value in params)
+    if model not in LAYOUTS or len(size) < 2 or not isinstance(params, list) or not numbers:
+        raise InputError(
+            f"{file}: colmap must hold model (one of {', '.join(LAYOUTS)}), width, height and params, a list of numbers"
+        )
+    if len(params) != COUNTS[model] or not np.isfinite(np.array(params, dtype=np.float64)).all():
+        raise InputError(f"{file}: {len(params)} parameters, {model} has {COUNTS[model]}, all finite")
+    return lens_from(model, size[0], size[1], np.array(params, dtype=np.float64))
+
+
+def lens_from(model: str, width: int, height: int, params: Array) -> Lens:
+    """Lens of one of COLMAP's models in `LAYOUTS`, with as many parameters as it has."""
+    in_order = np.append(params, 0.0)[list(LAYOUTS[model])]
+    return Lens(width=width, height=height, params=in_order, fisheye=model.endswith("FISHEYE"))

@@ -1,0 +1,111 @@
+"""Which photos are worth matching: all, those next to each other in order of name, or those whose cameras are near."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import minimum_spanning_tree
+
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.vision.reconstruction.settings import ReconstructionSettings
+
+Pairs = list[tuple[str, str]]
+# Views whose axes differ by more hardly share a SIFT match (Mikolajczyk & Schmid 2005, doi 10.1109/TPAMI.2005.188).
+EXHAUSTIVE_UP_TO, SEQUENCE_OVERLAP, POSE_NEIGHBOURS, BAND_NEIGHBOURS = 80, 10, 8, 6
+"""Photos up to which `auto` matches every pair; photos that each is matched with, in sequence, by poses, and along
+epipolar lines of poses: those find more in a pair, and with 6 cameras came out as precise as with 8."""
+MAX_ANGLE_RAD = np.radians(45.0)
+
+
+def choose_pairs(
+    names: list[str],
+    settings: ReconstructionSettings,
+    centres_W_m: dict[str, Array] | None = None,
+    axes_W: dict[str, Array] | None = None,
+    neighbours: int = POSE_NEIGHBOURS,
+) -> Pairs:
+    """Pairs as the settings ask for them.
+
+    Parameters
+    ----------
+    names : list of str
+        Photo names in order.
+    centres_W_m, axes_W : dict, optional
+        Camera centres and optical axes, shape (3,) each, by name. Without axes all are taken to look the same way.
+
+    neighbours : int
+        How many each is matched with at least, by poses.
+
+    Raises
+    ------
+    InputError
+        If pairs by poses are asked for and not every photo has a known position.
+    """
+    known = centres_W_m is not None and all(name in centres_W_m for name in names)
+    if settings.matching == "poses" and not known:
+        raise InputError("matching by poses: needs a known position of every photo's camera")
+    if known and centres_W_m is not None and (settings.matching == "poses" or (settings.matching == "auto" and axes_W)):
+        centres = np.array([centres_W_m[name] for name in names])
+        axes = None
+        if axes_W is not None and all(name in axes_W for name in names):
+            axes = np.array([axes_W[name] for name in names])
+        return pose_pairs(names, centres, axes, neighbours)
+    if settings.matching == "sequential" or by_looks(len(names), settings):
+        return sequence_pairs(names, SEQUENCE_OVERLAP)
+    return list(combinations(names, 2))
+
+
+def by_looks(photos: int, settings: ReconstructionSettings) -> bool:
+    """Whether photos that look alike are matched as well, which is known only when they have features."""
+    return settings.matching == "look-alike" or (settings.matching == "auto" and photos > EXHAUSTIVE_UP_TO)
+
+
+def sequence_pairs(names: list[str], overlap: int) -> Pairs:
+    """Each photo with the next few in order of name, and ever wider ones.
+
+    The steps that double (1, 2, 4, ...) beyond the overlap tie later laps of an orbit to earlier ones; the last photos
+    are tied to the first, as an orbit closes.
+    """
+    n = len(names)
+    powers = [2**k for k in range(n.bit_length()) if overlap < 2**k < n]
+    steps = [*range(1, min(overlap, n - 1) + 1), *powers]
+    found = {(i, i + step) for step in steps for i in range(n - step)}
+    found |= {(i, n - j) for j in range(1, overlap + 1) for i in range(overlap - j + 1) if i < n - j}
+    return [(names[i], names[j]) for i, j in sorted(found)]
+
+
+def pose_pairs(names: list[str], centres_W_m: Array, axes_W: Array | None, neighbours: int) -> Pairs:
+    """Each photo with the nearest others that look the same way, and what more it takes to hang all together.
+
+    Parameters
+    ----------
+    centres_W_m : ndarray, shape (n, 3)
+    axes_W : ndarray, shape (n, 3), optional
+        Unit optical axes; photos whose axes are more than 45 deg apart are no neighbours.
+    neighbours : int
+        How many each is paired with at least, if there are so many.
+    """
+    n = len(names)
+    centres = np.asarray(centres_W_m, dtype=np.float64)
+    distance = np.linalg.norm(centres[:, None] - centres[None], axis=2)
+    away = np.zeros((n, n), dtype=np.bool_)
+    if axes_W is not None:
+        unit = np.asarray(axes_W) / np.linalg.norm(axes_W, axis=1, keepdims=True)
+        away = unit @ unit.T < np.cos(MAX_ANGLE_RAD)
+    near = np.where(away, np.inf, distance)
+    np.fill_diagonal(near, np.inf)
+    found: set[tuple[int, int]] = set()
+    for i in range(n):
+        order = np.argsort(near[i], kind="stable")[:neighbours]
+        found |= {(min(i, int(j)), max(i, int(j))) for j in order if np.isfinite(near[i, j])}
+    # A tree over all photos, dear where axes differ, so that no group stays alone.
+    span = float(distance.max()) + 1.0
+    one, two = np.triu_indices(n, 1)
+    tree = minimum_spanning_tree(
+        coo_array((1e-9 + distance[one, two] + span * away[one, two], (one, two)), shape=(n, n)).tocsr()
+    )
+    found |= {(min(a, b), max(a, b)) for a, b in zip(*(index.tolist() for index in tree.nonzero()), strict=True)}
+    return [(names[a], names[b]) for a, b in sorted(found)]

@@ -1,0 +1,270 @@
+"""A folder of photographs: which files are meant, whether they are whole, and a fingerprint of them."""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+import zlib
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wakewise.core.errors import EnvironmentFailure, InputError
+from wakewise.vision.pictures import AS_STORED, decode_picture
+from wakewise.vision.reconstruction.exif import exif_words
+
+if TYPE_CHECKING:
+    from wakewise.vision.reconstruction.masks import Masks
+
+Image = NDArray[np.uint8]
+SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff")
+MIN_PHOTOS = 2
+# Decoded photos that are kept for the stages after the first; more are decoded again.
+KEPT_BYTES = 400_000_000
+PNG = b"\x89PNG\r\n\x1a\n"
+# What cameras leave beside photographs, and what it is; named when it is passed over.
+_OTHERS = {
+    "video": (".mp4", ".mov", ".avi", ".mkv", ".mts", ".m4v", ".webm", ".insv", ".360"),
+    "HEIC": (".heic", ".heif", ".hif", ".avif"),
+    "RAW": (".dng", ".cr2", ".cr3", ".nef", ".arw", ".orf", ".rw2", ".raf", ".gpr", ".pef", ".srw", ".raw"),
+    "other images": (".webp", ".gif", ".jp2", ".jxl", ".psd", ".exr", ".hdr"),
+}
+# How files begin, and the suffixes that say so: COLMAP goes by the suffix.
+_BEGINNINGS = {
+    b"\xff\xd8\xff": ("JPEG", (".jpg", ".jpeg")),
+    PNG: ("PNG", (".png",)),
+    b"BM": ("BMP", (".bmp",)),
+    b"II*\x00": ("TIFF", (".tif", ".tiff")),
+    b"MM\x00*": ("TIFF", (".tif", ".tiff")),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Photo:
+    """One photograph: name below its folder, size in pixels, a digest of its bytes, what EXIF says of its camera."""
+
+    name: str
+    width: int
+    height: int
+    digest: str
+    camera: str = ""
+
+
+class PhotoStore:
+    """Photos of a folder, decoded once: kept as long as they are small enough together, else decoded at every call.
+
+    `masks` say what of them is not to be looked at.
+    """
+
+    def __init__(self, folder: Path, most_bytes: int = KEPT_BYTES) -> None:
+        self.folder = folder
+        self.masks: Masks | None = None
+        self._left = most_bytes
+        self._kept: dict[str, Image] = {}
+        self._lock = threading.Lock()
+
+    def image(self, name: str) -> Image:
+        """Colours of a photo, shape (h, w, 3), blue first; not to be written to.
+
+        Raises
+        ------
+        EnvironmentFailure
+            If it could be read before and cannot be any more.
+        """
+        kept = self._kept.get(name)
+        if kept is not None:
+            return kept
+        path = self.folder / name
+        try:
+            image = decode(path.read_bytes(), str(path))
+        except OSError:
+            image = None
+        if image is None:
+            raise EnvironmentFailure(f"{path}: can no longer be read")
+        self.keep(name, image)
+        return image
+
+    def keep(self, name: str, image: Image) -> None:
+        """Keep a decoded photo if there is room."""
+        with self._lock:
+            if name not in self._kept and image.nbytes <= self._left:
+                image.setflags(write=False)
+                self._kept[name] = image
+                self._left -= image.nbytes
+
+
+def read_photos(folder: Path, store: PhotoStore | None = None, threads: int = 2) -> tuple[Photo, ...]:
+    """Check every photograph of a folder by decoding it; sorted by name. Other files beside them are left alone.
+
+    Where the folder holds no photographs but folders of them, as of the cameras of a rig, theirs are read, and are
+    named `folder/file`. What was decoded goes to `store`.
+
+    Raises
+    ------
+    InputError
+        If the folder is missing, holds no photographs or fewer than two, or a file cannot be decoded.
+    """
+    allowed = ", ".join(SUFFIXES)
+    if not folder.is_dir():
+        found = "is a file" if folder.exists() else "does not exist"
+        raise InputError(f"{folder}: {found}; a folder of photos ({allowed}) is needed")
+    images = photo_files(folder)
+    if not images:
+        files = _files(folder)
+        inside = sorted(p.name for p in folder.iterdir() if p.is_dir() and not p.name.startswith("."))
+        found = "is empty"
+        if files:
+            found = f"holds no photos ({files[0].name} is none)"
+        elif inside:
+            found = f"holds only folders ({', '.join(inside[:3])}) without photos"
+        raise InputError(f"{folder}: {found}; at least {MIN_PHOTOS} photos ({allowed}) are needed")
+    with ThreadPoolExecutor(threads) as pool:
+        try:
+            photos = tuple(pool.map(lambda path: _read_photo(folder, path, store), images))
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    if len(photos) < MIN_PHOTOS:
+        raise InputError(f"{folder}: holds {len(photos)} photos, at least {MIN_PHOTOS} are needed")
+    return photos
+
+
+def photo_files(folder: Path) -> list[Path]:
+    """Files of a folder that are taken for photographs by their names: its own, or else those of the folders in it."""
+    return [path for path in _files(folder) if path.suffix.lower() in SUFFIXES] or _below(folder)
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
+
+
+def _below(folder: Path) -> list[Path]:
+    """Photographs of the folders in a folder."""
+    inside = sorted(p for p in folder.iterdir() if p.is_dir() and not p.name.startswith("."))
+    return [
+        p
+        for one in inside
+        for p in sorted(one.iterdir())
+        if p.is_file() and not p.name.startswith(".") and p.suffix.lower() in SUFFIXES
+    ]
+
+
+def passed_over(folder: Path) -> dict[str, int]:
+    """How many files beside the photographs hold pictures that are not read, by kind: video, HEIC, RAW, others.
+
+    In the folder itself, and in those in it where the photographs lie in them.
+    """
+    folders = [folder]
+    if not any(p.is_file() and p.suffix.lower() in SUFFIXES for p in folder.iterdir()):
+        folders += [p for p in folder.iterdir() if p.is_dir() and not p.name.startswith(".")]
+    files = [p for one in folders for p in one.iterdir() if p.is_file() and not p.name.startswith(".")]
+    suffixes = [p.suffix.lower() for p in files]
+    counts = {kind: sum(suffix in wanted for suffix in suffixes) for kind, wanted in _OTHERS.items()}
+    return {kind: count for kind, count in counts.items() if count}
+
+
+def _read_photo(folder: Path, path: Path, store: PhotoStore | None) -> Photo:
+    data = path.read_bytes()
+    if data.startswith(b"\xff\xd8") and not jpeg_is_whole(data):
+        raise InputError(
+            f"{path}: is cut short ({len(data)} bytes), the JPEG image in it has no end; remove or replace it"
+        )
+    if data.startswith(PNG) and not png_is_whole(data):
+        raise InputError(f"{path}: is cut short or damaged ({len(data)} bytes of a PNG image); remove or replace it")
+    image = decode(data, str(path))
+    if image is None:
+        raise InputError(f"{path}: is no image that can be read ({len(data)} bytes); allowed are {', '.join(SUFFIXES)}")
+    kind, suffixes = next((found for start, found in _BEGINNINGS.items() if data.startswith(start)), ("", ()))
+    if not kind:
+        raise InputError(f"{path}: holds an image of another kind than JPEG, PNG, BMP or TIFF; save it as one of these")
+    if path.suffix.lower() not in suffixes:
+        raise InputError(f"{path}: holds a {kind} image, so its name must end in {suffixes[0]}, not {path.suffix}")
+    name = path.relative_to(folder).as_posix()
+    if store is not None:
+        store.keep(name, image)
+    height, width = image.shape[:2]
+    digest = hashlib.blake2b(data, digest_size=16).hexdigest()
+    return Photo(name=name, width=width, height=height, digest=digest, camera=exif_words(data))
+
+
+def without_duplicates(photos: tuple[Photo, ...]) -> tuple[tuple[Photo, ...], int]:
+    """Photos less those whose bytes another one has, which show nothing new; and how many those were.
+
+    Raises
+    ------
+    InputError
+        If fewer than two different ones are left.
+    """
+    first: dict[str, Photo] = {}
+    for photo in photos:
+        first.setdefault(photo.digest, photo)
+    if len(first) < MIN_PHOTOS:
+        raise InputError(f"photos: all {len(photos)} are copies of {photos[0].name}; {MIN_PHOTOS} different are needed")
+    return tuple(first.values()), len(photos) - len(first)
+
+
+def jpeg_is_whole(data: bytes) -> bool:
+    """Whether a JPEG's coded image comes to its end marker; decoders paint what is missing grey and say nothing.
+
+    ITU-T T.81, annex B: segments of a marker and a length; after a start of scan, coded bytes in which a marker is an
+    0xFF that is followed neither by 0 nor by a restart marker.
+    """
+    at = 2
+    while at + 4 <= len(data):
+        if data[at] != 0xFF:
+            return False
+        marker = data[at + 1]
+        if marker == 0xD9:
+            return True
+        if marker == 0xFF:  # padding
+            at += 1
+            continue
+        at += 2 + int.from_bytes(data[at + 2 : at + 4], "big")
+        if marker == 0xDA:
+            at = _end_of_scan(data, at)
+    return data[at : at + 2] == b"\xff\xd9"
+
+
+def png_is_whole(data: bytes) -> bool:
+    """Whether a PNG's chunks come to its end with the checksums they carry; its decoder complains past all handling.
+
+    W3C, Portable Network Graphics, section 5: length, type, data, CRC-32 of type and data.
+    """
+    at = len(PNG)
+    while at + 12 <= len(data):
+        length = int.from_bytes(data[at : at + 4], "big")
+        stop = at + 8 + length
+        if data[stop : stop + 4] != zlib.crc32(data[at + 4 : stop]).to_bytes(4, "big"):
+            return False
+        if data[at + 4 : at + 8] == b"IEND":
+            return True
+        at = stop + 4
+    return False
+
+
+def _end_of_scan(data: bytes, at: int) -> int:
+    """Where the marker after coded bytes begins; the data's length if there is none."""
+    while True:
+        at = data.find(b"\xff", at)
+        if at < 0 or at + 1 >= len(data):
+            return len(data)
+        if data[at + 1] not in (0x00, 0xFF) and not 0xD0 <= data[at + 1] <= 0xD7:
+            return at
+        at += 1 if data[at + 1] == 0xFF else 2
+
+
+def decode(data: bytes, name: str) -> Image | None:
+    """Colours of an encoded image, shape (h, w, 3), blue first as OpenCV has them; None if it is no image.
+
+    The camera's orientation tag is ignored, as COLMAP ignores it, so that pixels mean the same to both.
+
+    Raises
+    ------
+    InputError
+        If the image `name` has more pixels than are allowed.
+    """
+    return decode_picture(data, name, AS_STORED)

@@ -1,0 +1,345 @@
+"""The whole way from a folder of photos to a model, stage by stage; each can be rerun from its files."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.core.errors import InputError
+from wakewise.core.files import write_json
+from wakewise.core.interfaces import Progress, no_progress
+from wakewise.core.run_lock import alone
+from wakewise.vision.reconstruction.guided import Poses
+from wakewise.vision.reconstruction.known_cameras import KnownCameras, match_known
+from wakewise.vision.reconstruction.lens_groups import group_photos, known_groups, named_lenses
+from wakewise.vision.reconstruction.lenses import Lens
+from wakewise.vision.reconstruction.look_alike import LOOK_ALIKES
+from wakewise.vision.reconstruction.mapping import MAPPINGS
+from wakewise.vision.reconstruction.masks import read_masks
+from wakewise.vision.reconstruction.meshing import FIGURES as MESH_FIGURES
+from wakewise.vision.reconstruction.meshing import mesh_model
+from wakewise.vision.reconstruction.pairs import BAND_NEIGHBOURS, POSE_NEIGHBOURS, by_looks, choose_pairs
+from wakewise.vision.reconstruction.patchmatch import require_cuda
+from wakewise.vision.reconstruction.photos import Photo, PhotoStore, passed_over, read_photos, without_duplicates
+from wakewise.vision.reconstruction.references import match_references
+from wakewise.vision.reconstruction.settings import ReconstructionSettings
+from wakewise.vision.reconstruction.stage_keys import stage_key
+from wakewise.vision.reconstruction.stages import StageResult, make_folder, run_stage, withdraw
+from wakewise.vision.reconstruction.steps import dense_step, map_step, match_step, scale_step
+from wakewise.vision.reconstruction.views import Ball
+from wakewise.vision.reconstruction.wishes import Wishes
+
+LATER = ("scale_bars", "scale_fixes", "dense_points", "depth_maps", "point_spacing_mm", *MESH_FIGURES)
+"""Figures of stages that may not be asked for."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Model:
+    """What a reconstruction is; written as `reconstruction.json`.
+
+    pairs, verified_pairs, posed_pairs: of photos that were matched, that show the same, and those of them that were
+    matched along epipolar lines of known poses. mapping: how the sparse model came about; poses_refused: why not from
+    known poses where that was tried. reprojection_px: mean over all observations that were kept; reprojection_uncut_px:
+    before the last cuts, which took cut_pct of them. cameras_rmse_mm: distance of registered cameras from their
+    references after the similarity, None without references. reprojection_met: whether the mean is below what the
+    settings wish and nothing speaks against the model; doubts: what does, in words. The figures that this rests on:
+    `verdict.Evidence`, and second_opinion_pct, how far cameras move, of their spread, when each photo has a lens of its
+    own. lenses: name, focal length, size and photos of each; lenses_split: whether photos that seemed to share one
+    turned out not to. left_out: each photo without a place, its best partner and their matches. sub_models: photos in
+    each model that came about; the first is kept. duplicates: photos left out because another has the same bytes.
+    passed_over: films and other files that are not read. suspicion: a word where lengths cannot be metres. stages_s:
+    what each stage took when it ran; `skipped` were done before.
+    wall_s: this call. scale_bars, scale_fixes: what bars and fixes say of the scale, see `scale.stage`.
+    A model without references has no scale, so its lengths are None.
+    """
+
+    images: int
+    duplicates: int
+    registered_images: int
+    points: int
+    reprojection_px: float
+    reprojection_met: bool
+    reprojection_uncut_px: float
+    cut_pct: float
+    doubts: list[str]
+    observations_per_photo: float
+    coverage_pct: float
+    angle_deg: float
+    agreeing_pairs_pct: float | None
+    held_out_px: float | None
+    second_opinion_pct: float | None
+    lenses: list[dict[str, Any]]
+    lenses_split: bool
+    left_out: list[dict[str, Any]]
+    sub_models: list[int]
+    passed_over: dict[str, int]
+    track_length: float
+    focal_px: float
+    features_per_image: float
+    inlier_matches: int
+    pairs: int
+    verified_pairs: int
+    posed_pairs: int
+    mapping: str
+    poses_refused: str | None
+    cameras_rmse_mm: float | None
+    cameras_max_mm: float | None
+    reference_inliers: int | None
+    scale: float | None
+    surface_distance_m: float | None
+    suspicion: str | None
+    scale_bars: dict[str, Any] | None
+    scale_fixes: dict[str, Any] | None
+    dense_points: int | None
+    depth_maps: int | None
+    point_spacing_mm: float | None
+    mesh_vertices: int | None
+    mesh_faces: int | None
+    mesh_points_left_out: int | None
+    wall_s: float
+    stages_s: dict[str, float]
+    skipped: tuple[str, ...]
+
+    def summary(self) -> dict[str, Any]:
+        """All figures as plain values for JSON, with a reason (`why`) for each that is null."""
+        figures = {**asdict(self), "skipped": list(self.skipped)}
+        reason = {
+            "dense_points": "no dense points were asked for",
+            "depth_maps": "no dense points were asked for",
+            "scale_bars": "no bars were given",
+            "scale_fixes": "no fixes were given",
+            **dict.fromkeys(MESH_FIGURES, "no mesh was asked for, or it is made after the figures"),
+            "suspicion": "nothing looks suspicious",
+            "agreeing_pairs_pct": "no pair of registered photos has matches enough",
+            "held_out_px": "no point is seen by three photos",
+            "second_opinion_pct": "lenses were not looked into, or too few photos have a place in both models",
+            "poses_refused": "the model came from known poses, or none were given, or hardly a pair fitted them",
+        }
+        why = {
+            key: reason.get(key, "no reference cameras were given, so the model has no scale")
+            for key, value in figures.items()
+            if value is None
+        }
+        if self.mapping == MAPPINGS["known"]:
+            why |= {
+                key: "the cameras are as they were given" for key in why if key.startswith(("cameras_", "reference_"))
+            }
+            why |= {key: "the cameras that were given were not doubted" for key in why if key == "second_opinion_pct"}
+        return figures | {"why": why}
+
+
+def reconstruct(
+    photos: Path,
+    out: Path,
+    settings: ReconstructionSettings | None = None,
+    *,
+    focal_px: float | None = None,
+    lens: Lens | Mapping[str, Lens] | None = None,
+    lens_patterns: Mapping[str, str] | None = None,
+    pairs: Sequence[tuple[str, str]] | None = None,
+    reference_positions: dict[str, Array] | None = None,
+    reference_rotations: dict[str, Array] | None = None,
+    region: tuple[Array, float] | None = None,
+    known: KnownCameras | None = None,
+    wishes: Wishes | None = None,
+    progress: Progress = no_progress,
+) -> Model:
+    """Photos to a model in `out`: database.db, sparse/, dense.ply, mesh.ply, reconstruction.json.
+
+    A stage whose files are there, made from the same photos with the same settings, is skipped.
+
+    Parameters
+    ----------
+    photos : Path
+        Folder of photographs.
+    focal_px : float, optional
+        Focal length in pixels to start from; it is refined.
+    lens : Lens or mapping, optional
+        Camera that took all the photos, such as a trial's in its cameras.txt, or one by name of a group; refined unless
+        the settings say no.
+    lens_patterns : mapping, optional
+        Names of lenses and shell patterns of their photos' names; see `lens_groups.group_photos`.
+    pairs : sequence of two photo names, optional
+        Which photos to match; else the settings choose.
+    reference_positions : dict, optional
+        Camera centres in m, shape (3,), by photo name; they fix scale and frame.
+    reference_rotations : dict, optional
+        R_WC, shape (3, 3), by photo name, in the frame of the references (optical axis last): with them pairs are
+        chosen, matched and mapped from the poses, unless the settings say no or the photos say that they do not fit.
+    region : (centre, radius), optional
+        What the dense model is wanted of, in the frame of the references: shape (3,) in m, and m.
+    known : KnownCameras, optional
+        Poses and lenses of photos, in place of references and lenses: kept as they are, or where mapping begins, as the
+        settings say.
+    wishes : Wishes, optional
+        Bars or fixes that give scale, masks, a box to cut to, the last stage.
+    progress : callable
+        Called with (done, total, note) in units of a stage's own work.
+
+    Raises
+    ------
+    InputError
+        If the photos, references, pairs or region cannot be used.
+    StageError
+        If too little of it fits together.
+    EnvironmentFailure
+        If the disk is full, or a file cannot be read or written.
+    """
+    start = time.perf_counter()
+    if out.resolve() == photos.resolve():
+        raise InputError(f"{out}: is the folder of the photos, the model must go elsewhere")
+    settings = settings or ReconstructionSettings()
+    if settings.dense == "patch-match":
+        require_cuda()
+    wishes, store = wishes or Wishes(), PhotoStore(photos)
+    found, duplicates = without_duplicates(read_photos(photos, store, settings.threads))
+    strangers: tuple[Photo, ...] = ()
+    fixed = known is not None and settings.known_cameras == "fixed"
+    if known is not None:
+        if reference_positions is not None or reference_rotations is not None or focal_px is not None:
+            raise InputError("cameras: known cameras are references and lenses; give no others beside them")
+        known = match_known(known, found)
+        reference_positions, reference_rotations = known.positions, known.rotations
+        if fixed:
+            strangers = tuple(photo for photo in found if photo.name not in known.positions)
+            found = tuple(photo for photo in found if photo.name in known.positions)
+    names = [photo.name for photo in found]
+    store.masks = read_masks(photos, found, wishes.masks)
+    if focal_px is not None and not (np.isfinite(focal_px) and focal_px > 0):
+        raise InputError(f"focal length: {focal_px:g} px, must be above 0")
+    if lens is not None and focal_px is not None:
+        raise InputError("camera: give either a focal length or a calibrated camera, not both")
+    groups = group_photos(found, lens_patterns, lens)
+    if known is not None and (fixed or known.lenses):
+        told = {photo: group.lens for group in groups for photo in group.photos if group.lens is not None}
+        groups = known_groups(found, told | known.lenses)
+    references = reference_positions
+    if references is not None and not fixed:
+        references = match_references(references, names)
+    if settings.position_priors and references is None:
+        raise InputError("position priors: need known camera positions")
+    ball = _ball(region, references)
+    axes = None if reference_rotations is None else {name: R[:, 2] for name, R in reference_rotations.items()}
+    poses = _poses(settings, references, reference_rotations)
+    if fixed and known is not None:
+        poses = {name: (known.rotations[name], known.positions[name]) for name in names}
+    begun = None if poses is None else {n: [*R.ravel().tolist(), *p.tolist()] for n, (R, p) in poses.items()}
+    near = POSE_NEIGHBOURS if poses is None else BAND_NEIGHBOURS
+    listed = choose_pairs(names, settings, references, axes, near) if pairs is None else [(a, b) for a, b in pairs]
+    alike = LOOK_ALIKES if pairs is None and poses is None and by_looks(len(names), settings) else 0
+    make_folder(out)
+    database, sparse, dense = out / "database.db", out / "sparse", out / "dense.ply"
+
+    results: dict[str, StageResult] = {}
+    with alone(out):
+        results["match"] = run_stage(
+            out,
+            "match",
+            stage_key(
+                settings,
+                "match",
+                "",
+                [asdict(photo) for photo in found],
+                focal_px,
+                [[g.name, g.photos, g.lens and g.lens.numbers()] for g in groups],
+                listed,
+                begun,
+                alike,
+                *([] if store.masks is None else [store.masks.digests]),
+            ),
+            (database,),
+            lambda: match_step(
+                store, found, database, settings, focal_px, groups, listed, poses, fixed, alike, progress
+            ),
+        )
+        fit = 2 * results["match"].figures["posed_pairs"] >= results["match"].figures["pairs"]
+        placed = None if references is None else {name: position.tolist() for name, position in references.items()}
+        results["map"] = run_stage(
+            out,
+            "map",
+            stage_key(settings, "map", results["match"].key, placed, fixed),
+            (sparse / "images.bin",),
+            lambda: map_step(
+                store,
+                database,
+                sparse,
+                settings,
+                len(found),
+                references,
+                poses if fit or fixed else None,
+                fixed,
+                progress,
+            ),
+        )
+        bars, fixes = wishes.bars, wishes.fixes
+        if bars is None and fixes is None:
+            withdraw(out, "scale", "map")
+        else:
+            results["scale"] = run_stage(
+                out,
+                "scale",
+                stage_key(settings, "scale", results["map"].key, bars and bars.key(), fixes and fixes.key()),
+                (sparse / "images.bin",),
+                lambda: scale_step(store, sparse, wishes, settings.threads, references is not None, progress),
+            )
+        place = None if ball is None else [ball.centre_W_m.tolist(), ball.radius_m]
+        cut = [] if wishes.crop is None else [wishes.crop.key()]
+        if wishes.until != "sparse":
+            results["dense"] = run_stage(
+                out,
+                "dense",
+                stage_key(settings, "dense", results.get("scale", results["map"]).key, place, *cut),
+                (dense,),
+                lambda: dense_step(store, sparse, dense, settings, ball, fixed, wishes.crop, progress),
+            )
+        if settings.mesh and wishes.until == "mesh":
+            results["mesh"] = mesh_model(out, settings, progress)
+    figures: dict[str, Any] = dict.fromkeys(LATER)
+    for result in results.values():
+        figures |= result.figures
+    figures["lenses"] = named_lenses(figures["lenses"], groups)
+    figures["left_out"] = figures["left_out"] + [
+        {"name": photo.name, "partner": None, "matches": 0, "why": "no known camera"} for photo in strangers
+    ]
+    by_fixes = figures["scale_fixes"] is not None and figures["scale_fixes"]["used"]
+    if references is None and bars is None and not by_fixes:
+        figures["point_spacing_mm"] = None
+    model = Model(
+        images=len(found) + len(strangers),
+        duplicates=duplicates,
+        passed_over=passed_over(photos),
+        wall_s=time.perf_counter() - start,
+        stages_s={name: result.wall_s for name, result in results.items()},
+        skipped=tuple(name for name, result in results.items() if result.skipped),
+        **figures,
+    )
+    write_json(out / "reconstruction.json", model.summary())
+    return model
+
+
+def _poses(
+    settings: ReconstructionSettings, positions: dict[str, Array] | None, rotations: dict[str, Array] | None
+) -> Poses | None:
+    """Poses to match and map from: of the photos whose place and turn are both known; None if they are not wanted."""
+    if settings.mapper != "poses" or settings.position_priors:
+        return None
+    if positions is None or rotations is None:
+        return None
+    return {name: (np.asarray(rotations[name]), p) for name, p in positions.items() if name in rotations}
+
+
+def _ball(region: tuple[Array, float] | None, references: dict[str, Array] | None) -> Ball | None:
+    if region is None:
+        return None
+    if references is None:
+        raise InputError("region of interest: needs reference positions, else the model has no frame to place it in")
+    centre, radius = region
+    if not (np.isfinite(radius) and radius > 0):
+        raise InputError(f"region of interest: radius {radius:g} m, must be above 0")
+    return Ball(centre_W_m=np.asarray(centre, dtype=np.float64), radius_m=float(radius))

@@ -1,0 +1,176 @@
+"""What a user says of lengths: bars between coded targets, the targets' family and size, a ChArUco board."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field, ValidationError
+
+from wakewise.core.errors import InputError
+from wakewise.core.safe_yaml import yaml_file
+from wakewise.core.settings import Settings, describe_faults
+from wakewise.vision.reconstruction.calibration import Board
+
+SIGMA_SHARE = 1e-3
+"""Standard deviation of a length whose uncertainty nobody says, as a share of it: a steel rule read to half a mm."""
+FAMILIES = {
+    "apriltag_36h11": "DICT_APRILTAG_36h11",
+    "apriltag_36h10": "DICT_APRILTAG_36h10",
+    "apriltag_25h9": "DICT_APRILTAG_25h9",
+    "apriltag_16h5": "DICT_APRILTAG_16h5",
+    "aruco_4x4": "DICT_4X4_1000",
+    "aruco_5x5": "DICT_5X5_1000",
+    "aruco_6x6": "DICT_6X6_1000",
+    "aruco_7x7": "DICT_7X7_1000",
+    "aruco_original": "DICT_ARUCO_ORIGINAL",
+    "aruco_mip_36h12": "DICT_ARUCO_MIP_36h12",
+}
+"""Names of target families and OpenCV's dictionaries; a smaller dictionary is the beginning of the larger one."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bar:
+    """Distance between the middles of two targets, by number, in m, with its standard deviation."""
+
+    ends: tuple[int, int]
+    length_m: float
+    sigma_m: float
+
+    def __post_init__(self) -> None:
+        one, two = self.ends
+        if one == two or min(self.ends) < 0:
+            raise InputError(f"bar {self.name}: its ends must be two different targets, numbered from 0")
+        if not (math.isfinite(self.length_m) and self.length_m > 0.0):
+            raise InputError(f"bar {self.name}: length {self.length_m:g} m, must be above 0")
+        if not (math.isfinite(self.sigma_m) and 0.0 < self.sigma_m < self.length_m):
+            raise InputError(
+                f"bar {self.name}: uncertainty {self.sigma_m:g} m of a length of {self.length_m:g} m, must be above 0 "
+                "and less than the length"
+            )
+
+    @property
+    def name(self) -> str:
+        """Both ends."""
+        return f"{self.ends[0]}-{self.ends[1]}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bars:
+    """All that is known of lengths. family: of the targets, found out if None; tag_m: side of their black square."""
+
+    bars: tuple[Bar, ...] = ()
+    family: str | None = None
+    tag_m: float | None = None
+    board: Board | None = None
+    board_sigma: float = SIGMA_SHARE
+
+    def __post_init__(self) -> None:
+        if not self.bars and self.board is None:
+            raise InputError("bars: none are given; a bar is A,B,LENGTH in m, or a board in the file of bars")
+        if self.family is not None and self.family not in FAMILIES:
+            raise InputError(f"bars: targets of '{self.family}', allowed are {', '.join(FAMILIES)}")
+        if self.tag_m is not None and not (math.isfinite(self.tag_m) and self.tag_m > 0.0):
+            raise InputError(f"bars: targets of {self.tag_m:g} m, must be above 0")
+        pairs = [tuple(sorted(bar.ends)) for bar in self.bars]
+        for pair in pairs:
+            if pairs.count(pair) > 1:
+                raise InputError(f"bars: {pair[0]}-{pair[1]} is given {pairs.count(pair)} times, must be once")
+
+    @property
+    def wanted(self) -> tuple[int, ...]:
+        """Targets that bars end at, each once."""
+        return tuple(sorted({end for bar in self.bars for end in bar.ends}))
+
+    def key(self) -> list[Any]:
+        """Plain values that tell these bars from others."""
+        board = self.board
+        size = None if board is None else [board.columns, board.rows, board.square_m, board.marker_m, self.board_sigma]
+        return [[[*bar.ends, bar.length_m, bar.sigma_m] for bar in self.bars], self.family, self.tag_m, size]
+
+
+def parse_bar(words: str) -> Bar:
+    """A bar of `A,B,LENGTH[,SIGMA]`: numbers of two targets, and metres.
+
+    Raises
+    ------
+    InputError
+        If it is not of that form.
+    """
+    parts = [part.strip() for part in words.split(",")]
+    try:
+        if len(parts) not in (3, 4):
+            raise ValueError
+        ends, length = (int(parts[0]), int(parts[1])), float(parts[2])
+        sigma = float(parts[3]) if len(parts) == 4 else SIGMA_SHARE * length
+    except ValueError:
+        raise InputError(
+            f"bar '{words}': must be A,B,LENGTH or A,B,LENGTH,SIGMA: numbers of two targets, metres; such as "
+            "3,7,0.500,0.0002"
+        ) from None
+    return Bar(ends=ends, length_m=length, sigma_m=sigma)
+
+
+class _BarEntry(Settings):
+    ends: tuple[int, int]
+    length_m: float
+    sigma_m: float | None = None
+
+
+class _BoardEntry(Settings):
+    columns: int
+    rows: int
+    square_m: float
+    marker_m: float
+    sigma: float = Field(default=SIGMA_SHARE, gt=0.0, lt=0.5)
+
+
+class _BarsFile(Settings):
+    bars: tuple[_BarEntry, ...] = ()
+    targets: str | None = None
+    tag_m: float | None = None
+    board: _BoardEntry | None = None
+
+
+def read_bars(path: Path) -> Bars:
+    """Bars of a YAML file: `bars` (ends, length_m, sigma_m), `targets`, `tag_m`, `board`.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read or says something else.
+    """
+    value = yaml_file(path)
+    if not isinstance(value, dict):
+        raise InputError(f"{path}: must hold bars: a list of ends: [3, 7], length_m: 0.5, sigma_m: 0.0002")
+    try:
+        said = _BarsFile.model_validate(value)
+    except ValidationError as fault:
+        told = describe_faults(fault, _BarsFile, "bars")
+        raise InputError(f"{path}: {told}; a bar has ends: [3, 7], length_m, sigma_m") from None
+    try:
+        return Bars(
+            bars=tuple(
+                Bar(
+                    ends=one.ends,
+                    length_m=one.length_m,
+                    sigma_m=SIGMA_SHARE * one.length_m if one.sigma_m is None else one.sigma_m,
+                )
+                for one in said.bars
+            ),
+            family=said.targets,
+            tag_m=said.tag_m,
+            board=None
+            if said.board is None
+            else Board(
+                columns=said.board.columns,
+                rows=said.board.rows,
+                square_m=said.board.square_m,
+                marker_m=said.board.marker_m,
+            ),
+            board_sigma=SIGMA_SHARE if said.board is None else said.board.sigma,
+        )
+    except InputError as fault:
+        raise InputError(f"{path}: {fault}") from None

@@ -1,0 +1,127 @@
+"""Stages that are skipped when their files are there and were made from the same input with the same settings."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from wakewise.core.errors import EnvironmentFailure, InputError, WakewiseError, is_full
+from wakewise.core.files import write_json
+from wakewise.vision.reconstruction.colmap import RESERVE_MB
+
+LOW_DISK_MB = 5.0
+
+
+def fingerprint(*parts: Any) -> str:
+    """Digest of anything JSON can hold; the same value always gives the same digest."""
+    text = json.dumps(parts, sort_keys=True, allow_nan=False)
+    return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+
+
+@dataclass(frozen=True, kw_only=True)
+class StageResult:
+    """What a stage found (figures), how long it took when it ran, its fingerprint, and whether it was skipped now."""
+
+    figures: dict[str, Any]
+    wall_s: float
+    key: str
+    skipped: bool
+
+
+def run_stage(
+    folder: Path, name: str, key: str, products: tuple[Path, ...], work: Callable[[], dict[str, Any]]
+) -> StageResult:
+    """Run `work` unless its products are there and its stamp, `folder/stages/<name>.json`, has the same key.
+
+    The stamp is removed before and written after the work, so that a stage that was stopped is done again.
+
+    Raises
+    ------
+    EnvironmentFailure
+        If a file cannot be read or written, or the disk is full; whatever `work` raises else.
+    """
+    stamp = folder / "stages" / f"{name}.json"
+    known = read_stamp(folder, name)
+    if known.get("key") == key and all(path.exists() for path in products):
+        return StageResult(figures=known["figures"], wall_s=known["wall_s"], key=key, skipped=True)
+    start = time.perf_counter()
+    try:
+        stamp.unlink(missing_ok=True)
+        figures = work()
+        wall_s = time.perf_counter() - start
+        write_json(stamp, {"key": key, "wall_s": wall_s, "figures": figures})
+    except OSError as fault:
+        raise EnvironmentFailure(f"{name}: {no_room(fault, folder)}; the stages before it are kept") from fault
+    except (EnvironmentFailure, InputError):
+        raise
+    except (WakewiseError, RuntimeError) as fault:
+        # COLMAP and SQLite tell of a full disk in words of their own, or not at all.
+        free_MB = shutil.disk_usage(folder).free / 1e6
+        if free_MB > LOW_DISK_MB and not is_full(fault):
+            raise
+        reason = " ".join(str(fault).split())[:200]
+        raise EnvironmentFailure(f"{reason}; the disk of {folder} is full, {free_MB:.0f} MB are left") from fault
+    return StageResult(figures=figures, wall_s=wall_s, key=key, skipped=False)
+
+
+def withdraw(folder: Path, name: str, changed: str) -> None:
+    """Forget a stage that is no longer asked for; the stage whose files it changed is done again."""
+    stamps = folder / "stages"
+    if (stamps / f"{name}.json").exists():
+        (stamps / f"{changed}.json").unlink(missing_ok=True)
+        (stamps / f"{name}.json").unlink()
+
+
+def need_room(folder: Path, size_bytes: float, name: str) -> None:
+    """Check for room before a stage whose library ends the whole process when the disk is full, as COLMAP's does.
+
+    Raises
+    ------
+    EnvironmentFailure
+        If less is free than the stage may write.
+    """
+    free = shutil.disk_usage(folder).free
+    size_bytes += 1e6 * RESERVE_MB
+    if free < size_bytes:
+        raise EnvironmentFailure(
+            f"{name}: the disk of {folder} is full, {free / 1e6:.1f} MB are left and about {size_bytes / 1e6:.1f} MB "
+            "needed; the stages before it are kept"
+        )
+
+
+def no_room(fault: OSError, folder: Path) -> str:
+    """What a failed write means, in one line."""
+    if is_full(fault):
+        return f"the disk of {folder} is full"
+    return f"{fault.filename or folder}: {fault.strerror or fault}"
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder for results.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made, such as where a file is.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        raise InputError(f"{folder}: cannot be made a folder for the model ({fault.strerror})") from None
+
+
+def read_stamp(folder: Path, name: str) -> dict[str, Any]:
+    """What the stamp of a stage says: key, wall_s, figures; nothing if it is missing or damaged."""
+    path = folder / "stages" / f"{name}.json"
+    try:
+        value = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    whole = isinstance(value, dict) and {"key", "wall_s", "figures"} <= value.keys()
+    return value if whole else {}

@@ -1,0 +1,150 @@
+"""A campaign file says what is made, and a fault in it is told in a line before the first trial."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from wakewise.core.errors import InputError
+from wakewise.core.settings import Settings
+from wakewise.experiments.campaigns.definition import Campaign, check_campaign, example, load_campaign, planned
+from wakewise.experiments.campaigns.flights import scenario_of
+
+_MINE = """
+from wakewise.control import MAKERS
+
+def make(*arguments, **more):
+    return MAKERS["dp"](*arguments, **more)
+"""
+
+
+def _planned(**fields: Any) -> list[Any]:
+    return planned(check_campaign({"stages": "fly", "targets": ["branching"]} | fields))
+
+
+def test_every_combination_is_a_trial_seed_by_seed() -> None:
+    """Methods x targets x worlds x variations x seeds; names tell them apart, keys do, too."""
+    trials = _planned(
+        methods=["dp", "unaware"],
+        targets=["branching", "brain"],
+        worlds=["payload", "mud"],
+        variations={"as-is": {}, "closer": {"mission.standoff_m": 0.45}},
+        seeds=[4, 7],
+    )
+    assert len(trials) == 2 * 2 * 2 * 2 * 2
+    assert [trial.factors["seed"] for trial in trials] == [4] * 16 + [7] * 16
+    assert len({trial.task.key for trial in trials}) == len({trial.task.name for trial in trials}) == 32
+    assert trials[0].task.name == "dp/branching/payload/as-is/4"
+
+
+def test_a_trial_is_the_scenario_that_it_says() -> None:
+    """Fields of all trials, of the target by name, of the variation; the later one wins."""
+    (trial,) = _planned(
+        methods="dp",
+        targets={"coral-2": {"kind": "brain", "seed": 2}},
+        worlds="mud",
+        scenario={"mission": {"standoff_m": 0.6}, "control.rate_hz": 25},
+        variations={"near": {"mission.standoff_m": 0.55}},
+        seeds=[9],
+    )
+    scenario = scenario_of(trial.task.settings)
+    assert (scenario.method, scenario.world, scenario.seed) == ("dp", "mud", 9)
+    assert (scenario.target.kind, scenario.target.seed) == ("brain", 2)
+    assert (scenario.mission.standoff_m, scenario.control.rate_hz) == (0.55, 25)
+    assert trial.factors == {
+        "method": "dp",
+        "target": "coral-2",
+        "world": "mud",
+        "vehicle": scenario.vehicle,
+        "variation": "near",
+        "seed": 9,
+    }
+
+
+def test_a_controller_from_outside_is_flown_anew_when_it_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its source is in the trial's key; so are the bytes of a vehicle's file."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "my_campaign_method.py").write_text(_MINE)
+    (first,) = _planned(methods=["my_campaign_method:make"], seeds=1)
+    (again,) = _planned(methods=["my_campaign_method:make"], seeds=1)
+    (tmp_path / "my_campaign_method.py").write_text(_MINE + "# changed\n")
+    (changed,) = _planned(methods=["my_campaign_method:make"], seeds=1)
+    assert first.task.key == again.task.key != changed.task.key
+
+
+def test_the_example_is_a_campaign(tmp_path: Path) -> None:
+    """As it is printed."""
+    path = tmp_path / "campaign.yaml"
+    path.write_text(example())
+    assert len(planned(load_campaign(path))) == 3 * 2 * 1 * 2 * 3
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"method": ["dp"]}, "method: no such field, did you mean methods?"),
+        ({"stages": "both"}, "stages: found 'both', should be 'fly' or 'model'"),
+        ({"seeds": 0}, "allowed are 1 to 100000, or a list of seeds"),
+        ({"seeds": [1, 1]}, "none twice"),
+        ({"seeds": []}, "at least one"),
+        ({"methods": ["dp", "dp"]}, "methods: 'dp' is named twice"),
+        ({"timeout_s": 0}, "timeout_s: found 0, should be greater than 0"),
+        ({"retries": -1}, "retries"),
+        ({"name": "../../evil"}, "name: found '../../evil', names a folder, so no slash, no dot first"),
+    ],
+)
+def test_a_fault_of_the_file_is_told_with_what_would_be_right(
+    tmp_path: Path, fields: dict[str, Any], words: str
+) -> None:
+    """File, field, what was found."""
+    path = tmp_path / "c.yaml"
+    path.write_text(yaml.safe_dump(fields))
+    with pytest.raises(InputError) as fault:
+        load_campaign(path)
+    assert str(fault.value).startswith(f"{path}: ")
+    assert words in str(fault.value)
+    assert "\n" not in str(fault.value)
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"methods": ["dp", "wake-awere"]}, "did you mean wake-aware?"),
+        ({"methods": ["no_such_module:make"]}, "method 'no_such_module:make': cannot be loaded"),
+        ({"worlds": ["payload", "mudd"]}, "did you mean mud?"),
+        ({"targets": ["branchin"]}, "branchin"),
+        ({"vehicles": ["no-such-vehicle"]}, "no-such-vehicle"),
+        ({"scenario": {"mision.standoff_m": 1}}, "mision: no such field, did you mean mission?"),
+        ({"variations": {"far": {"mission.standoff_m": 99}}}, "variation far"),
+        ({"targets": {"a": {"kinds": "brain"}}}, "target.kinds: no such field, did you mean kind?"),
+        ({"seeds": 90_000, "methods": ["dp", "unaware"]}, "180000 trials, at most 100000"),
+    ],
+)
+def test_a_combination_that_cannot_be_flown_is_named(fields: dict[str, Any], words: str) -> None:
+    """Before the first trial is made."""
+    with pytest.raises(InputError) as fault:
+        _planned(**fields)
+    assert words in str(fault.value)
+    assert "\n" not in str(fault.value)
+
+
+def test_what_is_no_mapping_is_refused(tmp_path: Path) -> None:
+    """A list is no campaign, nor is a file that is not there."""
+    path = tmp_path / "c.yaml"
+    path.write_text("- dp\n")
+    with pytest.raises(InputError, match="holds list, must hold fields of a campaign"):
+        load_campaign(path)
+    with pytest.raises(InputError, match="cannot be read"):
+        load_campaign(tmp_path / "none.yaml")
+
+
+def test_a_campaign_is_settings_like_others() -> None:
+    """Frozen, and unknown fields are refused."""
+    assert issubclass(Campaign, Settings)
+    assert all(field.description for field in Campaign.model_fields.values())

@@ -1,0 +1,61 @@
+"""`wakewise --help`: commands by what they are for, each once; -h; and shells may complete them."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from wakewise.ui.cli.main import _COMMANDS, _commands, run
+
+COMPLETE = "import sys; from wakewise.ui.cli.main import main; sys.argv = ['wakewise']; main()"
+
+
+def test_every_command_stands_in_one_panel(capsys: pytest.CaptureFixture[str]) -> None:
+    """The five panels hold all commands, each once, and the help shows them so."""
+    assert run(["--help"]) == 0
+    text = capsys.readouterr().out
+    names = [name for _, name, _ in _COMMANDS]
+    assert sorted(names) == sorted(_commands().commands) and len(set(names)) == len(names)
+    panels = list(dict.fromkeys(panel for panel, _, _ in _COMMANDS))
+    assert len(panels) == 5
+    for here, following in zip(panels, [*panels[1:], None], strict=True):
+        start = text.index(f"\n{here}:\n")
+        section = text[start : text.index(f"\n{following}:\n") if following else None]
+        shown = [line.split()[0] for line in section.splitlines()[2:] if line.strip()]
+        assert shown == [name for panel, name, _ in _COMMANDS if panel == here]
+
+
+@pytest.mark.parametrize("words", [[], ["scan"], ["vehicle"], ["campaign", "run"]])
+def test_h_is_help(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    """-h says what --help says, of every command."""
+    said = []
+    for option in ("-h", "--help"):
+        assert run([*words, option]) == 0
+        said.append(capsys.readouterr().out)
+    assert said[0] == said[1] and "Usage: " in said[0]
+
+
+def test_a_shell_can_complete_commands() -> None:
+    """Asked as bash asks, the command names those that begin so."""
+    asked = os.environ | {"_WAKEWISE_COMPLETE": "complete_bash", "COMP_WORDS": "wakewise re", "COMP_CWORD": "1"}
+    done = subprocess.run([sys.executable, "-c", COMPLETE], env=asked, capture_output=True, text=True, check=False)
+    assert done.stdout.split() == ["reconstruct", "reproduce"]
+
+
+@pytest.mark.parametrize(
+    ("command", "option", "count", "words"),
+    [
+        ("allocate", "--wrench", 6, "X Y Z K M N"),
+        ("allocate", "--pose", 6, "X Y Z ROLL PITCH YAW"),
+        ("tank probe", "--pose", 6, "X Y Z ROLL PITCH YAW"),
+    ],
+)
+def test_too_few_numbers_are_told_by_how_many_are_needed(
+    command: str, option: str, count: int, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The option after them is taken for a number by the parser; what is said is how many numbers are needed."""
+    given = [*command.split(), option, *["1"] * (count - 1), "--points", "p.csv"]
+    assert run(given) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and f"{option}: needs {count} numbers, {words}" in said

@@ -1,0 +1,57 @@
+"""Depth maps that went to disk are those that were put in, and the cloud made of them is the same to the byte."""
+
+import numpy as np
+import pytest
+
+from wakewise.vision.reconstruction import ReconstructionSettings, depth_store, reconstruct
+from wakewise.vision.reconstruction.depth_store import DepthStore
+from wakewise.vision.reconstruction.stereo import DepthMap
+
+
+def depth_map(rng, height, width):
+    return DepthMap(
+        first=int(rng.integers(9)),
+        second=9,
+        focal_px=float(rng.uniform(100, 200)),
+        centre_px=rng.normal(size=2),
+        baseline_m=0.1,
+        R_CW=np.eye(3),
+        p_WC_m=rng.normal(size=3),
+        depth_m=rng.uniform(0, 1, (height, width)).astype(np.float32),
+        wanted=rng.random((height, width)) < 0.5,
+        colours=rng.integers(0, 255, (height, width, 3), dtype=np.uint8),
+    )
+
+
+def test_what_comes_out_is_what_went_in(tmp_path):
+    """In memory and on disk alike; the files are those of the maps that found no room."""
+    rng = np.random.default_rng(0)
+    maps = [depth_map(rng, 20 + k, 30 - k) for k in range(5)]
+    store = DepthStore(tmp_path, most_bytes=2 * 8 * 610)
+    for one in maps:
+        store.add(one)
+    assert len(store) == 5
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        f"{k}.{s}" for k in (2, 3, 4) for s in ("depth", "rest")
+    ]
+    for k, one in enumerate(maps):
+        assert store.photos(k) == (one.first, one.second)
+        found = store.whole(k)
+        for name in ("depth_m", "wanted", "colours"):
+            np.testing.assert_array_equal(getattr(found, name), getattr(one, name))
+        assert found.focal_px == one.focal_px
+        np.testing.assert_array_equal(store.depths(k).depth_m, one.depth_m)
+
+
+@pytest.mark.slow
+def test_a_cloud_from_maps_on_disk_is_the_same_to_the_byte(relief_photos, tmp_path, monkeypatch):
+    """With no room in memory at all; nothing of them is left in the folder."""
+    folder, _ = relief_photos
+    settings = ReconstructionSettings(
+        detector="opencv", max_features=1000, first_octave=0, agreeing_views=1, mesh=False, lens_check=False
+    )
+    for name, held in (("memory", 10**9), ("disk", 0)):
+        monkeypatch.setattr(depth_store.DepthStore.__init__, "__defaults__", (held,))
+        reconstruct(folder, tmp_path / name, settings)
+    assert (tmp_path / "memory" / "dense.ply").read_bytes() == (tmp_path / "disk" / "dense.ply").read_bytes()
+    assert [p.name for p in (tmp_path / "disk").iterdir() if p.name.startswith(".")] == []
