@@ -178,30 +178,31 @@ def table(page, heads):
     return rows
 
 
-def test_the_page_of_limits_says_what_the_tank_gets_wrong():
+def test_the_page_of_validation_says_what_the_tank_gets_wrong():
     """Its table is the tank's own, row by row, and nothing that the water has not is left out; misses are called so."""
-    from wakewise.simulation.tank.limits import ABSENT, limits_table
+    from wakewise.simulation.tank.validation_limits import ABSENT, limits_table
 
-    rows = table("docs/limits.md", "| | law | asked | reached | what it means for a claim |")
+    rows = table("docs/validation.md", "| | law | asked | reached | what it means for a claim |")
     told = limits_table()
     assert [row[1:] for row in rows] == [
         [f"*{row['name']}*: {row['law']}", row["asked"], row["reached"], row["means"]] for row in told
     ]
     assert [row[0] for row in rows] == [{"no": "**missed**", "yes": "kept"}[row["met"]] for row in told]
-    text = (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "validation.md").read_text(encoding="utf-8")
     assert [line for line in ABSENT if f"\n- {line}\n" not in text] == []
 
 
 def test_the_readme_counts_the_laws_and_leads_to_them():
-    """How many laws are measured and how many are missed is the tank's own count; three are told, all are linked."""
-    from wakewise.simulation.tank.limits import limits_table
+    """How many laws are measured and how many are missed is the tank's own count; three are named, all are linked."""
+    from wakewise.simulation.tank.validation_limits import limits_table
 
     laws = limits_table()
     missed = sum(row["met"] == "no" for row in laws)
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert f"against {len(laws)} laws" in " ".join(text.split()) and f"\n{missed} are missed" in text
-    assert len(table("README.md", "| what is wrong | by how much | what it means for a claim |")) == 3
-    assert "(docs/limits.md)" in text
+    section = text.split("## What the tank gets wrong")[1].split("\n## ")[0]
+    assert f"against {len(laws)} laws" in " ".join(section.split()) and f"; {missed} are missed" in section
+    assert section.count("\n- ") == len(table("docs/validation.md", "| error | size | consequence |")) == 3
+    assert "(docs/validation.md)" in section
 
 
 def test_the_page_of_worlds_lists_those_that_there_are():

@@ -29,7 +29,7 @@ def note_all(folder: Path) -> None:
     """Do the jobs in their order and write what each was the first to call."""
     import numba.core.event as events
 
-    from wakewise.core.jit.kernels import PACKAGE, type_of
+    from wakewise.core.jit.kernel_cache import PACKAGE, type_of
     from wakewise.core.jit.precompile import LIST
 
     rows: list[dict[str, Any]] = []

@@ -1,5 +1,5 @@
 """Write docs/commands.md from the commands' own help, docs/scenario.md and docs/vehicle-file.md from the settings' own
-descriptions, and docs/limits.md's table of what the tank gets wrong from that of the tank.
+descriptions, and docs/validation.md's table of what the tank gets wrong from that of the tank.
 
 A test fails when any is stale.
 """
@@ -233,7 +233,7 @@ def _allowed(field: Any) -> str:
 
 def limits_lines() -> list[str]:
     """What the tank gets wrong, as lines of Markdown: a table and what the water has not."""
-    from wakewise.simulation.tank.limits import ABSENT, limits_table
+    from wakewise.simulation.tank.validation_limits import ABSENT, limits_table
 
     said = {"no": "**missed**", "yes": "kept"}
     rows = ["| | law | asked | reached | what it means for a claim |", "|---|---|---|---|---|"]
@@ -243,14 +243,14 @@ def limits_lines() -> list[str]:
     return [*rows, "", "What it has not at all:", "", *(f"- {line}" for line in ABSENT)]
 
 
-def limits_page() -> str:
-    """Text of docs/limits.md with its table as it should be; the rest is as it is."""
-    text = (DOCS / "limits.md").read_text(encoding="utf-8")
+def validation_page() -> str:
+    """Text of docs/validation.md with its table as it should be; the rest is as it is."""
+    text = (DOCS / "validation.md").read_text(encoding="utf-8")
     before, mark, rest = text.partition("<!-- limits: ")
     comment, arrow, rest = rest.partition("-->\n")
     _, end, after = rest.partition("<!-- limits end -->")
     if not (mark and arrow and end):
-        raise ValueError("docs/limits.md: the two comments round the table of limits are not there")
+        raise ValueError("docs/validation.md: the two comments round the table of limits are not there")
     return "".join([before, mark, comment, arrow, "\n".join(limits_lines()), "\n", end, after])
 
 
@@ -258,7 +258,7 @@ PAGES = {
     "commands.md": commands_page,
     "scenario.md": scenario_page,
     "vehicle-file.md": vehicle_page,
-    "limits.md": limits_page,
+    "validation.md": validation_page,
 }
 
 if __name__ == "__main__":

@@ -5,15 +5,15 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.experiments.trials.timing import BenchOptions
-from wakewise_benchmarks import BENCHES, trap_scenes, traps
-from wakewise_benchmarks.show_traps import show_traps
+from wakewise_benchmarks import BENCHES, adversarial_photos, adversarial_scenes
+from wakewise_benchmarks.bench_adversarial import show_traps
 
 
 @pytest.mark.slow
 def test_some_traps_are_right_or_said(capsys: pytest.CaptureFixture[str]) -> None:
     """A good set is right, mixed-up names are a failure in words; the table has a row each."""
     assert "traps" in BENCHES
-    found = traps.run(BenchOptions(scenarios=("none", "names-mixed-up")))
+    found = adversarial_photos.run(BenchOptions(scenarios=("none", "names-mixed-up")))
     assert found["traps"]["none"]["verdict"] == "right" and found["traps"]["none"]["said"] == []
     assert found["traps"]["none"]["off_pct"] < 1.0
     assert found["traps"]["names-mixed-up"]["verdict"] == "said"
@@ -25,43 +25,45 @@ def test_some_traps_are_right_or_said(capsys: pytest.CaptureFixture[str]) -> Non
 
 def test_a_wrong_model_without_a_word_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
     """Cameras in the wrong places and no doubt: the bench says so, as it does of a stranger that was given a place."""
-    cameras = trap_scenes.over(6)
+    cameras = adversarial_scenes.over(6)
     picture = np.zeros((8, 8, 3), dtype=np.uint8)
-    shots = [traps.Shot(image=picture, camera=camera) for camera in cameras]
+    shots = [adversarial_photos.Shot(image=picture, camera=camera) for camera in cameras]
     placed = {f"{k:02d}.png": camera for k, camera in enumerate(cameras)}
-    bent = {n: trap_scenes.Camera(R_WC=c.R_WC, p_WC_m=c.p_WC_m * [1.0, 1.0, 2.0]) for n, c in placed.items()}
+    bent = {n: adversarial_scenes.Camera(R_WC=c.R_WC, p_WC_m=c.p_WC_m * [1.0, 1.0, 2.0]) for n, c in placed.items()}
     for stands, doubts, verdict in ((placed, [], "right"), (bent, [], "silent"), (bent, ["bent"], "said")):
-        monkeypatch.setattr(traps, "_model", lambda *_, s=stands, d=doubts: (d, s))
-        assert traps.spring(traps.Trap(why="", shots=lambda: shots)).verdict == verdict
-    strangers = [*shots[:5], traps.Shot(image=picture, camera=None)]
-    monkeypatch.setattr(traps, "_model", lambda *_: ([], placed))
-    assert traps.spring(traps.Trap(why="", shots=lambda: strangers)).verdict == "silent"
+        monkeypatch.setattr(adversarial_photos, "_model", lambda *_, s=stands, d=doubts: (d, s))
+        assert adversarial_photos.spring(adversarial_photos.Trap(why="", shots=lambda: shots)).verdict == verdict
+    strangers = [*shots[:5], adversarial_photos.Shot(image=picture, camera=None)]
+    monkeypatch.setattr(adversarial_photos, "_model", lambda *_: ([], placed))
+    assert adversarial_photos.spring(adversarial_photos.Trap(why="", shots=lambda: strangers)).verdict == "silent"
 
 
 def test_places_on_a_line_are_judged_by_the_cameras_turns() -> None:
     """Another frame and scale of the same line is right, other steps along it are not."""
-    R = trap_scenes.over(1)[0].R_WC
-    truth = {f"{k}": trap_scenes.Camera(R_WC=R, p_WC_m=np.array([0.1 * k, 0.0, 0.0])) for k in range(5)}
-    turn = trap_scenes.looking(np.array([0.3, 0.2, -0.5]), np.zeros(3)).R_WC
-    moved = {n: trap_scenes.Camera(R_WC=turn @ c.R_WC, p_WC_m=3.0 * turn @ c.p_WC_m + 1.0) for n, c in truth.items()}
-    assert traps._error(moved, truth) == pytest.approx((0.0, 0.0), abs=1e-4)
-    uneven = {n: trap_scenes.Camera(R_WC=R, p_WC_m=c.p_WC_m**2) for n, c in truth.items()}
-    assert traps._error(uneven, truth)[0] > 5.0
+    R = adversarial_scenes.over(1)[0].R_WC
+    truth = {f"{k}": adversarial_scenes.Camera(R_WC=R, p_WC_m=np.array([0.1 * k, 0.0, 0.0])) for k in range(5)}
+    turn = adversarial_scenes.looking(np.array([0.3, 0.2, -0.5]), np.zeros(3)).R_WC
+    moved = {
+        n: adversarial_scenes.Camera(R_WC=turn @ c.R_WC, p_WC_m=3.0 * turn @ c.p_WC_m + 1.0) for n, c in truth.items()
+    }
+    assert adversarial_photos._error(moved, truth) == pytest.approx((0.0, 0.0), abs=1e-4)
+    uneven = {n: adversarial_scenes.Camera(R_WC=R, p_WC_m=c.p_WC_m**2) for n, c in truth.items()}
+    assert adversarial_photos._error(uneven, truth)[0] > 5.0
 
 
 def test_what_was_taken_from_one_place_has_no_error_in_percent(monkeypatch: pytest.MonkeyPatch) -> None:
     """There is no spread to be off by; that is said in `why`, and a model of it is wrong unless it is doubted."""
-    placed = {f"{k:02d}.png": camera for k, camera in enumerate(trap_scenes.over(4))}
+    placed = {f"{k:02d}.png": camera for k, camera in enumerate(adversarial_scenes.over(4))}
     shots = [
-        traps.Shot(
+        adversarial_photos.Shot(
             image=np.zeros((8, 8, 3), dtype=np.uint8),
-            camera=trap_scenes.Camera(R_WC=camera.R_WC, p_WC_m=np.zeros(3)),
+            camera=adversarial_scenes.Camera(R_WC=camera.R_WC, p_WC_m=np.zeros(3)),
         )
         for camera in placed.values()
     ]
-    monkeypatch.setattr(traps, "_model", lambda *_: ([], placed))
-    monkeypatch.setattr(traps, "TRAPS", {"spot": traps.Trap(why="", shots=lambda: shots)})
-    told = traps.run(BenchOptions())
+    monkeypatch.setattr(adversarial_photos, "_model", lambda *_: ([], placed))
+    monkeypatch.setattr(adversarial_photos, "TRAPS", {"spot": adversarial_photos.Trap(why="", shots=lambda: shots)})
+    told = adversarial_photos.run(BenchOptions())
     assert told["traps"]["spot"]["off_pct"] is None and told["silent_wrongs"] == 1
     assert "one place" in told["why"]["traps.spot.off_pct"]
 
@@ -69,20 +71,20 @@ def test_what_was_taken_from_one_place_has_no_error_in_percent(monkeypatch: pyte
 def test_a_trap_that_there_is_not_is_refused() -> None:
     """In a line that names those that there are."""
     with pytest.raises(InputError, match="two-lenses"):
-        traps.run(BenchOptions(scenarios=("quicksand",)))
-    assert len(traps.TRAPS) >= 20
+        adversarial_photos.run(BenchOptions(scenarios=("quicksand",)))
+    assert len(adversarial_photos.TRAPS) >= 20
 
 
 def test_photographs_are_of_what_stands_there() -> None:
     """A pixel's ray, as long as the distance says, ends on the relief and on the rock."""
-    camera = trap_scenes.ring(3)[1]
-    _, depth = trap_scenes.rock()(np.asarray(camera.p_WC_m), camera.rays_W())
+    camera = adversarial_scenes.ring(3)[1]
+    _, depth = adversarial_scenes.rock()(np.asarray(camera.p_WC_m), camera.rays_W())
     point = camera.p_WC_m + depth[..., None] * camera.rays_W()
     hit = depth > 0.0
     length = np.linalg.norm(point[hit], axis=1)
     assert hit.mean() > 0.2
-    assert np.abs(length - trap_scenes.rock_radius(point[hit] / length[:, None])).max() < 2e-4
-    camera = trap_scenes.over(3)[0]
-    _, depth = trap_scenes.relief()(np.asarray(camera.p_WC_m), camera.rays_W())
+    assert np.abs(length - adversarial_scenes.rock_radius(point[hit] / length[:, None])).max() < 2e-4
+    camera = adversarial_scenes.over(3)[0]
+    _, depth = adversarial_scenes.relief()(np.asarray(camera.p_WC_m), camera.rays_W())
     x, y, z = np.moveaxis(camera.p_WC_m + depth[..., None] * camera.rays_W(), -1, 0)
     assert np.abs(z - 0.012 * np.sin(40.0 * x) * np.cos(35.0 * y)).max() < 1e-5

@@ -13,13 +13,13 @@ from scipy.optimize import LinearConstraint, minimize
 
 from wakewise.allocation import Layout, Weights, compile_layout, gentle_allocation, least_thrusts
 from wakewise.allocation.allocate import COUPLING_LIMIT
-from wakewise.allocation.search import box_range, cost, coupling, split_allocation
+from wakewise.allocation.line_search import box_range, cost, coupling, split_allocation
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose, look_at, quat_from_matrix
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 from wakewise.experiments.trials.timing import BenchOptions, timed_us
 from wakewise.wake import WakeSettings, disturbance, wake_model
-from wakewise.wake.view import WakeView
+from wakewise.wake.influence import WakeView
 from wakewise_benchmarks.cases import VEHICLE, bench_region, bench_target, cases
 
 GRID = 1201

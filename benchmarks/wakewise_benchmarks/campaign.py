@@ -20,7 +20,7 @@ from wakewise.core.jit.precompile import warm
 from wakewise.core.optional_dependencies import has, how_to_install
 from wakewise.experiments.campaigns import Engine, Processes, Task, planned
 from wakewise.experiments.campaigns import run as make
-from wakewise.experiments.campaigns.attempts import ATTEMPTS
+from wakewise.experiments.campaigns.attempt_log import ATTEMPTS
 from wakewise.experiments.campaigns.definition import check_campaign
 from wakewise.experiments.campaigns.engines import cores
 from wakewise.experiments.campaigns.index import INDEX, listing

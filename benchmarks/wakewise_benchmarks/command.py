@@ -12,9 +12,9 @@ import typer
 from wakewise.ui.cli.commands import STUDIES, Command
 from wakewise.ui.cli.console import Bars, print_json, shown, write_page
 from wakewise.ui.cli.options import Json
-from wakewise_benchmarks.show_traps import show_traps
+from wakewise_benchmarks.bench_adversarial import show_traps
 from wakewise_paper.cli.bench_operator import show_operator
-from wakewise_paper.cli.bench_wash_reduction import show_gentle
+from wakewise_paper.cli.bench_wash import show_gentle
 from wakewise_paper.cli.bench_worlds import show_worlds
 
 Name = Annotated[str, typer.Argument(help="Which bench, or all; without a name they are listed.", show_default=False)]
@@ -162,8 +162,8 @@ def bench(
 
                 add_cockpit(results[each], options)
     if plot is not None:
-        from wakewise_paper.reports.operator_study import draw_operator
-        from wakewise_paper.reports.wash_reduction import draw_gentle
+        from wakewise_paper.reports.operator_bench_plot import draw_operator
+        from wakewise_paper.reports.wash_bench_plot import draw_gentle
 
         draw = {"gentle": draw_gentle, "operator": draw_operator}[name]
         write_page("plot", lambda: draw(results[name], plot))

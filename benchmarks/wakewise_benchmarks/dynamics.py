@@ -12,10 +12,10 @@ import numba
 import numpy as np
 
 from wakewise.core.arrays import Array
+from wakewise.core.constants import GRAVITY_M_S2
+from wakewise.core.constants import TRIM_WATER_KG_M3 as RHO_KG_M3
 from wakewise.core.geometry import quat_from_euler
-from wakewise.core.jit.compiled import njit
-from wakewise.core.physics import GRAVITY_M_S2
-from wakewise.core.physics import TRIM_WATER_KG_M3 as RHO_KG_M3
+from wakewise.core.jit.njit import njit
 from wakewise.experiments.trials.timing import BenchOptions, timed_us
 from wakewise.robot.vehicles import (
     RigidBody,

@@ -14,8 +14,8 @@ from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.simulation.lattice import load_mean_field
 from wakewise.simulation.lattice.engines import why_no_gpu
 from wakewise.simulation.lattice.kernel import step
+from wakewise.simulation.lattice.reference_step import twin_step
 from wakewise.simulation.lattice.stencil import OPEN, PERIODIC, box, plane_row, smagorinsky_factor, still_water
-from wakewise.simulation.lattice.twin import twin_step
 from wakewise_benchmarks.plain_lattice import make_sweep, two_lattices
 
 CELLS = (128, 110, 110)

@@ -106,8 +106,8 @@ def _fire(port: int, seconds: float) -> None:
 
 def relay_figures(passes: int = PASSES) -> dict[str, Any]:
     """Milliseconds from a ground station's socket to the vehicle's, p99, while the companion drives."""
-    from wakewise_ardusub.link.mediator import Mediator
-    from wakewise_ardusub.sitl.rehearsal import sticks_packet
+    from wakewise_ardusub.link.mavlink_relay import Mediator
+    from wakewise_ardusub.sitl.inprocess_session import sticks_packet
 
     ends = [open_socket(LOOPBACK, 0) for _ in range(2)]
     vehicle, station = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
@@ -146,13 +146,13 @@ def loop_figures(options: BenchOptions, seconds: float = LOOP_S) -> dict[str, An
     much of it is the computer's.
     """
     from wakewise.core.jit.precompile import warm
-    from wakewise_ardusub.link.carriers import Udp
     from wakewise_ardusub.link.connection import Endpoint
-    from wakewise_ardusub.link.post import Post
-    from wakewise_ardusub.session.join import SEA
+    from wakewise_ardusub.link.mavlink_codec import Post
+    from wakewise_ardusub.link.transports import Udp
+    from wakewise_ardusub.session.link_join import SEA
+    from wakewise_ardusub.session.protected_region import WhatToSpare
     from wakewise_ardusub.session.session import SeaSession
-    from wakewise_ardusub.session.target import WhatToSpare
-    from wakewise_ardusub.sitl.piloted import fly_piloted
+    from wakewise_ardusub.sitl.scripted_ground_station import fly_piloted
 
     warm(("plan", "fly"), options.progress)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
@@ -242,8 +242,8 @@ def _engage(session: Any, within_s: float = _READY_S) -> bool:
 def loss_figures() -> dict[str, Any]:
     """How long after each loss a script still drove an output, and thrusts while disarmed."""
     from wakewise.robot.vehicles import load_vehicle
-    from wakewise_ardusub.sitl.aboard import FAULTS_ABOARD, suffer_aboard
-    from wakewise_ardusub.sitl.rehearsal import FAULTS, Outcome, suffer
+    from wakewise_ardusub.sitl.companion_harness import FAULTS_ABOARD, suffer_aboard
+    from wakewise_ardusub.sitl.inprocess_session import FAULTS, Outcome, suffer
 
     vehicle = load_vehicle(VEHICLE)
     after: dict[str, Outcome] = {f"script alone: {name}": suffer(vehicle, fault) for name, fault in FAULTS.items()}
@@ -260,8 +260,8 @@ def noise_figures(count: int = FUZZ_BYTES) -> dict[str, Any]:
     """Noise on all ends at once: the autopilot, the companion beside it, physics; half of it while engaged."""
     from wakewise.robot.vehicles import load_vehicle
     from wakewise_ardusub.physics import FreeWater
-    from wakewise_ardusub.sitl.aboard import Aboard
-    from wakewise_ardusub.sitl.rehearsal import Rehearsal, noise, outcome
+    from wakewise_ardusub.sitl.companion_harness import Aboard
+    from wakewise_ardusub.sitl.inprocess_session import Rehearsal, noise, outcome
 
     vehicle = load_vehicle(VEHICLE)
     physics = Physics(lambda: FreeWater(vehicle), PulseTable.of(vehicle).thrusts)

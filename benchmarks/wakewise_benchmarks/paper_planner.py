@@ -20,7 +20,7 @@ import numpy as np
 from scipy import sparse
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 from wakewise.planning.condensing import add_commands, condense
 from wakewise.planning.kernels import RATE_N, horizon, rotation
 from wakewise.planning.planner import PlanModel, Planner

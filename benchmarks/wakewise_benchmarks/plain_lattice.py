@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 from wakewise.simulation.lattice.collision import Populations, collide
 from wakewise.simulation.lattice.stencil import VELOCITIES, Lattice
 

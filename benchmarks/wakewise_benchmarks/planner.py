@@ -28,7 +28,7 @@ from wakewise.robot.vehicles import compile_body
 from wakewise.robot.vehicles.runge_kutta import rk4_kernel
 from wakewise.wake import WakeSettings, wake_model
 from wakewise_benchmarks.cases import VEHICLE, bench_region, bench_target
-from wakewise_benchmarks.flown_step import METHODS, flown_step
+from wakewise_benchmarks.control_step import METHODS, flown_step
 from wakewise_benchmarks.paper_planner import PaperPlanner
 from wakewise_benchmarks.planner_load import deadline_misses
 from wakewise_benchmarks.planner_reference import IpoptReference

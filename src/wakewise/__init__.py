@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from wakewise.core.jit import cache_folder as cache_folder  # before Numba is imported anywhere
+from wakewise.core.jit import cache_dir as cache_dir  # before Numba is imported anywhere
 from wakewise.core.lazy_imports import lazy_door
 
 if TYPE_CHECKING:

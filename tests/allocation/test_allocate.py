@@ -15,7 +15,7 @@ from wakewise.allocation import (
     least_thrusts,
     pseudo_inverse,
 )
-from wakewise.allocation.search import cost
+from wakewise.allocation.line_search import cost
 from wakewise.control import vehicle_layout
 from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import load_vehicle

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from wakewise.allocation import Weights, compile_layout, gentle_allocation, least_thrusts
 from wakewise.allocation.allocate import is_incoherent
-from wakewise.allocation.boxes import box_search, coordinates
+from wakewise.allocation.branch_and_bound import box_search, coordinates
 from wakewise.allocation.convex import convex_allocation
 from wakewise.allocation.layout import independent_blocks
-from wakewise.allocation.search import cost
+from wakewise.allocation.line_search import cost
 from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import load_vehicle
 

@@ -15,7 +15,7 @@ from wakewise.allocation import (
     worth,
     worthiest,
 )
-from wakewise.allocation.search import cost
+from wakewise.allocation.line_search import cost
 
 RNG = np.random.default_rng(3)
 HALF = np.sqrt(0.5)

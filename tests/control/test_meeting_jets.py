@@ -10,7 +10,7 @@ from wakewise.core.geometry import Pose, quat_from_rotvec
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.targets import Region
 from wakewise.wake import FloorJet, RoundJet, WakeView, disturbance
-from wakewise.wake.carried import Flow
+from wakewise.wake.advected_jets import Flow
 from wakewise.wake.disturbance import carried_velocity
 
 VEHICLE = load_vehicle("paper")

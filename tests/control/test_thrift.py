@@ -24,7 +24,7 @@ from wakewise.core.geometry import Pose
 from wakewise.robot.thrusters import electrical_power_W
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.wake import RoundJet, WakeView
-from wakewise.wake.view import Seen
+from wakewise.wake.influence import Seen
 
 VEHICLE = load_vehicle("paper")
 LAYOUT, LAW = vehicle_layout(VEHICLE), power_law(VEHICLE)

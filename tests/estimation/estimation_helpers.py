@@ -3,7 +3,7 @@
 import numpy as np
 
 from wakewise.core.geometry import quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
-from wakewise.estimation.kernels import CURRENT, GAINS
+from wakewise.estimation.eskf_kernels import CURRENT, GAINS
 from wakewise.robot.vehicles import compile_body, load_vehicle
 
 VEHICLE = load_vehicle("paper")

@@ -14,10 +14,10 @@ from estimation_helpers import (
     unit_quaternion,
 )
 
+from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.geometry import matrix_from_quat, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
-from wakewise.core.physics import GRAVITY_M_S2
 from wakewise.estimation.corrections import NOTHING, correct, take_force, take_pose, take_sum
-from wakewise.estimation.kernels import GAINS, GYRO, felt
+from wakewise.estimation.eskf_kernels import GAINS, GYRO, felt
 
 
 def test_correction_is_the_kalman_update():

@@ -9,7 +9,7 @@ import pytest
 
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState, Measurement
-from wakewise.estimation import ErrorStateFilter, error_state
+from wakewise.estimation import ErrorStateFilter, eskf
 from wakewise.estimation.settings import FilterSettings, Priors
 from wakewise.robot.vehicles import load_vehicle
 
@@ -60,7 +60,7 @@ def test_the_models_white_error_counts_over_the_period_of_the_sensor(
         used.append(float(args[7]))  # type: ignore[arg-type]
         return 0.0
 
-    monkeypatch.setattr(error_state, "take_force", listening)
+    monkeypatch.setattr(eskf, "take_force", listening)
     settings, priors = FilterSettings(), Priors(acceleration_noise_m_s2=0.05, settle_s=0.0)
     filter_ = ErrorStateFilter(VEHICLE, settings, priors=priors)
     state = filter_.init(BodyState(X_WB=Pose(HERE)))

@@ -109,6 +109,6 @@ def test_the_loop_keeps_its_phase_margin_in_flight(name):
     assert late >= 1
     errors, _ = hold(name, "dp", trim_N=0.0, current_m_s=0.0, late_steps=late, seconds=30.0)
     # Of the 30 deg that the tracker is designed for the filter takes half: reckoning with slow errors of poses, it
-    # believes its model for longer, which knows of no lateness (docs/decisions/0030).
+    # believes its model for longer, which knows of no lateness (docs/research-log/0030).
     assert rms(errors[750:]) < 0.01
     assert rms(errors[1125:]) < 1.5 * rms(errors[750:1125])

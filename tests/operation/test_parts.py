@@ -102,7 +102,7 @@ def test_other_worlds_fly_the_same_mission(world):
 
 def test_the_lattices_water_is_the_lattices_jet():
     """One thruster of the true vehicle at the true pose: the speed on its axis is that of the mean field."""
-    from wakewise.operation.worlds.wake_world import free_jet_field
+    from wakewise.operation.worlds.quasi_steady_world import free_jet_field
     from wakewise.simulation.lattice import LatticeFlow
 
     plant, witness = QUICK.replace(method="dp", world="lattice-jets").parts().world.begin()

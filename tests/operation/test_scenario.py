@@ -224,7 +224,7 @@ OLD_FIELDS = {
         "mesh mesh_depth threads random_seed"
     ),
 }
-"""Every field that a scenario had before decision 0018, by group."""
+"""Every field that a scenario had before research log 0018, by group."""
 
 
 def leaves(model: type[BaseModel], prefix: str = "") -> list[str]:

@@ -10,7 +10,7 @@ import wakewise as ww
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import Posture, ScalarGrid
-from wakewise.operation.darkroom import packed, unpacked
+from wakewise.operation.background_renderer import packed, unpacked
 from wakewise.operation.exposures import ExposureRecord, exposure_arrays, read_exposures
 from wakewise.operation.photography import fingerprint, moved_m, scenes_of
 from wakewise.operation.preflight import check_target

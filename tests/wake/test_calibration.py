@@ -14,8 +14,8 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.wake.calibration import calibrate, split_samples
-from wakewise.wake.families import FAMILIES, family
 from wakewise.wake.fit_file import fit_figures, read_wake_settings, write_fit
+from wakewise.wake.fit_parameters import FAMILIES, family
 from wakewise.wake.samples import JetSamples
 from wakewise.wake.scores import score, score_speeds
 

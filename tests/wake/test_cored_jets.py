@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from wakewise.core.jit.compiled import COMPILED
+from wakewise.core.jit.njit import COMPILED
 from wakewise.wake import wake_model
 from wakewise.wake.kernels import FAST, _cored_law, as_tuple, fill_cored_jet, own_constants, speed_and_slope
 

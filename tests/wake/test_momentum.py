@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.wake.families import family
+from wakewise.wake.fit_parameters import family
 from wakewise.wake.jets import GaussianJet, RoundJet
 from wakewise.wake.momentum import flux_over_thrust, momentum_law
 from wakewise.wake.samples import JetSamples

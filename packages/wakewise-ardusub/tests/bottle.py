@@ -11,11 +11,11 @@ import numpy as np
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
 from wakewise_ardusub.link.buttons import BUTTON_PARAMETERS
-from wakewise_ardusub.link.engagement import Limits
-from wakewise_ardusub.link.journal import Journal
-from wakewise_ardusub.link.listening import Said
+from wakewise_ardusub.link.engagement_fsm import Limits
+from wakewise_ardusub.link.message_state import Said
+from wakewise_ardusub.link.output_gate import TICK_S, Warden
 from wakewise_ardusub.link.protocol import RELEASE_GROUP, SCRIPT_VERSION
-from wakewise_ardusub.link.warden import TICK_S, Warden
+from wakewise_ardusub.link.session_log import Journal
 
 MOTORS = 8
 SESSION = 4711

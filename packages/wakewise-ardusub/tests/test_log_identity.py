@@ -19,7 +19,7 @@ from wakewise.ui.cli.main import run
 from wakewise_ardusub.logs.identity import Identity, firmware_of
 from wakewise_ardusub.logs.read import read_log
 from wakewise_ardusub.logs.table import tabulate
-from wakewise_ardusub.wash_meter.hearing import Hearing
+from wakewise_ardusub.wash_meter.vehicle_listener import Hearing
 
 Capture = pytest.CaptureFixture[str]
 MADE: dict[str, Callable[..., bytes]] = {"a.tlog": made_logs.tlog, "a.mcap": made_logs.mcap}

@@ -16,8 +16,8 @@ pytest.importorskip("mcap", reason="the extra `links` is not installed")
 
 import made_logs
 from wakewise.core.errors import InputError
+from wakewise_ardusub.logs.channels import Gather, VehicleLog
 from wakewise_ardusub.logs.dataflash import read_dataflash
-from wakewise_ardusub.logs.gather import Gather, VehicleLog
 from wakewise_ardusub.logs.mcap_file import read_mcap
 from wakewise_ardusub.logs.read import read_log
 from wakewise_ardusub.logs.table import RATE_HZ, tabulate

@@ -22,7 +22,7 @@ JUDGE = """
 import json, sys
 import numpy as np
 from pathlib import Path
-from wakewise.core.jit.compiled import COMPILED
+from wakewise.core.jit.njit import COMPILED
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise_ardusub.vehicle_summary import read_craft
 from wakewise_ardusub.wash_savings import SHARES, Sparing, bow_ball, look
@@ -83,7 +83,7 @@ def test_the_meters_whole_program_needs_numpy_and_pymavlink_only() -> None:
     """Every module that the small door opens, pymavlink's dialect too."""
     found = bare(
         "before = set(sys.modules)\n"
-        "import wakewise_ardusub.wash_meter.small, pymavlink.dialects.v20.ardupilotmega\n"
+        "import wakewise_ardusub.wash_meter.embedded, pymavlink.dialects.v20.ardupilotmega\n"
         "print(sorted({m.partition('.')[0] for m in set(sys.modules) - before} - set(sys.stdlib_module_names)))"
     )
     assert set(json.loads(found.replace("'", '"'))) <= {"fastcrc", "numpy", "pymavlink", "wakewise"}

@@ -9,9 +9,9 @@ from analytic_sphere import REGION, look, photograph
 torch = pytest.importorskip("torch", reason="needs the extra `nerf` (PyTorch)")
 
 from wakewise.core.errors import StageError
-from wakewise.vision.reconstruction.views import Ball
+from wakewise.vision.reconstruction.registered_photos import Ball
 from wakewise_nerf.field.field import RadianceField
-from wakewise_nerf.field.judging import draw, psnr_db, split, ssim
+from wakewise_nerf.field.held_out_views import draw, psnr_db, split, ssim
 from wakewise_nerf.field.occupancy import Occupancy
 from wakewise_nerf.field.posed import read_model, read_posed
 from wakewise_nerf.field.rays import RayTable, origin_in

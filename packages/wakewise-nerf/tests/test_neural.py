@@ -8,7 +8,7 @@ import pytest
 from wakewise.core.files import write_json
 from wakewise.operation import load_scenario, write_scenario
 from wakewise.vision.evaluation import Crop
-from wakewise.vision.evaluation.surface import sample_surface
+from wakewise.vision.evaluation.cloud_to_surface import sample_surface
 from wakewise.vision.reconstruction import Cloud, write_cloud
 from wakewise_nerf import neural
 from wakewise_nerf.field import PROFILES

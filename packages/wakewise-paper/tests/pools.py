@@ -5,8 +5,8 @@ from contextlib import contextmanager
 
 from wakewise.core.interfaces import no_progress
 from wakewise.experiments.campaigns.engines import Crew
-from wakewise.experiments.campaigns.slot import Report
 from wakewise.experiments.campaigns.worker import work_on
+from wakewise.experiments.campaigns.worker_process import Report
 
 
 class Here:

@@ -3,7 +3,7 @@
 from pools import Here
 from wakewise.experiments.campaigns.store import open_store
 from wakewise.experiments.trials import BenchOptions
-from wakewise_paper import flight_store, side_by_side
+from wakewise_paper import flight_batches, flight_store
 from wakewise_paper.flight_store import FlightStore, store_folder
 from wakewise_paper.wash_reduction.flight import Trial
 
@@ -19,21 +19,21 @@ def made_up(trial):
 
 def test_flights_are_kept_by_what_was_flown(tmp_path, monkeypatch):
     """The same trial is found again as it was, another is not, and `fresh` finds none; nonsense counts as not flown."""
-    monkeypatch.setattr(side_by_side, "warm", lambda **_: None)
+    monkeypatch.setattr(flight_batches, "warm", lambda **_: None)
     store = FlightStore(tmp_path / "c")
     trial = Trial(scenario="orbit/paper", method="dp", seed=1, control=(("levers.drift", False), ("w", (1.0, 2.0))))
     assert store.load(trial, FLY) is None
     flown.clear()
-    rows, failures, known = side_by_side.fly_all({("a", "b", 1): trial}, FLY, store, BenchOptions(), lambda _: Here())
+    rows, failures, known = flight_batches.fly_all({("a", "b", 1): trial}, FLY, store, BenchOptions(), lambda _: Here())
     assert (rows, failures, known) == ({("a", "b", 1): {"target_speed_mean_m_s": 1.0}}, [], 0)
     assert flown == [trial]
     assert store.load(trial, FLY) == {"target_speed_mean_m_s": 1.0}
-    assert side_by_side.fly_all({("a", "b", 1): trial}, FLY, store, BenchOptions(), lambda _: Here())[2] == 1
+    assert flight_batches.fly_all({("a", "b", 1): trial}, FLY, store, BenchOptions(), lambda _: Here())[2] == 1
     assert store.load(Trial(scenario="orbit/paper", method="dp", seed=2), FLY) is None
     assert store.load(trial, f"{__name__}:another") is None
     fresh = FlightStore(store.folder, fresh=True)
     assert fresh.load(trial, FLY) is None
-    assert side_by_side.fly_all({("a", "b", 1): trial}, FLY, fresh, BenchOptions(), lambda _: Here())[2] == 0
+    assert flight_batches.fly_all({("a", "b", 1): trial}, FLY, fresh, BenchOptions(), lambda _: Here())[2] == 0
     assert flown == [trial, trial]
     (open_store(store.folder).place(store.task(trial, FLY).key) / "figures.json").write_text("[1, 2")
     assert store.load(trial, FLY) is None

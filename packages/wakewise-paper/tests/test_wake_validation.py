@@ -9,7 +9,7 @@ import pytest
 
 from wakewise.simulation.lattice import load_mean_field
 from wakewise.wake.calibration import split_samples
-from wakewise.wake.families import FAMILIES
+from wakewise.wake.fit_parameters import FAMILIES
 from wakewise_paper.flows import FUEHRER_ROEMISCH
 from wakewise_paper.lattice_reference import grid_convergence_pct, oracle_jets
 from wakewise_paper.wake_piv import piv_samples

@@ -13,13 +13,13 @@ from functools import cached_property
 
 import numpy as np
 
-from wakewise.allocation.boxes import box_search
-from wakewise.allocation.cells import CLOSED
+from wakewise.allocation.attainable_set import AXES, by_priority, is_all, parse_priority, within_limits
+from wakewise.allocation.branch_and_bound import box_search
 from wakewise.allocation.convex import convex_allocation
-from wakewise.allocation.coupled import feasible_starts, start_directions, starts_at_rest, tied_parts
+from wakewise.allocation.coordinate_descent import feasible_starts, start_directions, starts_at_rest, tied_parts
+from wakewise.allocation.cost_bounds import CLOSED
 from wakewise.allocation.layout import Layout, compile_layout
-from wakewise.allocation.reach import AXES, by_priority, is_all, parse_priority, within_limits
-from wakewise.allocation.search import cost, disjoint_search, split_allocation
+from wakewise.allocation.line_search import cost, disjoint_search, split_allocation
 from wakewise.core.arrays import Array, freeze, frozen
 from wakewise.core.checks import finite_number, instance_of, whole_number
 from wakewise.core.defaults import BUDGET, CHANGE_WEIGHT, EFFORT_WEIGHT

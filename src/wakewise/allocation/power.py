@@ -25,9 +25,9 @@ import numpy as np
 
 from wakewise.allocation.allocate import Allocation, Weights, disturbance_of
 from wakewise.allocation.layout import Layout
-from wakewise.allocation.search import cost
+from wakewise.allocation.line_search import cost
 from wakewise.core.arrays import Array, freeze
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 
 _PARTS = 3
 """Most parts of the null space gone along by themselves; what a layout has beyond goes with the last of them."""

@@ -34,6 +34,7 @@ from wakewise.control.settings import ControlSettings
 from wakewise.control.stability import Gains, axis_scale, vehicle_axes
 from wakewise.control.tracker import ESTIMATOR_LAG_S, GYRO_LAG_S
 from wakewise.core.arrays import Array, freeze
+from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import (
     euler_from_quat,
@@ -44,7 +45,6 @@ from wakewise.core.geometry import (
     rotvec_from_quat,
 )
 from wakewise.core.interfaces import BodyState, Command, Goal, WakeModel
-from wakewise.core.physics import GRAVITY_M_S2
 from wakewise.planning import Surroundings
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region

@@ -22,7 +22,7 @@ import numpy as np
 from wakewise.core.arrays import Array, freeze, frozen
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import matrix_from_quat
-from wakewise.estimation.current import current_of_force
+from wakewise.estimation.current_from_drag import current_of_force
 from wakewise.estimation.settings import Priors
 from wakewise.robot.vehicles import Vehicle, compile_body, coriolis_wrench, damping_wrench, restoring_wrench
 from wakewise.robot.vehicles.ballast import Block, net_buoyancy_N
@@ -32,7 +32,7 @@ STEP_N, STEP_M = 0.5, 0.05
 LIGHT_N = 0.5 * STEP_N
 """Net buoyancy that is aimed at. After rounding to blocks a vehicle is then left neutral to half a newton light, and
 never heavy: that half newton costs a third more wash than neutral, half a newton heavy once cost ten times as much
-(docs/decisions/0037)."""
+(docs/research-log/0037)."""
 WORTH_NM = 0.05
 """A moment below this, half a newton at a decimetre, is left alone where no net weight goes with it."""
 SURE = 2.0

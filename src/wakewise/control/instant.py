@@ -20,7 +20,7 @@ from wakewise.planning.surroundings import around_target
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
 from wakewise.wake import bed_of
-from wakewise.wake.view import Seen, WakeView
+from wakewise.wake.influence import Seen, WakeView
 
 
 def instant_allocator(

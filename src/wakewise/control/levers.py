@@ -30,7 +30,7 @@ Velocity = tuple[Component, Component, Component]
 
 
 class LeverSettings(Settings):
-    """Switches of the levers; those that the tank bore out are on (docs/decisions/0014), all off is the paper's."""
+    """Switches of the levers; those that the tank bore out are on (docs/research-log/0014), all off is the paper's."""
 
     bed: bool = Field(default=False, description="also keep the water still on the bed around the target")
     spare: bool = Field(

@@ -14,7 +14,7 @@ from wakewise.control.watch import APART_S, EVERY_S, FULL, JUMP_EVERY_S, Watch
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.interfaces import BodyState, Command, Goal
 from wakewise.robot.vehicles import Vehicle
-from wakewise.wake.view import Seen, WakeView
+from wakewise.wake.influence import Seen, WakeView
 
 Allocate = Callable[[Array, Array | None, Array], Allocation]
 """`(wrench_B, gram or None, thrusts before) -> Allocation`; the Gram matrix is None if the wake model gave nonsense."""

@@ -27,11 +27,11 @@ import numpy as np
 from wakewise.allocation import Layout
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.geometry import Pose
-from wakewise.core.jit.compiled import assign, njit
+from wakewise.core.jit.njit import assign, njit
 from wakewise.wake import AxialJet, free_jet
-from wakewise.wake.carried import Flow
+from wakewise.wake.advected_jets import Flow
 from wakewise.wake.disturbance import carried_velocity, incoherent, velocity_gram
-from wakewise.wake.view import Seen, WakeView
+from wakewise.wake.influence import Seen, WakeView
 
 LEAST_COSINE = -0.5
 """Cosine of 120 deg: jets that cross at more turn aside rather than join."""

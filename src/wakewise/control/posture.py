@@ -155,7 +155,7 @@ class Price:
 NOT_TO_BE_HAD = Price(cost=np.inf, power_W=np.inf)
 NEAR = 4.0
 """Postures that cost at most this many times the least are as good as the least: no wake model of ours knows the speeds
-of the water within a factor of two (docs/decisions/0014), and cost goes with their square."""
+of the water within a factor of two (docs/research-log/0014), and cost goes with their square."""
 MOST_POWER = 2.0
 """A posture may take this many times the power of the mission's own. Where wash is carried off by a current or has
 nothing to disturb, wake models still find it, and a vehicle that hovers for nearly nothing would lean for it."""

@@ -21,7 +21,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.interfaces import BodyState, Command, Controller, Goal
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 from wakewise.robot.thrusters import ThrustSteps
 from wakewise.robot.thrusters.thrust_steps import nearest
 from wakewise.robot.vehicles import Vehicle

@@ -11,7 +11,7 @@ plan begins anew at the estimate.
 How corrections are shared out. The thrusts of a correction minimise its cost in the planner's own majorised model of
 the first stage, so thrusters whose jets hit the target are spared there, too. The load that the estimator found acts
 in the plan, whose thrusts hold against it at the planned attitude; where the vehicle is turned from that, the
-correction turns the force back, as 22 N of stream held 6 deg askew push 2 N aside (docs/decisions/0080). The PID's
+correction turns the force back, as 22 N of stream held 6 deg askew push 2 N aside (docs/research-log/0080). The PID's
 integral makes up for what is left.
 """
 
@@ -42,7 +42,7 @@ from wakewise.planning.surroundings import Surroundings, around_target
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
 from wakewise.wake import FloorJet
-from wakewise.wake.gradients import Superposition
+from wakewise.wake.disturbance_derivatives import Superposition
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,7 +175,7 @@ class PlanningController:
         """How fast the goal's velocity changes, shape (6,), zero for its turn.
 
         A turn that keeps something in view trembles with the hand and its rate within a step; carried on for half a
-        second that is a yaw moment four times the one needed (docs/decisions/0073). A goal that jumps has no
+        second that is a yaw moment four times the one needed (docs/research-log/0073). A goal that jumps has no
         acceleration worth following.
         """
         if state.goal_nu is None or not dt_s > 0.0:
@@ -365,7 +365,7 @@ def plan_superposition(wake: WakeModel, settings: ControlSettings) -> Superposit
     """How a plan adds jets up: as `control.superposition` says, but always as squares if its wake model has a floor.
 
     Wall jets that cancel on paper give the coherent sum many minima within 3 % of one another, and plans jump between
-    them (docs/decisions/0014); the sum of squares is convex, and plans stay. The exact allocators find the least of
+    them (docs/research-log/0014); the sum of squares is convex, and plans stay. The exact allocators find the least of
     all minima, and need no such care.
     """
     return "incoherent" if isinstance(wake, FloorJet) else settings.superposition

@@ -11,7 +11,7 @@ from wakewise.core.defaults import DISTURBANCE_WEIGHT, EFFORT_WEIGHT
 from wakewise.core.settings import Settings
 from wakewise.planning.problem import PlanSettings
 from wakewise.wake import WakeSettings
-from wakewise.wake.gradients import Superposition
+from wakewise.wake.disturbance_derivatives import Superposition
 
 Coordinate = Annotated[float, Field(ge=-100.0, le=100.0)]
 Radius = Annotated[float, Field(gt=0.0, le=10.0)]
@@ -36,7 +36,7 @@ class ControlSettings(Settings):
     every plane across a jet, integral of u^2 dA = |T| / rho, so within a length L a jet that misses gives the water of
     the volume L^3 a mean square speed |T| / (rho L^2), 1e-3 (m/s)^2 per newton for a work site of 1 m. But what is
     to be still is the target, a fifth of that size, and not the site: the planner always had 150 times that, and an
-    allocator that flies with less gains half as much (docs/decisions/0018). In a plan the pair is per second.
+    allocator that flies with less gains half as much (docs/research-log/0018). In a plan the pair is per second.
     """
 
     rate_hz: float = Field(default=50.0, description="control steps per second (Hz)", ge=5.0, le=500.0)

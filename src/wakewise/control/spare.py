@@ -18,7 +18,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState, Command, Controller, Goal, WakeModel
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
-from wakewise.wake.view import Seen, WakeView
+from wakewise.wake.influence import Seen, WakeView
 
 
 @dataclass(frozen=True, eq=False)

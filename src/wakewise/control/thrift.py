@@ -6,12 +6,12 @@ percent of speed for two percent of power (`allocation.power`), and the bound on
 goes with the speed that these would leave at the target, by the wake model and what it is known to be wrong by: `CALM`
 up to `CALM_M_S`, `TROUBLE` at `TROUBLE_M_S`, `MOST` from `MOST_M_S` on, straight in between. The first two were set
 beforehand: a flight may cost 1.3 times the energy of `dp` where that leaves more than 10 mm/s, 1.05 times where it
-leaves less than 5 (docs/decisions/0036). Of what lies above 1, a twentieth stays for what the bound does not see:
+leaves less than 5 (docs/research-log/0036). Of what lies above 1, a twentieth stays for what the bound does not see:
 pulses, the lag of rotors, corrections between two searches. An instant may cost more than a flight, since what is not
-worth it elsewhere pays (docs/decisions/0065).
+worth it elsewhere pays (docs/research-log/0065).
 
 Shares of power are of the thrusters' own and `STANDING_W`, and so is what trouble may cost beyond calm: a ballasted
-vehicle hovers on a watt or two, and a quarter of that is no price (docs/decisions/0078).
+vehicle hovers on a watt or two, and a quarter of that is no price (docs/research-log/0078).
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from wakewise.allocation import (
     worth,
     worthiest,
 )
-from wakewise.allocation.reach import within_limits
+from wakewise.allocation.attainable_set import within_limits
 from wakewise.control.settings import PREVIOUS_SHARE, ControlSettings
 from wakewise.core.arrays import Array
 from wakewise.robot.thrusters import electrical_power_W
 from wakewise.robot.vehicles import Vehicle
-from wakewise.wake.view import Seen
+from wakewise.wake.influence import Seen
 
 KEPT = 0.95
 """Share of the extra power of a whole flight that the bound of an instant hands out: with a bound of 1.3 two flights
@@ -48,14 +48,14 @@ CALM_M_S, TROUBLE_M_S, MOST_M_S = 0.005, 0.010, 0.025
 MOST = 1.5
 """The least bound that costs no wash: 1.7, about what the gentlest shares of a heavy vehicle need, left 33 % of `dp`'s
 in 18 flights in trouble for 1.28 times its energy, 1.5 leaves 32 for 1.27, 1.4 leaves 34 for 1.25
-(docs/decisions/0079)."""
+(docs/research-log/0079)."""
 STANDING_W = 2.0
 """Power beside that of the thrusters that shares of power are reckoned with: a watt or two that nobody misses. Well
 below what computer, camera and lights draw, since a flight's bar on energy counts thrusters alone."""
 TOO_FAST = 2.6
 """How many times too fast the wake model has the target's water under the least thrusts, as it reckons jets to go, the
 current's way: twice in the median of 14 flights in trouble (1 to 3.7), 3.2 times in 35 calm ones. With 2.6 all but one
-of the first lie above `TROUBLE_M_S` and all but one of the others below (docs/decisions/0078)."""
+of the first lie above `TROUBLE_M_S` and all but one of the others below (docs/research-log/0078)."""
 
 
 def allowed(speed_m_s: float) -> float:

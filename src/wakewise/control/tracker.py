@@ -10,7 +10,7 @@ from wakewise.control.settings import ControlSettings
 from wakewise.control.stability import Gains, stable_gain_scale, vehicle_axes, wished_gains
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.interfaces import BodyState, Goal
-from wakewise.core.jit.compiled import assign, njit
+from wakewise.core.jit.njit import assign, njit
 from wakewise.robot.vehicles import RigidBody, Vehicle, compile_body, coriolis_wrench, damping_wrench, restoring_wrench
 
 _NO_FEED = np.zeros(6)

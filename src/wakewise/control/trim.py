@@ -7,10 +7,10 @@ as written. Steady jets only: what moving costs does not depend on ballast.
 
 The advice is the ballast of least effort that is not worse by D than the vehicle as it is, among those that are light
 by as much as is unknown, so that the vehicle is heavy in no case: in the tank half a newton light costs a third more
-wash than neutral, half a newton heavy up to ten times as much (docs/decisions/0037). Least D is another one and is told
-beside it (`gentlest`, of least effort among those near to the least D): D asks for more floats, since jets then go up,
-away from target and bed, which the tank does not bear out beyond half a newton. What a flight says of its own trim is
-told by `hover_trim`.
+wash than neutral, half a newton heavy up to ten times as much (docs/research-log/0037). Least D is another one and is
+told beside it (`gentlest`, of least effort among those near to the least D): D asks for more floats, since jets then go
+up, away from target and bed, which the tank does not bear out beyond half a newton. What a flight says of its own trim
+is told by `hover_trim`.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from wakewise.control.levers import with_bed_points
 from wakewise.control.loop import vehicle_layout
 from wakewise.control.settings import ControlSettings
 from wakewise.core.arrays import Array
+from wakewise.core.constants import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import WakeModel
-from wakewise.core.physics import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.robot.vehicles import Vehicle, compile_body, restoring_wrench
 from wakewise.robot.vehicles.ballast import ballasted, net_buoyancy_N
 from wakewise.scene.targets import Region
-from wakewise.wake.view import WakeView
+from wakewise.wake.influence import WakeView
 
 __all__ = ["TrimAdvice", "TrimRow", "ballasted", "net_buoyancy_N", "trim_advice"]
 

@@ -14,7 +14,7 @@ from wakewise.wake import free_jet
 
 FILTER_S = 0.77
 """Time over which `smooth` filters its thrusts: of those flown the longest whose position error is within a tenth of
-that of `unaware` (docs/decisions/0036)."""
+that of `unaware` (docs/research-log/0036)."""
 
 
 def price_of_change(settings: ControlSettings) -> float:

@@ -23,8 +23,8 @@ from wakewise.control.levers import LeverSettings
 from wakewise.control.thrift import Sharer
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState
-from wakewise.wake.carried import Flow
-from wakewise.wake.view import Seen, WakeView
+from wakewise.wake.advected_jets import Flow
+from wakewise.wake.influence import Seen, WakeView
 
 UNSURE = 0.55
 """Standard deviation of how far the current takes a jet's water over what is reckoned, beside what the estimator is
@@ -36,8 +36,9 @@ half as long again in the mean, give or take half."""
 
 DOUBT = 0.3
 """Share of belief that a jet has gone astray (see `wakewise.wake.disturbance`) rather than where it is reckoned to go.
-Of 64 single pushes the belief has the order right to .73 (docs/decisions/0048). Set before any flight of it; .6 and .9
-flew as gently for more power (docs/decisions/0070)."""
+Of 64 single pushes the belief has the order right to .73 (docs/research-log/0048). Set before any flight of it; .6 and
+.9
+flew as gently for more power (docs/research-log/0070)."""
 
 WORTH = 0.05
 """Share of the cost that a jump must save: less is within what a wake model may claim to know."""

@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import assign, njit
-from wakewise.core.physics import GRAVITY_M_S2
-from wakewise.estimation.kernels import GAINS, felt, turn_between, turned_by
-from wakewise.estimation.resting import DRAG, turn
+from wakewise.core.constants import GRAVITY_M_S2
+from wakewise.core.jit.njit import assign, njit
+from wakewise.estimation.drag_bias import DRAG, turn
+from wakewise.estimation.eskf_kernels import GAINS, felt, turn_between, turned_by
 
 NOTHING = -1
 """In place of where a second error begins, if a measurement tells only one."""

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import njit
-from wakewise.estimation.kernels import CURRENT, FORCE, MOVING, moved
+from wakewise.core.jit.njit import njit
+from wakewise.estimation.eskf_kernels import CURRENT, FORCE, MOVING, moved
 from wakewise.robot.vehicles.kernels import rotate
 
 TICK_S = 1e-9

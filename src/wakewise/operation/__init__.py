@@ -2,14 +2,14 @@
 
 Start reading in `parts.py` (what a flight is built from, and the one place where the controller's world and the true
 one meet) and `loop.py` (the loop itself). `scenario.py` with `target_settings.py` is a maker of parts, read from YAML
-(`renamed.py` knows the names of older files) with `draws.py` (what its seed draws), `seeds.py` its random streams,
-`regions.py` keeps what takes long to draw; `worlds/` and `pilot_makers.py` are worlds and pilots by name,
-`instant_water.py` and `lattice_water.py` worlds other than the tank, `survey.py` what is known of target and camera
-beforehand; `surroundings.py` is what a planner is told to keep clear of, `preflight.py` refuses what does not fit,
-`switches.py` says what is set and cannot act, `foreign.py` guards what comes from outside; `flying.py` flies,
-`recorder.py` and `telemetry.py` keep what was, `flight_trim.py` reads from it what ballast is lacking,
-`photography.py` renders what the camera saw, `darkroom.py` while the flight goes on, `guide.py` begins the guide of
-what photographs have seen.
+(`renamed.py` knows the names of older files) with `randomization.py` (what its seed draws), `seeds.py` its random
+streams, `regions.py` keeps what takes long to draw; `worlds/` and `pilot_makers.py` are worlds and pilots by name,
+`instant_water.py` and `lattice_water.py` worlds other than the tank, `calibration_error.py` what is known of target and
+camera beforehand; `known_obstacles.py` is what a planner is told to keep clear of, `preflight.py` refuses what does not
+fit, `setting_checks.py` says what is set and cannot act, `plugin_adapter.py` guards what comes from outside;
+`flying.py` flies, `recorder.py` and `telemetry.py` keep what was, `flight_trim.py` reads from it what ballast is
+lacking, `photography.py` renders what the camera saw, `background_renderer.py` while the flight goes on, `guide.py`
+begins the guide of what photographs have seen.
 
 By hand (`teleop/`): what an operator asks for, and flights that go on until somebody ends them. What was lies in the
 parts of `flight_log.py` until it is a trial's folder (`trial_folder.py`, `exposures.py`). With a real vehicle
@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 from wakewise.core.lazy_imports import lazy_door
 
 if TYPE_CHECKING:
-    from wakewise.operation.darkroom import Darkroom
+    from wakewise.operation.background_renderer import Darkroom
     from wakewise.operation.exposures import read_exposures
     from wakewise.operation.flying import Flight, fly, fly_trial
     from wakewise.operation.parts import PARTS, Parts

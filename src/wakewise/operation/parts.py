@@ -18,13 +18,13 @@ from wakewise.core.checks import able, instance_of, quoted
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import BodyState, Controller, Estimator, Pilot, WakeModel, World
 from wakewise.estimation import ErrorStateFilter
-from wakewise.operation.foreign import described, from_outside, guarded
+from wakewise.operation.calibration_error import found_target, surveyed_current
+from wakewise.operation.known_obstacles import surroundings_of, tank_bounds
 from wakewise.operation.pilot_makers import make_pilot
+from wakewise.operation.plugin_adapter import described, from_outside, guarded
 from wakewise.operation.preflight import Preflight, preflight
 from wakewise.operation.regions import region_of
 from wakewise.operation.seeds import Seeds
-from wakewise.operation.surroundings import surroundings_of, tank_bounds
-from wakewise.operation.survey import found_target, surveyed_current
 from wakewise.operation.worlds.makers import make_world
 from wakewise.planning import Surroundings
 from wakewise.robot.importers import any_vehicle
@@ -33,7 +33,7 @@ from wakewise.robot.vehicles.ballast import with_blocks
 from wakewise.scene.missions import CameraAim, Route, TankBounds, aim_of, plan_route
 from wakewise.scene.targets import Region, Sway, Target, find_target
 from wakewise.simulation.tank import build_ambient
-from wakewise.simulation.tank.swaying import DRAG, Loose, Yielding
+from wakewise.simulation.tank.soft_body import DRAG, Loose, Yielding
 from wakewise.wake import wake_model
 
 if TYPE_CHECKING:

@@ -19,10 +19,10 @@ from wakewise.core.arrays import Array
 from wakewise.core.files import whole_file, write_text
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import no_progress
+from wakewise.operation.calibration_error import known_calibration
 from wakewise.operation.exposures import ExposureRecord, read_exposures
 from wakewise.operation.parts import Parts
 from wakewise.operation.scenario import Scenario
-from wakewise.operation.survey import known_calibration
 from wakewise.scene.targets import turned_normals
 from wakewise.vision.imaging import Scene, SiltOptics, calibrate, photograph
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Pilot
 from wakewise.core.plugins import find
-from wakewise.operation.teleop.helm import HumanPilot
+from wakewise.operation.teleop.human_pilot import HumanPilot
 from wakewise.operation.teleop.input.sources import hands_from
 from wakewise.scene.missions import RoutePilot
 
@@ -42,7 +42,7 @@ def operator_pilot(parts: Parts) -> Pilot:
         If the scenario names no such file: a person's own hands no scenario can hold.
     """
     from wakewise.operation.teleop.assisted import assisted_pilot
-    from wakewise.operation.teleop.desk import Desk
+    from wakewise.operation.teleop.operator_state import Desk
 
     if parts.scenario.controls is None:
         raise InputError("pilot: operator, flies by hand: take `wakewise cockpit`, or name a record in controls")
@@ -52,8 +52,8 @@ def operator_pilot(parts: Parts) -> Pilot:
 def assisted_person(parts: Parts) -> Pilot:
     """`assisted`: the person of `human` at the desk's sticks, camera kept on the target, brakes and all."""
     from wakewise.operation.teleop.assisted import assisted_pilot
-    from wakewise.operation.teleop.desk import Desk, DeskState
-    from wakewise.operation.teleop.hands import PersonsHands
+    from wakewise.operation.teleop.operator_state import Desk, DeskState
+    from wakewise.operation.teleop.simulated_operator import PersonsHands
 
     hands = PersonsHands(
         wish=route_pilot(parts),

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wakewise.core.errors import InputError
-from wakewise.operation.surroundings import surroundings_of
-from wakewise.operation.switches import idle_switches
+from wakewise.operation.known_obstacles import surroundings_of
+from wakewise.operation.setting_checks import idle_switches
 from wakewise.planning import check_start, state_of
 from wakewise.robot.vehicles import possible_drags, with_drag
 from wakewise.scene.missions import check_clearance, check_tilt
 from wakewise.simulation.tank import Holding, holding, tank_ambient
-from wakewise.simulation.tank.preflight import check_fit
-from wakewise.simulation.tank.swaying import check_loose, check_sway
+from wakewise.simulation.tank.soft_body import check_loose, check_sway
+from wakewise.simulation.tank.station_keeping import check_fit
 
 if TYPE_CHECKING:
     from wakewise.operation.parts import Parts
@@ -83,7 +83,7 @@ def check_target(parts: Parts, looks: int = 200) -> None:
     Raises
     ------
     InputError
-        See `wakewise.simulation.tank.swaying.check_sway` and `check_loose`.
+        See `wakewise.simulation.tank.soft_body.check_sway` and `check_loose`.
     """
     yielding, tank, target = parts.yielding, parts.scenario.tank, parts.target
     if yielding is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-_EVIDENCE = "gone, gained nothing (docs/decisions/0014)"
+_EVIDENCE = "gone, gained nothing (docs/research-log/0014)"
 _CONSTANT = "gone, a constant now"
 
 
@@ -110,10 +110,10 @@ GONE: Mapping[str, str] = {
     "tank.background_length_m": f"{_CONSTANT} (wakewise.simulation.tank.settings)",
     **dict.fromkeys((f"control.levers.{name}" for name in ("quiet", "quiet_gain", "quiet_lead_s")), _EVIDENCE),
     **dict.fromkeys((f"control.plan.{name}" for name in ("quiet_gain", "travel", "persistence")), _EVIDENCE),
-    "control.levers.level_deg": "gone, 4 % for a camera 30 mm off its place (docs/decisions/0014)",
+    "control.levers.level_deg": "gone, 4 % for a camera 30 mm off its place (docs/research-log/0014)",
     **dict.fromkeys(
         (f"control.levers.{name}" for name in ("halo", "halo_points", "halo_m", "halo_weight")),
-        "gone, drift does the same better (docs/decisions/0014)",
+        "gone, drift does the same better (docs/research-log/0014)",
     ),
     **dict.fromkeys(
         (f"control.levers.bed_{name}" for name in ("points", "radius_m", "weight")),
@@ -121,7 +121,7 @@ GONE: Mapping[str, str] = {
     ),
     **dict.fromkeys(
         (f"control.levers.drift_{name}" for name in ("s", "spread_m_s", "points", "weight")),
-        "gone, jets follow the current themselves (wakewise.wake.carried)",
+        "gone, jets follow the current themselves (wakewise.wake.advected_jets)",
     ),
     "control.w_previous": "gone, five times w_effort by argument (wakewise.control.settings)",
     **dict.fromkeys(

@@ -18,10 +18,10 @@ from wakewise.core.plugins import names
 from wakewise.core.safe_yaml import YamlError, read_yaml, text_of
 from wakewise.core.settings import Seed, Settings, describe_faults, guess
 from wakewise.estimation import FilterSettings
-from wakewise.operation.draws import Draw, values_of
+from wakewise.operation.calibration_error import SurveySettings
 from wakewise.operation.pilot_makers import PILOTS
+from wakewise.operation.randomization import Draw, values_of
 from wakewise.operation.renamed import became
-from wakewise.operation.survey import SurveySettings
 from wakewise.operation.target_settings import TargetSettings
 from wakewise.operation.worlds.library import load_world, own_file, world_names
 from wakewise.operation.worlds.makers import WORLDS

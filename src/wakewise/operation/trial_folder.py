@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.core.files import write_text
 from wakewise.core.geometry import Pose
-from wakewise.operation.foreign import is_ours
 from wakewise.operation.photography import photo_name
+from wakewise.operation.plugin_adapter import is_ours
 from wakewise.operation.scenario import Scenario, differences, read_scenario, write_scenario
 from wakewise.scene.targets import write_mesh
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 
 ROUNDED = 0.05
 """Sine of the tilt within which the corner nearest to a plane changes: |c| is rounded to sqrt(c^2 + 0.05^2), which

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import assign, njit
+from wakewise.core.jit.njit import assign, njit
 from wakewise.planning.kernels import RATE_N, RHO, W_CHANGE, W_EFFORT, W_TWIST
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}

@@ -27,7 +27,7 @@ USABLE_SHARE = 0.5
 """Share of the horizon up to which an old plan may be flown on."""
 SPIN_RAD_S = 2.0
 """A plan that turns the vehicle faster is none: no mission or hand asks for more than 1 rad/s, stages of a tenth of a
-second do not follow it, and a plan that has begun to spin is the start of the next one (docs/decisions/0078)."""
+second do not follow it, and a plan that has begun to spin is the start of the next one (docs/research-log/0078)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from wakewise.planning.kernels import PlanWork
 from wakewise.planning.problem import SMOOTH_N, PlanTerms
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Region
-from wakewise.wake.numeric import NumericWake, thinned
+from wakewise.wake.finite_difference import NumericWake, thinned
 
 
 def numeric_wake(wake: WakeModel, region: Region, vehicle: Vehicle, terms: PlanTerms) -> NumericWake:

@@ -21,7 +21,7 @@ import numpy as np
 import piqp
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}
 MANY_ACTIVE = 60

@@ -11,7 +11,7 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import Goal
-from wakewise.core.jit.compiled import assign, njit
+from wakewise.core.jit.njit import assign, njit
 
 RAMP_S = 0.5
 """How long a change of speed goes on, on average, once it is seen: half of the second that an operator (0.1 m/s at

@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 
 from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.errors import InputError
-from wakewise.wake.families import Family
+from wakewise.wake.fit_parameters import Family
 from wakewise.wake.samples import JetRegion, JetSamples
 from wakewise.wake.scores import Scores, score
 

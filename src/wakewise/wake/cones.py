@@ -14,8 +14,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.errors import InputError
-from wakewise.core.physics import FRESH_WATER_KG_M3
 from wakewise.wake import kernels
 from wakewise.wake.jets import AxialJet, Law, check_ranges
 

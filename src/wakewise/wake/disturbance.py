@@ -10,10 +10,10 @@ sideways.
 
 Astray: nobody knows where the jets go, only about where they were sent. A jet lives for seconds, in water that has
 gusts, a bed, a hull and other jets in it, so what it does to the target is known less surely than its law: of single
-pushes sent beside a target the belief has the order right to .73 (docs/decisions/0048). Here its direction is scattered
-about the way it was sent as by von Mises and Fisher, f(theta) = kappa exp(kappa cos theta) / (4 pi sinh kappa), and the
-speed that is met at a distance r off the disk is that of its section there, U(r) exp(-(r theta')^2 / w(r)^2) with w the
-width. Of a jet narrower than the scatter the mean square of the speed at an angle theta is then
+pushes sent beside a target the belief has the order right to .73 (docs/research-log/0048). Here its direction is
+scattered about the way it was sent as by von Mises and Fisher, f(theta) = kappa exp(kappa cos theta) / (4 pi sinh
+kappa), and the speed that is met at a distance r off the disk is that of its section there, U(r) exp(-(r theta')^2 /
+w(r)^2) with w the width. Of a jet narrower than the scatter the mean square of the speed at an angle theta is then
 
     U(r)^2 (pi / 2) (w(r) / r)^2 f(theta).
 
@@ -30,17 +30,17 @@ from wakewise.core.arrays import Array, frozen
 from wakewise.core.checks import one_of, quoted
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import WakeModel
-from wakewise.core.jit.compiled import njit
-from wakewise.wake.beds import free_jet
-from wakewise.wake.carried import Flow, plumes
-from wakewise.wake.checks import explain, same_sizes
-from wakewise.wake.floor import FloorJet
-from wakewise.wake.floor_carried import add_carried_walls
-from wakewise.wake.floor_sums import floor_gram_sum
-from wakewise.wake.gradients import SUPERPOSITIONS, Superposition
+from wakewise.core.jit.njit import njit
+from wakewise.wake.advected_jets import Flow, plumes
+from wakewise.wake.advected_wall_jet import add_carried_walls
+from wakewise.wake.bed_depth import free_jet
+from wakewise.wake.disturbance_derivatives import SUPERPOSITIONS, Superposition
+from wakewise.wake.gram import FAST, dot, gram_sum
+from wakewise.wake.input_checks import explain, same_sizes
 from wakewise.wake.jets import AxialJet
 from wakewise.wake.kernels import as_tuple, own_constants, section_of
-from wakewise.wake.sums import FAST, dot, gram_sum
+from wakewise.wake.wall_jet import FloorJet
+from wakewise.wake.wall_jet_gram import floor_gram_sum
 
 SCATTER_RAD = float(np.radians(45.0))
 """Root mean square of the angle between where a jet was sent and where it goes, taken small: kappa = 2 / angle^2."""

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wakewise.core.arrays import Array
+from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.errors import InputError
-from wakewise.core.physics import FRESH_WATER_KG_M3
 from wakewise.wake import kernels
 
 
@@ -128,7 +128,7 @@ class RoundJet(AxialJet):
     it is the Gaussian self-similar jet with U_c = 6.9 sqrt(T / rho) / x. The power 6 of the passage between the two is
     a choice of smoothing, not a measured constant: it leaves 99 % of the exit speed at 4 D and 90 % at 6 D, and meets
     the decay law within 1 % at 10 D. The water is still upstream of the disk; the slow inflow towards the jet's sides
-    is left out, and so are walls (see `wakewise.wake.floor`) and the time a jet needs to
+    is left out, and so are walls (see `wakewise.wake.wall_jet`) and the time a jet needs to
     arrive.
 
     Parameters

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}
 PRINTED_CONE, POWER_CONE, ROUND_JET = 0, 1, 2

@@ -14,11 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.core.arrays import Array
+from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
-from wakewise.core.physics import FRESH_WATER_KG_M3
-from wakewise.core.sizes import check_arrays
-from wakewise.wake.floor import WALL_SPEED, wall_velocity
+from wakewise.core.size_limits import check_arrays
 from wakewise.wake.network import (
     EDGES,
     FARTHEST_D,
@@ -28,6 +27,7 @@ from wakewise.wake.network import (
     history_bins,
     remembered,
 )
+from wakewise.wake.wall_jet import WALL_SPEED, wall_velocity
 
 CIRCULAR = "circular to a degree: trained on draws of the tank's own water"
 """To be printed wherever it is judged in the tank."""
@@ -45,7 +45,7 @@ class LearnedWake:
     ----------
     network : Network
     bed_z_m : float or None
-        Depth of a bed along which jets run out as in `wakewise.wake.floor`; None for free jets alone.
+        Depth of a bed along which jets run out as in `wakewise.wake.wall_jet`; None for free jets alone.
     water_density_kg_m3 : float
     """
 

@@ -31,9 +31,9 @@ from wakewise.core.interfaces import WakeModel
 from wakewise.core.plugins import find, names, offered
 from wakewise.core.settings import Settings
 from wakewise.wake.cones import PaperJet, PowerJet
-from wakewise.wake.floor import FloorJet
 from wakewise.wake.jets import AxialJet, GaussianJet, RoundJet
 from wakewise.wake.learned import learned_wake
+from wakewise.wake.wall_jet import FloorJet
 
 ModelName = Literal["paper", "paper-calibrated", "fitted", "linear", "jet", "jet-fitted"]
 """Our own models."""

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from wakewise.core.arrays import Array
+from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.errors import InputError
-from wakewise.core.physics import FRESH_WATER_KG_M3
 from wakewise.wake.calibration import calibrated_values
-from wakewise.wake.families import family
+from wakewise.wake.fit_parameters import family
 from wakewise.wake.jets import AxialJet
 from wakewise.wake.samples import JetSamples
 

@@ -1,9 +1,9 @@
 """Compiled: D of one stage with its gradient and its Gauss-Newton matrix, in the vehicle's own axes.
 
-The same figures as `wakewise.wake.gradients.gauss_newton`, which is this module's twin in the tests, made for a planner
-that asks twenty times per plan: points as rows of coordinates, the paper's cone without branches, jets that miss the
-region left out before anything is computed, and no sum that is known to be zero. |v|^2 does not depend on the axes
-it is expressed in, so everything is done in B; only the slopes by position are turned to W at the end.
+The same figures as `wakewise.wake.disturbance_derivatives.gauss_newton`, which is this module's twin in the tests, made
+for a planner that asks twenty times per plan: points as rows of coordinates, the paper's cone without branches, jets
+that miss the region left out before anything is computed, and no sum that is known to be zero. |v|^2 does not depend on
+the axes it is expressed in, so everything is done in B; only the slopes by position are turned to W at the end.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import assign, njit
-from wakewise.wake.floor_sums import floor_stage_sum
+from wakewise.core.jit.njit import assign, njit
 from wakewise.wake.kernels import FAST, ROUND_JET, as_tuple, fill_cored_jet, speed_and_slope
-from wakewise.wake.stage import smooth_root
-from wakewise.wake.table import PLAIN_CONE
+from wakewise.wake.packed_model import PLAIN_CONE
+from wakewise.wake.stage_cost import smooth_root
+from wakewise.wake.wall_jet_gram import floor_stage_sum
 
 
 class WakeScratch(NamedTuple):

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.core.arrays import Array, BoolArray, IntArray
+from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
-from wakewise.core.physics import GRAVITY_M_S2
 from wakewise.core.safe_yaml import YamlError, text_of
 
 COLUMNS: dict[str, str] = {

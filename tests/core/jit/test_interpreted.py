@@ -14,14 +14,14 @@ import pytest
 import wakewise
 from wakewise.allocation import Weights, gentle_allocation, least_thrusts
 from wakewise.control.loop import vehicle_layout
-from wakewise.core.jit.cache_folder import is_interpreted
+from wakewise.core.jit.cache_dir import is_interpreted
 from wakewise.robot.vehicles import compile_body, load_vehicle, step_rk4
 
 ROOT = Path(wakewise.__file__).parent
 USERS = sorted(
     ".".join(("wakewise", *path.relative_to(ROOT).with_suffix("").parts)).removesuffix(".__init__")
     for path in ROOT.rglob("*.py")
-    if "from wakewise.core.jit.compiled import" in path.read_text(encoding="utf-8")
+    if "from wakewise.core.jit.njit import" in path.read_text(encoding="utf-8")
 )
 
 
@@ -53,10 +53,10 @@ def trace(frame, event, _):
     lines.add((pathlib.Path(path).name, frame.f_code.co_name))
     return trace
 from test_interpreted import answers
-from wakewise.core.jit.compiled import COMPILED
+from wakewise.core.jit.njit import COMPILED
 from wakewise.core.jit.precompile import Warmed, is_warm, warm
 import numpy as np
-from wakewise.simulation.lattice.memory import copy_line, peek, poke, settle_stores, stream_line
+from wakewise.simulation.lattice.streaming_stores import copy_line, peek, poke, settle_stores, stream_line
 assert not COMPILED and is_warm() and warm().kernels == 0
 a, b = np.zeros(32, np.float32), np.arange(32, dtype=np.float32)
 poke(a, 0, np.float32(7.0)), copy_line(a, 16, b, 8), stream_line(a, 0, b, 16), settle_stores()

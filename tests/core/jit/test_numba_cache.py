@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from wakewise.core.jit.cache_folder import VARIABLE, can_be_written, keep_kernels, needs_folder, private_folder
+from wakewise.core.jit.cache_dir import VARIABLE, can_be_written, keep_kernels, needs_folder, private_folder
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def test_a_user_who_cannot_read_the_home_imports_and_runs(tmp_path: Path) -> Non
     home.mkdir(mode=0o700)
     tmp.mkdir()
     tmp.chmod(0o777)
-    code = "import wakewise.allocation, wakewise.core.jit.cache_folder as c; print(c.CHOSEN)"
+    code = "import wakewise.allocation, wakewise.core.jit.cache_dir as c; print(c.CHOSEN)"
     words = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", sys.executable, "-c", code]
     environment = os.environ | {"HOME": str(home), "TMPDIR": str(tmp), "PYTHONPATH": str(source)}
     for name in (VARIABLE, "XDG_CACHE_HOME"):
@@ -95,7 +95,7 @@ def test_numba_is_told(package: Path, tmp_path: Path, monkeypatch: pytest.Monkey
     import numba
 
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    monkeypatch.setattr("wakewise.core.jit.cache_folder.can_be_written", lambda _: False)
+    monkeypatch.setattr("wakewise.core.jit.cache_dir.can_be_written", lambda _: False)
     monkeypatch.setattr(numba.config, "CACHE_DIR", "")
     environment = {"HOME": "/home/me"}
     folder = keep_kernels(package, environment)

@@ -12,9 +12,9 @@ import pytest
 from numba import types
 from numba.core.caching import NullCache
 
-from wakewise.core.jit import kernels
-from wakewise.core.jit.compiled import assign, njit
-from wakewise.core.jit.kernels import PACKAGE, _alone, imported, type_from, type_of
+from wakewise.core.jit import kernel_cache
+from wakewise.core.jit.kernel_cache import PACKAGE, _alone, imported, type_from, type_of
+from wakewise.core.jit.njit import assign, njit
 
 
 class Pair(NamedTuple):
@@ -71,11 +71,11 @@ def small_package(tmp_path: Path) -> Path:
         shutil.copy(PACKAGE / door, folder)
     (folder / "constants.py").write_text("STEP = 1.0\n")
     (folder / "callee.py").write_text(
-        "from wakewise.core.jit.compiled import njit\n"
+        "from wakewise.core.jit.njit import njit\n"
         "from wakewise.constants import STEP\n@njit\ndef f():\n    return STEP\n"
     )
     (folder / "caller.py").write_text(
-        "from wakewise.core.jit.compiled import njit\n"
+        "from wakewise.core.jit.njit import njit\n"
         "from wakewise.callee import (\n    f,\n)\n"
         "@njit\ndef g():\n    return 10.0 * f()\n"
     )
@@ -116,7 +116,7 @@ def test_a_kernel_apart_is_brought_along_through_one_that_was_read_from_disk(sma
     callee = small_package / "callee.py"
     callee.write_text(callee.read_text().replace("@njit", "@njit(apart=True)"))
     (small_package / "above.py").write_text(
-        "from wakewise.core.jit.compiled import njit\n"
+        "from wakewise.core.jit.njit import njit\n"
         "from wakewise.caller import g\n@njit\ndef h():\n    return 2.0 * g()\n"
     )
     assert _run(small_package) == ["10.0", "0"]
@@ -194,5 +194,5 @@ def test_one_at_a_time_keeps_kernels_in_a_folder(tmp_path: Path) -> None:
 
 def test_the_cache_knows_the_places_of_numba() -> None:
     """A folder that was given, beside the source, the user's; in this order, as Numba has it."""
-    kinds = [kind.__bases__[1].__name__ for kind in kernels._Impl._locator_classes]
+    kinds = [kind.__bases__[1].__name__ for kind in kernel_cache._Impl._locator_classes]
     assert kinds == ["UserProvidedCacheLocator", "InTreeCacheLocator", "UserWideCacheLocator"]

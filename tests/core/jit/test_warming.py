@@ -45,7 +45,7 @@ def test_once_warm_a_flight_compiles_nothing() -> None:
 
 def test_what_cannot_be_compiled_is_told_and_holds_nothing_up(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
     """A kernel that is not there gives a line, now and whenever somebody asks; it is not tried again."""
-    wrong = Listed(name="wakewise.core.jit.compiled.nothing", types=("float64",), job="more", cost_s=1.0)
+    wrong = Listed(name="wakewise.core.jit.njit.nothing", types=("float64",), job="more", cost_s=1.0)
     monkeypatch.setattr(precompile, "listed", lambda: (wrong,))
     monkeypatch.setattr(precompile, "_made_from", lambda job: "0")
     monkeypatch.setattr(precompile, "_tried", set())

@@ -18,8 +18,8 @@ import pytest
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.core.run_lock import is_running
 from wakewise.experiments.campaigns import Processes, cluster, run
-from wakewise.experiments.campaigns.claims import holder_of
 from wakewise.experiments.campaigns.store import open_store
+from wakewise.experiments.campaigns.trial_lock import holder_of
 
 pytest.importorskip("distributed")
 from wakewise.experiments.campaigns.cluster import Dask

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from wakewise.experiments.campaigns import attempts
+from wakewise.experiments.campaigns import attempt_log
 from wakewise.experiments.campaigns.index import INDEX, listing
 from wakewise.experiments.campaigns.store import FIGURES, Store, open_store, write_figures
 
@@ -25,7 +25,7 @@ def _folder(tmp_path: Path, count: int) -> Store:
         elif number % 7:
             lines.append('{"event": "ended", "how": "done", "reason": null, "took_s": 1}')
             (place / FIGURES).write_text(json.dumps({"figures": {"a": number, "b": "word"}, "took_s": 1.0}))
-        (place / attempts.ATTEMPTS).write_text("\n".join(lines) + "\n")
+        (place / attempt_log.ATTEMPTS).write_text("\n".join(lines) + "\n")
     return store
 
 

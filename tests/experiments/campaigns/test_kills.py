@@ -19,10 +19,10 @@ import pytest
 from wakewise.core.errors import EnvironmentFailure
 from wakewise.core.run_lock import is_running
 from wakewise.experiments.campaigns import Processes, Task, run
-from wakewise.experiments.campaigns.attempts import read_attempts
-from wakewise.experiments.campaigns.claims import holder_of
+from wakewise.experiments.campaigns.attempt_log import read_attempts
 from wakewise.experiments.campaigns.index import listing
 from wakewise.experiments.campaigns.store import FIGURES, Store, open_store
+from wakewise.experiments.campaigns.trial_lock import holder_of
 
 KILLS = 20
 

@@ -15,7 +15,7 @@ import pytest
 
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.experiments.campaigns import Processes, Task, run
-from wakewise.experiments.campaigns.attempts import read_attempts
+from wakewise.experiments.campaigns.attempt_log import read_attempts
 from wakewise.experiments.campaigns.store import open_store
 
 

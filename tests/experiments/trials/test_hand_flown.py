@@ -10,8 +10,8 @@ from wakewise.core.errors import InputError, StageError
 from wakewise.experiments.trials import run_trial
 from wakewise.operation import LiveFlight, load_scenario, read_scenario
 from wakewise.operation.teleop.assisted import assisted
-from wakewise.operation.teleop.desk import Desk
 from wakewise.operation.teleop.input.script import script_of
+from wakewise.operation.teleop.operator_state import Desk
 
 SCENARIO = load_scenario("quick", None, {"method": "dp", "imaging.width": 320, "imaging.height": 240})
 

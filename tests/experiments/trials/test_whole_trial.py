@@ -19,7 +19,7 @@ from wakewise.core.run_lock import alone
 from wakewise.experiments.trials import run_trial
 from wakewise.operation import Parts, Scenario, fly, load_scenario
 from wakewise.operation.worlds.makers import tank_world, true_start, true_vehicle
-from wakewise.operation.worlds.wake_world import InstantWater, jets_of
+from wakewise.operation.worlds.quasi_steady_world import InstantWater, jets_of
 from wakewise.ui.reports import write_report
 from wakewise.wake import point_disturbance
 

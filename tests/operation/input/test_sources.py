@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from wakewise.core.errors import InputError
+from wakewise.operation.teleop.input.control_log import Trace
 from wakewise.operation.teleop.input.script import Script
 from wakewise.operation.teleop.input.sources import hands_from
-from wakewise.operation.teleop.input.trace import Trace
 
 
 def test_the_ending_says_how_a_file_is_read(tmp_path):

@@ -9,11 +9,11 @@ import pytest
 from wakewise.core.geometry import Pose, quat_conjugate, quat_multiply, rotvec_from_quat
 from wakewise.core.interfaces import BodyState
 from wakewise.operation import Scenario
+from wakewise.operation.teleop.arbitration import BRAKING_M_S2
 from wakewise.operation.teleop.assisted import assisted_pilot
-from wakewise.operation.teleop.desk import Desk, DeskState
 from wakewise.operation.teleop.input import CENTRED, Controls
-from wakewise.operation.teleop.scanning import PACE_S
-from wakewise.operation.teleop.steering import BRAKING_M_S2
+from wakewise.operation.teleop.operator_state import Desk, DeskState
+from wakewise.operation.teleop.resumable_mission import PACE_S
 from wakewise.planning.barrier import least_gap
 from wakewise.planning.problem import CLEARANCE_M
 from wakewise.scene.missions import RoutePilot

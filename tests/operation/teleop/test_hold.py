@@ -5,8 +5,8 @@ import pytest
 
 from wakewise.operation import Scenario, fly
 from wakewise.operation.teleop.assisted import assisted
-from wakewise.operation.teleop.desk import Desk, DeskState
 from wakewise.operation.teleop.input.script import script_of
+from wakewise.operation.teleop.operator_state import Desk, DeskState
 
 OVERSHOOT_M = 0.1
 GO_S, LET_GO_S, END_S = 1.0, 3.1, 5.6

@@ -10,8 +10,8 @@ from wakewise.core.interfaces import Witness
 from wakewise.operation import LiveFlight, load_scenario, read_scenario
 from wakewise.operation.loop import Step
 from wakewise.operation.teleop.assisted import assisted
-from wakewise.operation.teleop.desk import Desk, DeskState
 from wakewise.operation.teleop.input.script import script_of
+from wakewise.operation.teleop.operator_state import Desk, DeskState
 from wakewise.operation.teleop.replay import replay_of
 
 SCENARIO = load_scenario("quick", None, {"world": "tank", "method": "dp"})

@@ -11,7 +11,7 @@ from hypothesis.extra import numpy as nps
 
 from wakewise.core.errors import InputError
 from wakewise.robot.importers import import_vehicle, read_matrix
-from wakewise.robot.importers.found import to_frd, wrench_rows_to_frd
+from wakewise.robot.importers.parsed_vehicle import to_frd, wrench_rows_to_frd
 from wakewise.robot.vehicles import VehicleDraft
 
 SIX = nps.arrays(np.float64, (6, 6), elements=st.floats(-10, 10))

@@ -12,7 +12,7 @@ from test_importers_bad_input import WHOLE
 
 from wakewise.core.errors import InputError
 from wakewise.robot.importers import import_vehicle
-from wakewise.robot.importers.plausible import UNIT_SLACK
+from wakewise.robot.importers.thruster_checks import UNIT_SLACK
 from wakewise.robot.vehicles import check_report
 from wakewise.robot.vehicles.draft import MAX_THRUSTERS
 

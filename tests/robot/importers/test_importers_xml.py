@@ -6,8 +6,8 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.robot.importers import import_vehicle
+from wakewise.robot.importers.safe_yaml_nodes import parse_yaml
 from wakewise.robot.importers.xml import MAX_BYTES, parse_xml, read_text
-from wakewise.robot.importers.yamls import parse_yaml
 
 
 def refused(path: Path, text: str | bytes, match: str) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise.simulation.lattice import Case, DiskJet, LatticeRun, case_hash, find_case
-from wakewise.simulation.lattice.bodies import Bodies, solid_cells
+from wakewise.simulation.lattice.bounce_back import Bodies, solid_cells
 from wakewise.simulation.lattice.engines import make_engine
 from wakewise.simulation.lattice.run import Disk
 from wakewise.simulation.lattice.stencil import OPPOSITE, VELOCITIES, WALL, WEIGHTS, box, still_water

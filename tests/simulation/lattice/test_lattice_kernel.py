@@ -8,6 +8,7 @@ import pytest
 
 from wakewise.simulation.lattice.cases import Case, DiskJet
 from wakewise.simulation.lattice.kernel import push, step, velocity, wrap
+from wakewise.simulation.lattice.reference_step import equilibrium, twin_step
 from wakewise.simulation.lattice.run import LatticeRun
 from wakewise.simulation.lattice.stencil import (
     OPEN,
@@ -21,7 +22,6 @@ from wakewise.simulation.lattice.stencil import (
     smagorinsky_factor,
     still_water,
 )
-from wakewise.simulation.lattice.twin import equilibrium, twin_step
 
 EDDIES = smagorinsky_factor(0.12)
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from wakewise.scene.targets import Mesh, Target, coral, place_on_bed
 from wakewise.simulation.lattice import find_case
-from wakewise.simulation.lattice.past_box import load_past_box, momentum, past_figures
+from wakewise.simulation.lattice.deflected_jet import load_past_box, momentum, past_figures
 from wakewise.simulation.water.blockage import Blockage, _surface
-from wakewise.simulation.water.closure import Spreading
+from wakewise.simulation.water.round_jet_closure import Spreading
 from wakewise.simulation.water.water import Water
 
 D_M = 0.06

@@ -6,8 +6,8 @@ import pytest
 from wakewise.core.interfaces import ScalarGrid
 from wakewise.scene.targets import Mesh, place_on_bed
 from wakewise.simulation.tank.grains import beam_attenuation_per_m, friction_velocity_m_s
-from wakewise.simulation.tank.measuring import FRAME_S, TargetProbes, concentration_at, tracer_speeds_m_s
 from wakewise.simulation.tank.sediment import SHEAR_HEIGHT_M, SiltLaws
+from wakewise.simulation.tank.water_truth import FRAME_S, TargetProbes, concentration_at, tracer_speeds_m_s
 
 PYRAMID = place_on_bed(
     "pyramid",

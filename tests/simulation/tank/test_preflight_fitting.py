@@ -7,7 +7,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.simulation.tank import TankSettings
-from wakewise.simulation.tank.preflight import check_fit
+from wakewise.simulation.tank.station_keeping import check_fit
 
 VEHICLE = load_vehicle("paper")
 ROUTE = [(0.0, Pose(np.array([0.0, 0.0, 1.0]))), (60.0, Pose(np.array([1.0, 0.0, 1.0])))]

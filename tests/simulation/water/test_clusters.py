@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wakewise.simulation.water import chunks
+from wakewise.simulation.water import blocked_sums
 from wakewise.simulation.water.clusters import ImpulseField
 from wakewise.simulation.water.faces import Room
 from wakewise.simulation.water.induction import impulse_velocity
@@ -46,10 +46,10 @@ def test_threads_do_not_change_a_byte(monkeypatch):
     sources = _jets()
     points = np.random.default_rng(1).uniform([-1, -1, 0.5], [1, 1, 1.5], (3000, 3))
     field = ImpulseField.of(*sources)
-    monkeypatch.setattr(chunks, "_THREADED_PAIRS", 10**12)
+    monkeypatch.setattr(blocked_sums, "_THREADED_PAIRS", 10**12)
     alone = field.velocity(points)
-    monkeypatch.setattr(chunks, "_THREADED_PAIRS", 1)
-    monkeypatch.setattr(chunks, "cores", lambda: 4)
+    monkeypatch.setattr(blocked_sums, "_THREADED_PAIRS", 1)
+    monkeypatch.setattr(blocked_sums, "cores", lambda: 4)
     assert field.velocity(points).tobytes() == alone.tobytes()
 
 

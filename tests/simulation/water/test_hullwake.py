@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from wakewise.simulation.water.closure import FIRST_D
 from wakewise.simulation.water.hullwake import HullPush, HullWake, first_wake, frontal_area_m2, lee_m
+from wakewise.simulation.water.round_jet_closure import FIRST_D
 from wakewise.simulation.water.water import Water
 
 DENSITY = 1000.0

@@ -9,7 +9,7 @@ import math
 import numpy as np
 import pytest
 
-from wakewise.simulation.water.closure import SWIRLING
+from wakewise.simulation.water.round_jet_closure import SWIRLING
 from wakewise.simulation.water.water import Water
 
 D_M = 0.06

@@ -1,8 +1,8 @@
 """What the parcels' water does where it misses a law or the lattice: pinned, so that no change passes unseen.
 
 These are regressions, not laws: their bounds are what was measured. How far each is from what should be is told in
-`wakewise.simulation.tank.limits`. Lattice figures: case `head-on` (seed 0, averaged from 40 to 100 D/U0), November
-2026.
+`wakewise.simulation.tank.validation_limits`. Lattice figures: case `head-on` (seed 0, averaged from 40 to 100 D/U0),
+November 2026.
 """
 
 import math

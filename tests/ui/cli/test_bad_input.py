@@ -135,7 +135,7 @@ def test_what_holds_no_model_is_refused_in_words(name: str, data: bytes, as_mode
 
 def test_points_in_ascii_that_are_all_there_are_read(capsys: Capsys) -> None:
     """A whole ASCII file is no broken promise, blank lines, comments and faces included."""
-    from wakewise.core.sizes import broken_ply
+    from wakewise.core.size_limits import broken_ply
 
     Path("whole.ply").write_text(CUT.format(2) + "0 0 0\n\n0 0 1\n")
     Path("other.txt").write_text("nothing of the kind\n")

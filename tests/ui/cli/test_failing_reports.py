@@ -130,7 +130,7 @@ def test_a_look_at_photographs_keeps_its_words(tmp_path, capsys, monkeypatch):
     noise = np.random.default_rng(0).integers(0, 255, (120, 160, 3), dtype=np.uint8)
     for k in range(3):
         cv2.imwrite(str(photos / f"{k}.png"), cv2.GaussianBlur(np.roll(noise, 9 * k, axis=1), (0, 0), 1.0))
-    monkeypatch.setattr("wakewise.ui.reports.look.look_page", broken)
+    monkeypatch.setattr("wakewise.ui.reports.photo_preview.look_page", broken)
     assert run(["reconstruct", str(photos), "--look", "--out", str(tmp_path / "out")]) == 0
     told = capsys.readouterr()
     assert "report could not be written: TypeError" in told.err

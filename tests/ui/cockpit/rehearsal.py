@@ -18,10 +18,10 @@ import cv2
 import numpy as np
 
 from wakewise.core.errors import InputError
-from wakewise.ui.cockpit.extras import PAGE
-from wakewise.ui.cockpit.seat import Seat
+from wakewise.ui.cockpit.control_mailbox import Seat
+from wakewise.ui.cockpit.ground_station_listing import PAGE
 from wakewise.ui.cockpit.server import Server
-from wakewise.ui.cockpit.show import Note, Picture
+from wakewise.ui.cockpit.view_model import Note, Picture
 from wakewise.ui.web.files import Files
 
 _THRUSTERS = 8

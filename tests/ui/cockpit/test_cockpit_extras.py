@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from rehearsal import Rehearsal
 
-from wakewise.ui.cockpit.extras import OFFER, page_files
+from wakewise.ui.cockpit.ground_station_listing import OFFER, page_files
 from wakewise.ui.cockpit.server import Server
 
 # Required and optional keys of each object, as Cockpit's "External Integrations" lists them.

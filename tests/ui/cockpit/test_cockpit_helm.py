@@ -7,7 +7,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from wakewise.ui.cockpit.helm import FORGET_S, LAPSE_S, STALE_S, Helm
+from wakewise.ui.cockpit.control_lease import FORGET_S, LAPSE_S, STALE_S, Helm
 
 FULL = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
 CLIENTS = st.sampled_from(["a", "b", "c"])

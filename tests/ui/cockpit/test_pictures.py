@@ -8,7 +8,7 @@ from typing import Any, cast
 
 from wakewise.ui.cockpit.client import SEEN_WITHIN_S, Client
 from wakewise.ui.cockpit.pictures import OLD_S, show_pictures
-from wakewise.ui.cockpit.show import Picture, Show
+from wakewise.ui.cockpit.view_model import Picture, Show
 
 
 class Drawn:

@@ -20,7 +20,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from wakewise.core.errors import InputError
 from wakewise.ui.cockpit import server as server_module
-from wakewise.ui.cockpit.seat import Seat
+from wakewise.ui.cockpit.control_mailbox import Seat
 from wakewise.ui.cockpit.server import Server
 
 

@@ -28,10 +28,10 @@ from wakewise.robot.vehicles import load_vehicle, vehicle_names
 from wakewise.simulation.water import Water
 from wakewise.ui.film import compared_trials, make, write_film, write_rows
 from wakewise.ui.film.encode import film_writer
+from wakewise.ui.film.external_view import FASTEST_M_S, speed_colours
 from wakewise.ui.film.layout import Moment, Page, Story, cover
 from wakewise.ui.film.make import silt_at
-from wakewise.ui.film.outside import FASTEST_M_S, speed_colours
-from wakewise.ui.film.vantage import vantage
+from wakewise.ui.film.viewpoint import vantage
 from wakewise.ui.film.wash import STEP_S, TRAIL, Motion, replay, wash_of
 from wakewise.ui.reports.vehicle.hull import corner_normals, hull_of
 from wakewise.vision.imaging import PinholeCamera

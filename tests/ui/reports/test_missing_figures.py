@@ -20,23 +20,23 @@ from test_photo_model_report import FACTS, FIGURES, TARGET
 from wakewise.robot.vehicles import describe, load_draft
 from wakewise.ui.reports.campaign import campaign_page
 from wakewise.ui.reports.compare import comparison_page
-from wakewise.ui.reports.look import look_page
 from wakewise.ui.reports.methods_compared import methods_compared, profiles
 from wakewise.ui.reports.photo_model.page import model_page
+from wakewise.ui.reports.photo_preview import look_page
 from wakewise.ui.reports.report import report_page
+from wakewise.ui.reports.text import NONE, fixed, number, shown
 from wakewise.ui.reports.trial import read_trial
 from wakewise.ui.reports.vehicle import page as vehicle
-from wakewise.ui.reports.words import NONE, fixed, number, shown
-from wakewise.vision.reconstruction.look import Look, PhotoLook
+from wakewise.vision.reconstruction.photo_preview import Look, PhotoLook
 from wakewise_ardusub.reports.log import log_page
-from wakewise_paper.reports.operator_study import draw_operator
+from wakewise_paper.reports.operator_bench_plot import draw_operator
 from wakewise_paper.reports.photo_robustness import plot_degradation
 from wakewise_paper.reports.reproduction import write_results
 from wakewise_paper.reports.reproduction.page import tables_page
 from wakewise_paper.reports.reproduction.plots import agreement, obedience
 from wakewise_paper.reports.wake import wake_page
-from wakewise_paper.reports.wash_reduction import LOOKS, draw_gentle
-from wakewise_paper.reproduction.judged import JUDGED
+from wakewise_paper.reports.wash_bench_plot import LOOKS, draw_gentle
+from wakewise_paper.reproduction.acceptance import JUDGED
 
 SAID = re.compile(r"\bNone\b|\bnan\b|\binf\b")
 """What a page must not say where a figure is missing."""

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from wakewise.ui.reports.coverage import coverage_html
-from wakewise.ui.reports.draft import Draft
+from wakewise.ui.reports.page_parts import Draft
 from wakewise.ui.reports.trial import Trial, read_trial
 
 

@@ -19,8 +19,8 @@ from wakewise.ui.reports.figures import (
     thrust_columns,
     water_over_time,
 )
-from wakewise.ui.reports.ink import dress, inline_svg, new_figure, thinned
 from wakewise.ui.reports.photos import embedded_width, extremes
+from wakewise.ui.reports.svg_style import dress, inline_svg, new_figure, thinned
 from wakewise.ui.reports.trial import read_trial
 
 

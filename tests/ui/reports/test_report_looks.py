@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from wakewise.ui.reports import looks, write_comparison
-from wakewise.ui.reports.looks import coloured_model, colours_html, film_html
+from wakewise.ui.reports import media, write_comparison
+from wakewise.ui.reports.media import coloured_model, colours_html, film_html
 from wakewise.ui.reports.report import report_page
 from wakewise.ui.reports.trial import read_trial
 from wakewise.vision.texturing.textured import standing
@@ -32,7 +32,7 @@ def test_a_film_is_inside_the_page_unless_it_is_too_large(own: Path, monkeypatch
     assert 'src="data:image/webp;base64,' in film_html(read_trial(own))
     (own / "film.mp4").write_bytes(b"0" * 100)
     assert "<video controls" in film_html(read_trial(own))
-    monkeypatch.setattr(looks, "MOST_FILM_BYTES", 50)
+    monkeypatch.setattr(media, "MOST_FILM_BYTES", 50)
     assert 'src="film.mp4"' in film_html(read_trial(own))
 
 

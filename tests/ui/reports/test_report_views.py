@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from wakewise.ui.reports.ink import NOT_COVERED, OVER_LIMIT, error_colours, rgb
+from wakewise.ui.reports.svg_style import NOT_COVERED, OVER_LIMIT, error_colours, rgb
 from wakewise.ui.reports.trial import Surface
 from wakewise.ui.reports.views import SIDES, Frame, View, coverage_colours, draw_cloud, draw_surface
 

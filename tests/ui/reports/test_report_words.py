@@ -5,8 +5,8 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
+from wakewise.ui.reports.text import THIN_SPACE, grouped, number, unit
 from wakewise.ui.reports.trial import Metrics
-from wakewise.ui.reports.words import THIN_SPACE, grouped, number, unit
 
 
 def test_numbers_have_three_digits_and_no_exponents() -> None:

@@ -10,9 +10,9 @@ import polars as pl
 import pytest
 import yaml
 
+from wakewise.ui.reports.references import against_dp, against_grains, against_water, yardstick_html, yardsticks
 from wakewise.ui.reports.report import report_page
 from wakewise.ui.reports.trial import read_trial
-from wakewise.ui.reports.yardstick import against_dp, against_grains, against_water, yardstick_html, yardsticks
 
 FIGURES = {
     "target_speed_mean_m_s": 0.005,

@@ -7,12 +7,12 @@ from importlib import resources
 import pytest
 from test_campaign_page import campaign
 
-from wakewise.experiments.campaigns.glance import Glance, Measure, glance
+from wakewise.experiments.campaigns.summary import Glance, Measure, glance
 from wakewise.ui.reports.campaign import campaign_page
 from wakewise.ui.reports.methods_compared import price, won
 from wakewise.ui.reports.page import chip, missing, prose, scene_box
-from wakewise.ui.reports.words import duration, percent
-from wakewise_paper.reports.reproduction import words
+from wakewise.ui.reports.text import duration, percent
+from wakewise_paper.reports.reproduction import sentences
 
 
 def judged(low=5.0, high=15.0, trials=12, less=10.0, ours=0.9, theirs=1.0, rival="smooth"):
@@ -100,9 +100,9 @@ def test_rows_of_the_papers_tables_tell_ratios_so():
     """In tables and in sentences; rows of another kind keep their unit."""
     row = {"reading": "less_pct", "ours": -11990.0, "low": -363079.0, "high": -3492.0, "unit": "%", "world": "field",
            "target": None, "n": 21, "figure": "silt", "method": "wake-aware"}  # fmt: skip
-    assert words.ours(row) == "121 times as much" and words.interval(row) == "35.9 to 3632 times"
-    assert words._place(row) == "field: 121 times as much (35.9 to 3632 times), n = 21"
-    assert words.ours(row | {"reading": "mean", "ours": 4.0, "unit": "mm"}) == "4 mm"
+    assert sentences.ours(row) == "121 times as much" and sentences.interval(row) == "35.9 to 3632 times"
+    assert sentences._place(row) == "field: 121 times as much (35.9 to 3632 times), n = 21"
+    assert sentences.ours(row | {"reading": "mean", "ours": 4.0, "unit": "mm"}) == "4 mm"
 
 
 def row(world, met, figure="wash", paper=60.0):
@@ -118,12 +118,12 @@ def test_a_count_of_what_is_met_says_in_which_worlds():
         row("pump-tank", True, "rmse"),
         row("payload", False, "late"),
     ]
-    said = words.met_of({"station": rows})
+    said = sentences.met_of({"station": rows})
     assert said == (
         "2 of 3 figures that the paper quotes are met in any world at all, and 1 of 2 in pump-tank, the paper's own "
         "set-up"
     )
-    assert words.met_of({"solver": [row("-", True)]}) == "1 of 1 figure that the paper quotes is met"
+    assert sentences.met_of({"solver": [row("-", True)]}) == "1 of 1 figure that the paper quotes is met"
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from wakewise.ui.web.blueos import EXTRAS_PATH, SERVICE_PATH, Offer
 from wakewise.ui.web.files import Files
-from wakewise.ui.web.gate import page_headers
-from wakewise.ui.web.stations import EXTRAS_PATH, SERVICE_PATH, Offer
+from wakewise.ui.web.origin_check import page_headers
 
 OFFER = Offer(name="A page", description="Shows something.", widget="A widget")
 

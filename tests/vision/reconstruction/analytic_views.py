@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wakewise.vision.reconstruction.views import View
+from wakewise.vision.reconstruction.registered_photos import View
 
 
 def straight(width, height, focal, centre=(0.0, 0.0, 0.0), R_CW=None):

@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.vision.reconstruction.scale.by_fixes import MOST_UNSURE_PCT, place_by_fixes, why_unused
-from wakewise.vision.reconstruction.scale.fixes import Fix, Fixes
+from wakewise.vision.reconstruction.registered_photos import camera_centres
+from wakewise.vision.reconstruction.scale.position_fixes import Fix, Fixes
+from wakewise.vision.reconstruction.scale.scale_from_positions import MOST_UNSURE_PCT, place_by_fixes, why_unused
 from wakewise.vision.reconstruction.scale.stage import place_model
-from wakewise.vision.reconstruction.views import camera_centres
 
 SCALE = 0.137
 TURN = Rotation.from_rotvec([0.4, -1.1, 2.0]).as_matrix()

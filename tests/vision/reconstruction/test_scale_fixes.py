@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from wakewise.core.errors import InputError
-from wakewise.vision.reconstruction.scale.fixes import (
+from wakewise.vision.reconstruction.scale.position_fixes import (
     DEPTH_SIGMA_M,
     GPS_HEIGHT_SIGMA_M,
     GPS_SIGMA_M,

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise.core.sizes import picture_depth
+from wakewise.core.size_limits import picture_depth
 from wakewise.vision.texturing.photo_colours import copy_names, correct_photos
 
 

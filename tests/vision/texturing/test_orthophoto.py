@@ -9,7 +9,7 @@ import pytest
 
 from wakewise.core.geometry import look_at
 from wakewise.vision.reconstruction import Cloud, write_cloud
-from wakewise.vision.reconstruction.views import View
+from wakewise.vision.reconstruction.registered_photos import View
 from wakewise.vision.texturing import orthophoto
 from wakewise.vision.texturing.orthophoto import closed, grid_faces, without_strays, write_orthophoto
 

@@ -3,7 +3,7 @@
 WAKEWISE_VEHICLE    a craft file's name: bluerov2-heavy (default), bluerov2, or one that lies in /data
 WAKEWISE_CONNECTION udpin:0.0.0.0:14770 (default), where a MAVLink endpoint of BlueOS sends to
 WAKEWISE_AHEAD      metres from the bow to the target (default 0.4)
-WAKEWISE_OPTIONS    further options of `python3 -m wakewise_ardusub.wash_meter.small`; "--ask" if not set
+WAKEWISE_OPTIONS    further options of `python3 -m wakewise_ardusub.wash_meter.embedded`; "--ask" if not set
 
 A file /data/vehicle.params, where there is one, says the autopilot's parameters. The page listens at 0.0.0.0, which in
 a container is what BlueOS forwards to: whoever reaches BlueOS reaches the page, and BlueOS itself asks for no token.
@@ -37,6 +37,6 @@ def options(environment: Mapping[str, str], data: Path = DATA) -> list[str]:
 
 
 if __name__ == "__main__":
-    from wakewise_ardusub.wash_meter.small import main
+    from wakewise_ardusub.wash_meter.embedded import main
 
     sys.exit(main(options(os.environ)))

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wakewise.core.arrays import Array
+from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import BodyState, Plant, Witness
 from wakewise.core.jit.precompile import warm
-from wakewise.core.physics import GRAVITY_M_S2
 from wakewise_ardusub.physics.datagrams import Motion
-from wakewise_ardusub.physics.lowering import Lowered
+from wakewise_ardusub.physics.lowered_start import Lowered
 from wakewise_ardusub.physics.physics import Body
 from wakewise_ardusub.physics.surface import Surface
 

@@ -17,7 +17,7 @@ from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError
 from wakewise.robot.thrusters.thrust_curve import CurveSide, ThrustCurve
 from wakewise.wake.jets import AxialJet, Law
-from wakewise_ardusub.logs.gather import SERVOS
+from wakewise_ardusub.logs.channels import SERVOS
 
 if TYPE_CHECKING:
     from wakewise.core.interfaces import WakeModel

@@ -17,8 +17,8 @@ import numpy as np
 from wakewise.allocation import Layout, Weights, compile_layout, disturbance_of, gentle_allocation, least_thrusts
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
-from wakewise.core.jit.compiled import COMPILED
-from wakewise.wake.view import WakeView
+from wakewise.core.jit.njit import COMPILED
+from wakewise.wake.influence import WakeView
 from wakewise_ardusub.motors import limits_of_motors, thrusts_of_pulses
 from wakewise_ardusub.vehicle_summary import Craft
 

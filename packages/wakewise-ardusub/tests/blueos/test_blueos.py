@@ -161,7 +161,7 @@ def test_what_is_installed_is_what_the_meter_imports(instructions: list[tuple[st
     assert "python3-numpy" in by_debian
     found = bare(
         "before = set(sys.modules)\n"
-        "import wakewise_ardusub.wash_meter.small, pymavlink.dialects.v20.ardupilotmega\n"
+        "import wakewise_ardusub.wash_meter.embedded, pymavlink.dialects.v20.ardupilotmega\n"
         "print(*({m.partition('.')[0] for m in set(sys.modules) - before} - set(sys.stdlib_module_names)))"
     )
     # fastcrc is taken by pymavlink where it is there.

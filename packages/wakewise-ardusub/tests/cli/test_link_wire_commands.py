@@ -27,9 +27,9 @@ from wakewise_ardusub.physics.datagrams import Motion
 from wakewise_ardusub.physics.free_water import FreeWater
 from wakewise_ardusub.physics.pulses import PulseTable
 from wakewise_ardusub.sitl.own_parameters import own_parameters
-from wakewise_ardusub.sitl.rim import Embedded, Link
-from wakewise_ardusub.sitl.rim import run as run_stand_in
-from wakewise_ardusub.sitl.stand_in import StandIn
+from wakewise_ardusub.sitl.simulated_autopilot import StandIn
+from wakewise_ardusub.sitl.udp_endpoints import Embedded, Link
+from wakewise_ardusub.sitl.udp_endpoints import run as run_stand_in
 
 Capture = pytest.CaptureFixture[str]
 
@@ -254,7 +254,7 @@ def test_what_cannot_be_is_one_line(
 
 def test_nobody_there_is_one_line(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     """A connection on which no autopilot speaks, after a while."""
-    monkeypatch.setattr("wakewise_ardusub.link.survey.PATIENCE_S", 0.1)
+    monkeypatch.setattr("wakewise_ardusub.link.vehicle_survey.PATIENCE_S", 0.1)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         where = f"udpin:127.0.0.1:{probe.getsockname()[1]}"

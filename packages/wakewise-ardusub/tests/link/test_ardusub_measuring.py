@@ -17,8 +17,8 @@ from wakewise.core.geometry import (
     quat_from_matrix,
     quat_multiply,
 )
-from wakewise_ardusub.link.listening import Said
-from wakewise_ardusub.link.measuring import SETTLED, SenderClock, Telemetry, measured, odometry_pose
+from wakewise_ardusub.link.message_state import Said
+from wakewise_ardusub.link.telemetry_adapter import SETTLED, SenderClock, Telemetry, measured, odometry_pose
 
 STILL = {"rollspeed": 0.0, "pitchspeed": 0.0, "yawspeed": 0.0}
 UNIT = st.tuples(*(st.floats(-1.0, 1.0) for _ in range(4))).filter(lambda q: np.linalg.norm(q) > 0.1)

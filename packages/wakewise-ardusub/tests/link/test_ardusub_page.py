@@ -14,8 +14,8 @@ from wakewise_ardusub.link import protocol
 from wakewise_ardusub.link.script import script_text
 from wakewise_ardusub.physics.free_water import FreeWater
 from wakewise_ardusub.physics.pulses import PulseTable
-from wakewise_ardusub.sitl.rim import Embedded, Link, run
-from wakewise_ardusub.sitl.stand_in import StandIn
+from wakewise_ardusub.sitl.simulated_autopilot import StandIn
+from wakewise_ardusub.sitl.udp_endpoints import Embedded, Link, run
 
 PAGE = (Path(__file__).parents[4] / "docs" / "ardusub.md").read_text(encoding="utf-8")
 

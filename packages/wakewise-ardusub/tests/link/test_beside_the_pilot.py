@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_ardusub.link.engagement import Limits
-from wakewise_ardusub.link.journal import Journal, read_journal
+from wakewise_ardusub.link.engagement_fsm import Limits
 from wakewise_ardusub.link.protocol import NEUTRAL_WITHIN_S
-from wakewise_ardusub.sitl.aboard import FAULTS_ABOARD, Aboard
-from wakewise_ardusub.sitl.rehearsal import Rehearsal, noise
+from wakewise_ardusub.link.session_log import Journal, read_journal
+from wakewise_ardusub.sitl.companion_harness import FAULTS_ABOARD, Aboard
+from wakewise_ardusub.sitl.inprocess_session import Rehearsal, noise
 
 HEAVY = load_vehicle("bluerov2-heavy")
 SLACK_S = 1e-6

@@ -16,8 +16,8 @@ from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.cli.link_ardusub import _buttons
 from wakewise_ardusub.link.buttons import BUTTONS, buttons_amiss, conflict, free_buttons
 from wakewise_ardusub.link.checks import Facts, check, verdict
+from wakewise_ardusub.sitl.inprocess_session import Rehearsal
 from wakewise_ardusub.sitl.own_parameters import own_parameters
-from wakewise_ardusub.sitl.rehearsal import Rehearsal
 
 ROOT = Path(__file__).parents[4]
 HEAVY = load_vehicle("bluerov2-heavy")

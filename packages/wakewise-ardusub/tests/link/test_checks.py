@@ -15,7 +15,7 @@ from wakewise_ardusub.link import protocol
 from wakewise_ardusub.link.checks import Facts, Heard, Row, check, verdict
 from wakewise_ardusub.link.motor_results import MotorResults, MotorSeen, read_results, write_results
 from wakewise_ardusub.link.parameters import read_parameter_file
-from wakewise_ardusub.link.survey import await_autopilot, survey
+from wakewise_ardusub.link.vehicle_survey import await_autopilot, survey
 
 HEAVY = load_vehicle("bluerov2-heavy")
 DIRECTIONS = (1, 1, -1, -1, 1, -1, -1, 1)

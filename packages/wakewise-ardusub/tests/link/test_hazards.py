@@ -9,13 +9,13 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from bottle import Bottle
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_ardusub.link.drive import VehicleDrive
-from wakewise_ardusub.link.engagement import Limits
+from wakewise_ardusub.link.engagement_fsm import Limits
+from wakewise_ardusub.link.motor_interface import VehicleDrive
 from wakewise_ardusub.link.protocol import ALLOWED_MODES, ALT_HOLD, POSHOLD
 from wakewise_ardusub.link.script import script_text
-from wakewise_ardusub.sitl.aboard import FAULTS_ABOARD
+from wakewise_ardusub.sitl.companion_harness import FAULTS_ABOARD
+from wakewise_ardusub.sitl.inprocess_session import Rehearsal
 from wakewise_ardusub.sitl.own_parameters import own_parameters
-from wakewise_ardusub.sitl.rehearsal import Rehearsal
 
 ROOT = Path(__file__).parents[4]
 ROW = re.compile(r"^\|.*\| `(test_\w+)(?:\[(.+)\])?` \|$", re.MULTILINE)

@@ -18,13 +18,13 @@ from wakewise_ardusub.link.connection import heard_of, send_command
 from wakewise_ardusub.link.output import motor_output
 from wakewise_ardusub.link.parameters import read_all_parameters, read_parameters, set_parameter
 from wakewise_ardusub.link.script import script_text
-from wakewise_ardusub.link.survey import survey
 from wakewise_ardusub.link.upload import start_script, upload_script
+from wakewise_ardusub.link.vehicle_survey import survey
 from wakewise_ardusub.physics.free_water import FreeWater
 from wakewise_ardusub.physics.pulses import PulseTable
 from wakewise_ardusub.sitl.own_parameters import own_parameters
-from wakewise_ardusub.sitl.rim import Embedded
-from wakewise_ardusub.sitl.stand_in import StandIn
+from wakewise_ardusub.sitl.simulated_autopilot import StandIn
+from wakewise_ardusub.sitl.udp_endpoints import Embedded
 
 HEAVY = load_vehicle("bluerov2-heavy")
 DIRECTIONS = (1, -1, -1, 1, 1, -1, 1, -1)

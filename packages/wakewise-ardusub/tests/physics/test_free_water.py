@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from wakewise.core.constants import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
-from wakewise.core.physics import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.robot.vehicles import fossen, load_vehicle
 from wakewise_ardusub.physics import FreeWater
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
-from wakewise.core.physics import GRAVITY_M_S2
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.physics import FreeWater, Physics, PulseTable, Request, read_reply, write_request
 

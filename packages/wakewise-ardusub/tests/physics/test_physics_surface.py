@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import BodyState
-from wakewise.core.physics import GRAVITY_M_S2
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.physics import FreeWater
-from wakewise_ardusub.physics.lowering import LOWERED_M_S, Lowered
+from wakewise_ardusub.physics.lowered_start import LOWERED_M_S, Lowered
 from wakewise_ardusub.physics.surface import Surface
 
 HEAVY = load_vehicle("bluerov2-heavy")

@@ -9,7 +9,7 @@ from wakewise.core.errors import InputError
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.physics import FreeWater, Physics, PulseTable
 from wakewise_ardusub.physics.udp import LOOPBACK, open_socket, serve
-from wakewise_ardusub.sitl.rim import OverUdp
+from wakewise_ardusub.sitl.udp_endpoints import OverUdp
 
 HEAVY = load_vehicle("bluerov2-heavy")
 

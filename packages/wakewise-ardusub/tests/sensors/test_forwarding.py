@@ -13,8 +13,8 @@ import pytest
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import Measurement
 from wakewise.ui.cli.main import run
-from wakewise_ardusub.link.listening import Said
-from wakewise_ardusub.link.measuring import Telemetry, measured
+from wakewise_ardusub.link.message_state import Said
+from wakewise_ardusub.link.telemetry_adapter import Telemetry, measured
 from wakewise_ardusub.sensors import PoseForwarder, PoseSample, UdpSocket, vision_position_estimate
 
 common = pytest.importorskip("pymavlink.dialects.v20.common")

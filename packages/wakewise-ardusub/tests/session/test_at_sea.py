@@ -13,17 +13,17 @@ from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
 from wakewise.operation.flying import loop_of, recorder_of
 from wakewise.operation.scenario import Scenario
-from wakewise.operation.teleop.shutter import Shutter
+from wakewise.operation.teleop.photo_trigger import Shutter
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_ardusub.link.journal import Journal, read_journal
-from wakewise_ardusub.link.listening import attitude_of
+from wakewise_ardusub.link.message_state import attitude_of
 from wakewise_ardusub.link.protocol import ALT_HOLD, STABILIZE
-from wakewise_ardusub.session.join import SEA, at_sea
-from wakewise_ardusub.session.rehearsal import rehearse
+from wakewise_ardusub.link.session_log import Journal, read_journal
+from wakewise_ardusub.session.link_join import SEA, at_sea
+from wakewise_ardusub.session.protected_region import WhatToSpare, ball, ball_points
 from wakewise_ardusub.session.session import SeaSession
-from wakewise_ardusub.session.target import WhatToSpare, ball, ball_points
-from wakewise_ardusub.sitl.aboard import Aboard
-from wakewise_ardusub.sitl.rehearsal import Rehearsal
+from wakewise_ardusub.session.warm_up import rehearse
+from wakewise_ardusub.sitl.companion_harness import Aboard
+from wakewise_ardusub.sitl.inprocess_session import Rehearsal
 
 MISSION = {
     "mission.elevations_deg": [15.0],

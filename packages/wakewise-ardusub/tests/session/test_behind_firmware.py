@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, quat_from_euler
 from wakewise.core.interfaces import BodyState, Truth
-from wakewise.core.physics import GRAVITY_M_S2
 from wakewise.operation.scenario import Scenario
 from wakewise.operation.worlds.lattice_world import LatticeWater
-from wakewise.operation.worlds.wake_world import InstantWater
+from wakewise.operation.worlds.quasi_steady_world import InstantWater
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.simulation.tank.tank import Tank
 from wakewise_ardusub.physics import Physics, PulseTable, Request, read_reply, write_request

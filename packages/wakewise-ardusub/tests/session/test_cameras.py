@@ -12,7 +12,7 @@ from bottle import Bottle
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.vision.reconstruction import read_reference_cameras
-from wakewise_ardusub.link.journal import Journal, read_journal
+from wakewise_ardusub.link.session_log import Journal, read_journal
 from wakewise_ardusub.session.cameras import CAMERAS_FILE, PHOTOGRAPHS, note_view, parse_camera, photo_name
 
 WRITES = f"run:{sys.executable} -c \"import sys; open(sys.argv[1], 'w').write(sys.argv[2])\" {{file}} {{number}}"

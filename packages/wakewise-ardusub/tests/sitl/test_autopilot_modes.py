@@ -10,7 +10,7 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 from wakewise.core.geometry import euler_from_quat
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link.protocol import ALT_HOLD, MANUAL, STABILIZE
-from wakewise_ardusub.sitl.rehearsal import Rehearsal
+from wakewise_ardusub.sitl.inprocess_session import Rehearsal
 
 HEAVY = load_vehicle("bluerov2-heavy")
 

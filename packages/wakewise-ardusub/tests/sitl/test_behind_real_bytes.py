@@ -29,7 +29,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_ardusub.link.engagement import Limits
+from wakewise_ardusub.link.engagement_fsm import Limits
 from wakewise_ardusub.link.protocol import (
     ALT_HOLD,
     COMPANION_COMPONENT,
@@ -40,13 +40,13 @@ from wakewise_ardusub.link.protocol import (
 from wakewise_ardusub.link.script import script_text
 from wakewise_ardusub.physics import Body, FreeWater, Physics, PulseTable
 from wakewise_ardusub.physics.datagrams import PORT
-from wakewise_ardusub.physics.lowering import Lowered
+from wakewise_ardusub.physics.lowered_start import Lowered
 from wakewise_ardusub.physics.udp import LOOPBACK, open_socket, serve
-from wakewise_ardusub.sitl.aboard import Aboard
+from wakewise_ardusub.sitl.companion_harness import Aboard
+from wakewise_ardusub.sitl.inprocess_session import STATION, STATION_COMPONENT, THRUSTS, shipped_script
 from wakewise_ardusub.sitl.own_parameters import own_parameters
-from wakewise_ardusub.sitl.rehearsal import STATION, STATION_COMPONENT, THRUSTS, shipped_script
-from wakewise_ardusub.sitl.rim import Link, OverUdp, run
-from wakewise_ardusub.sitl.stand_in import HOME_DEG, StandIn
+from wakewise_ardusub.sitl.simulated_autopilot import HOME_DEG, StandIn
+from wakewise_ardusub.sitl.udp_endpoints import Link, OverUdp, run
 
 HEAVY = load_vehicle("bluerov2-heavy")
 BINARY = os.environ.get("WAKEWISE_ARDUSUB", "")

@@ -12,7 +12,7 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 
 from wakewise.robot.vehicles import load_vehicle
 from wakewise_ardusub.link.protocol import ENABLE_PARAMETER, LOOP_MS, NEUTRAL_WITHIN_S, STABILIZE
-from wakewise_ardusub.sitl.rehearsal import FAULTS, THRUSTS, Rehearsal, Speaker, noise, suffer
+from wakewise_ardusub.sitl.inprocess_session import FAULTS, THRUSTS, Rehearsal, Speaker, noise, suffer
 
 HEAVY = load_vehicle("bluerov2-heavy")
 ACTING = tuple(int(1500 + 400 * value + 0.5) for value in THRUSTS)

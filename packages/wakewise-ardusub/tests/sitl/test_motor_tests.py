@@ -10,8 +10,8 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from wakewise.robot.vehicles import load_vehicle
+from wakewise_ardusub.sitl.inprocess_session import Rehearsal
 from wakewise_ardusub.sitl.motor_tests import COOL_S, SILENT_S
-from wakewise_ardusub.sitl.rehearsal import Rehearsal
 
 HEAVY = load_vehicle("bluerov2-heavy")
 

@@ -9,8 +9,8 @@ pytest.importorskip("lupa", reason="the extra `links` is not installed")
 
 from wakewise.core.errors import MissingExtra
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_ardusub.sitl.rehearsal import Rehearsal
-from wakewise_ardusub.sitl.stand_in import StandIn
+from wakewise_ardusub.sitl.inprocess_session import Rehearsal
+from wakewise_ardusub.sitl.simulated_autopilot import StandIn
 
 HEAVY = load_vehicle("bluerov2-heavy")
 

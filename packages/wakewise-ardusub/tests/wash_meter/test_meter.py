@@ -19,12 +19,12 @@ from wakewise.robot.vehicles import load_vehicle
 from wakewise.wake import wake_model
 from wakewise_ardusub.logs import mavlink, tlog
 from wakewise_ardusub.logs.clock import Clock
-from wakewise_ardusub.logs.hindsight import Hindsight, bow_points, hindsight
 from wakewise_ardusub.logs.read import read_log
+from wakewise_ardusub.logs.replay_allocation import Hindsight, bow_points, hindsight
 from wakewise_ardusub.logs.table import LogTable, tabulate
 from wakewise_ardusub.vehicle_summary import Craft
-from wakewise_ardusub.wash_meter.hearing import Hearing
 from wakewise_ardusub.wash_meter.meter import MINUTE_S, Meter, Reading
+from wakewise_ardusub.wash_meter.vehicle_listener import Hearing
 from wakewise_ardusub.wash_savings import SHARES, bow_ball
 
 REAL = Path(os.environ.get("WAKEWISE_DATA", "../shared/data")) / "ardusub" / "2023-04-18.tlog"

@@ -18,12 +18,12 @@ from loopback_vehicle import Vehicle, free_ends
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.wake import wake_model
 from wakewise_ardusub.vehicle_summary import Craft
-from wakewise_ardusub.wash_meter.hearing import Hearing
 from wakewise_ardusub.wash_meter.history import KEPT_S, History
+from wakewise_ardusub.wash_meter.mavlink_socket import Heard, Wire
 from wakewise_ardusub.wash_meter.meter import Reading
 from wakewise_ardusub.wash_meter.record import Record
 from wakewise_ardusub.wash_meter.settings import MeterSettings
-from wakewise_ardusub.wash_meter.wire import Heard, Wire
+from wakewise_ardusub.wash_meter.vehicle_listener import Hearing
 from wakewise_ardusub.wash_savings import Spared
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
 from wakewise.core.arrays import Array
+from wakewise.core.constants import FRESH_WATER_KG_M3 as WATER_DENSITY_KG_M3
 from wakewise.core.interfaces import Flow
-from wakewise.core.physics import FRESH_WATER_KG_M3 as WATER_DENSITY_KG_M3
 from wakewise.simulation.water import Water
 
 DISK_DIAMETER_M = 0.06

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.core.arrays import Array
+from wakewise.core.constants import FRESH_WATER_KG_M3 as WATER_DENSITY_KG_M3
 from wakewise.core.errors import InputError
-from wakewise.core.physics import FRESH_WATER_KG_M3 as WATER_DENSITY_KG_M3
 from wakewise.wake.calibration import Split
 from wakewise.wake.samples import CORE, JetSamples
 from wakewise.wake.scores import score_speeds

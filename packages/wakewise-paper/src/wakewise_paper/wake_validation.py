@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 from wakewise.core.arrays import Array
+from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Progress, no_progress
-from wakewise.core.physics import FRESH_WATER_KG_M3
 from wakewise.wake.calibration import Calibration, Split, calibrate, split_samples
-from wakewise.wake.families import FAMILIES, Family
 from wakewise.wake.fit_file import fit_figures
+from wakewise.wake.fit_parameters import FAMILIES, Family
 from wakewise.wake.jets import AxialJet
 from wakewise.wake.samples import CORE, WAKE, JetRegion, JetSamples, joined
 from wakewise.wake.scores import Scores, score

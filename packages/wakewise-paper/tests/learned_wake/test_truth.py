@@ -5,7 +5,7 @@ import pytest
 
 from wakewise.wake import wake_model
 from wakewise.wake.network import EDGES, Network
-from wakewise_paper.learned_wake.judging import Score, predictors, unit_f
+from wakewise_paper.learned_wake.evaluation import Score, predictors, unit_f
 from wakewise_paper.learned_wake.truth import (
     FAR_D,
     LATTICE_HISTORIES,

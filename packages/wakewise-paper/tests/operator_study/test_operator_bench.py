@@ -37,7 +37,7 @@ def made_up(monkeypatch, tmp_path):
     monkeypatch.setattr(bench, "_engine", lambda _: Here())
     monkeypatch.setattr("wakewise_paper.operator_study.flight.fly_trial", flight)
     monkeypatch.setattr(paper, "fly_trial", paper_flight)
-    monkeypatch.setattr("wakewise_paper.side_by_side.warm", lambda **_: None)
+    monkeypatch.setattr("wakewise_paper.flight_batches.warm", lambda **_: None)
     return tmp_path
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from wakewise.control.receding import PlanState
+from wakewise_paper.operator_study.controller_probe import Overheard, within
 from wakewise_paper.operator_study.flight import (
     DEVIATIONS,
     FIGURES,
@@ -15,7 +16,6 @@ from wakewise_paper.operator_study.flight import (
     fly_trial,
     parts_of,
 )
-from wakewise_paper.operator_study.heard import Overheard, within
 
 
 def test_deviation_is_the_rms_of_what_is_missed_over_that_of_what_is_asked():

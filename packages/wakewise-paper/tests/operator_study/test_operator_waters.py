@@ -7,7 +7,7 @@ import pytest
 from wakewise.core.errors import InputError
 from wakewise.operation import Scenario
 from wakewise.operation.worlds.library import load_world, world_names
-from wakewise_paper.operator_study.waters import CONTROL, CURRENT, TRIM, TRIMS, TROUBLE, water_of
+from wakewise_paper.operator_study.worlds import CONTROL, CURRENT, TRIM, TRIMS, TROUBLE, water_of
 
 
 @pytest.mark.parametrize("world", [*TROUBLE, CONTROL])

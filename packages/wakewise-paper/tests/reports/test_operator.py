@@ -3,7 +3,7 @@
 import pytest
 
 from wakewise.core.errors import InputError
-from wakewise_paper.reports.operator_study import draw_operator
+from wakewise_paper.reports.operator_bench_plot import draw_operator
 
 W_TRACKS = ("1", "2", "5", "10", "20")
 

@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from wakewise_paper.reproduction.claim import TABLES, UNQUOTED, Claim
-from wakewise_paper.reproduction.quoted import CLAIMS, UNKNOWN
+from wakewise_paper.reproduction.published_tables import CLAIMS, UNKNOWN
 
 EVERY = [(name, claim) for name, claims in CLAIMS.items() for claim in claims]
 

@@ -6,8 +6,8 @@ from wakewise.core.errors import InputError
 from wakewise.experiments.campaigns.store import open_store, write_figures
 from wakewise.experiments.campaigns.task import Outcome
 from wakewise_paper.reproduction import run as module
-from wakewise_paper.reproduction.blocks import Wish, blocks_of
 from wakewise_paper.reproduction.run import Options, reproduce
+from wakewise_paper.reproduction.table_trials import Wish, blocks_of
 
 
 @pytest.fixture

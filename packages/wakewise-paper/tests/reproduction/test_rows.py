@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from wakewise.experiments.campaigns.task import Outcome, Task
-from wakewise_paper.reproduction.blocks import Plan
 from wakewise_paper.reproduction.claim import ORDER, Claim
 from wakewise_paper.reproduction.rows import Made, Trials, once_rows, table_rows
+from wakewise_paper.reproduction.table_trials import Plan
 
 KEYS = ["method", "target", "figure", "paper", "ours", "low", "high", "n", "met"]
 

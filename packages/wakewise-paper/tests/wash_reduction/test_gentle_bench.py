@@ -9,15 +9,15 @@ from wakewise.control import METHODS as MADE
 from wakewise.control import ControlSettings
 from wakewise.core.errors import InputError, StageError
 from wakewise.experiments.trials import BenchOptions
-from wakewise_paper.cli.bench_wash_reduction import show_gentle
-from wakewise_paper.reports.wash_reduction import draw_gentle
+from wakewise_paper.cli.bench_wash import show_gentle
+from wakewise_paper.reports.wash_bench_plot import draw_gentle
 from wakewise_paper.wash_reduction import bench as gentle
+from wakewise_paper.wash_reduction.ablations import LEVERS, NONE, alone, left_out, lever_settings, wished_levers
 from wakewise_paper.wash_reduction.figures import SPEED
 from wakewise_paper.wash_reduction.flight import FIGURES, parts_of
-from wakewise_paper.wash_reduction.headline import WRONG
-from wakewise_paper.wash_reduction.levers import LEVERS, NONE, alone, left_out, lever_settings, wished_levers
 from wakewise_paper.wash_reduction.paper import FIGURES as PAPER_FIGURES
 from wakewise_paper.wash_reduction.plan import METHODS, flown_methods, lever_trial, planned_trials
+from wakewise_paper.wash_reduction.summary_table import WRONG
 
 ROW = dict.fromkeys(FIGURES, 1.0)
 SHARE = {"dp": 1.0, "bow-rule": 0.4, "wake-aware": 0.1}
@@ -39,7 +39,7 @@ def here(monkeypatch):
         return made_up(trial)
 
     monkeypatch.setattr(gentle, "_engine", lambda _: Here())
-    monkeypatch.setattr("wakewise_paper.side_by_side.warm", lambda **_: None)
+    monkeypatch.setattr("wakewise_paper.flight_batches.warm", lambda **_: None)
     monkeypatch.setattr("wakewise_paper.wash_reduction.flight.fly_trial", flight)
     monkeypatch.setattr(
         "wakewise_paper.wash_reduction.paper.fly_paper", lambda trial: dict.fromkeys(PAPER_FIGURES, float(trial.seed))

@@ -13,10 +13,12 @@ from wakewise.control.loop import vehicle_layout
 from wakewise.core.errors import InputError
 from wakewise.experiments.trials import BenchOptions
 from wakewise.robot.vehicles import load_vehicle
-from wakewise_paper.cli.bench_wash_reduction import show_gentle
+from wakewise_paper.cli.bench_wash import show_gentle
 from wakewise_paper.wash_reduction import bench as gentle
-from wakewise_paper.wash_reduction import bound
-from wakewise_paper.wash_reduction.bound import (
+from wakewise_paper.wash_reduction import energy_optimum
+from wakewise_paper.wash_reduction.allocations import sharings, split
+from wakewise_paper.wash_reduction.energy_bound import chosen, sum_of
+from wakewise_paper.wash_reduction.energy_optimum import (
     ENERGIES,
     FRESH_GUSTS,
     BoundTrial,
@@ -27,10 +29,8 @@ from wakewise_paper.wash_reduction.bound import (
     fly_dp,
     smoothed,
 )
-from wakewise_paper.wash_reduction.bound_figures import NAMED, bound_figures, reductions
-from wakewise_paper.wash_reduction.choosing import chosen, sum_of
+from wakewise_paper.wash_reduction.energy_optimum_tables import NAMED, bound_figures, reductions
 from wakewise_paper.wash_reduction.flight import FIGURES
-from wakewise_paper.wash_reduction.sharings import sharings, split
 
 VEHICLE = load_vehicle("paper")
 LAYOUT = vehicle_layout(VEHICLE)
@@ -147,14 +147,14 @@ def test_a_flight_of_dp_is_judged_with_the_rule_and_the_belief_among_the_choices
     """
     trial = BoundTrial(scenario="orbit/paper", seed=1, duration_s=12.0)
     flown = fly_dp(trial)
-    monkeypatch.setattr(bound, "sharings", lambda layout, least_N: sharings(layout, least_N)[:3])
+    monkeypatch.setattr(energy_optimum, "sharings", lambda layout, least_N: sharings(layout, least_N)[:3])
     grid, named = candidates(flown)
     assert np.abs((grid - grid[0]) @ flown.layout.B.T).max() < 1e-6
     rule = bow_layout(flown.vehicle)
     assert (grid[named["rule"]] >= rule.lower_N - 1e-6).all() and (grid[named["rule"]] <= rule.upper_N + 1e-6).all()
     assert not (grid[0] >= rule.lower_N - 1e-6).all() or not (grid[0] <= rule.upper_N + 1e-6).all()
-    monkeypatch.setattr(bound, "fly_dp", lambda _: flown)
-    monkeypatch.setattr(bound, "candidates", lambda _: (grid, named))
+    monkeypatch.setattr(energy_optimum, "fly_dp", lambda _: flown)
+    monkeypatch.setattr(energy_optimum, "candidates", lambda _: (grid, named))
     row = fly_bound(trial)
     assert None not in row.values() and row["sharings"] == 6.0
     assert row["belief_any_m_s"] < 0.8 * row["least_m_s"] and row["belief_any_energy"] > 1.05
@@ -205,9 +205,9 @@ def test_the_bench_tells_the_bound_where_it_is_wished(monkeypatch, tmp_path, cap
         return row
 
     monkeypatch.setattr(gentle, "_engine", lambda _: Here())
-    monkeypatch.setattr("wakewise_paper.side_by_side.warm", lambda **_: None)
+    monkeypatch.setattr("wakewise_paper.flight_batches.warm", lambda **_: None)
     monkeypatch.setattr("wakewise_paper.wash_reduction.flight.fly_trial", lambda _: dict.fromkeys(FIGURES, 0.02))
-    monkeypatch.setattr("wakewise_paper.wash_reduction.bound.fly_bound", made_up)
+    monkeypatch.setattr("wakewise_paper.wash_reduction.energy_optimum.fly_bound", made_up)
     options = BenchOptions(seeds=1, bound=2, scenarios=("orbit/paper",), methods=("dp",), store=tmp_path)
     found = gentle.run(options)
     assert len(worked) == 2 and found["failed"] == 0

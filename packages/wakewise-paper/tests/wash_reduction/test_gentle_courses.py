@@ -5,7 +5,8 @@ import pytest
 
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.missions import CameraAim, check_clearance
-from wakewise_paper.wash_reduction.courses import (
+from wakewise_paper.wash_reduction.flight import Trial, parts_of
+from wakewise_paper.wash_reduction.routes import (
     BRAKE_SPEED_M_S,
     CLEARANCE_M,
     gentle_route,
@@ -13,8 +14,7 @@ from wakewise_paper.wash_reduction.courses import (
     looking_down,
     top_above_centre_m,
 )
-from wakewise_paper.wash_reduction.flight import Trial, parts_of
-from wakewise_paper.wash_reduction.library import SCENARIOS, VEHICLES
+from wakewise_paper.wash_reduction.scenario_files import SCENARIOS, VEHICLES
 
 VEHICLE = load_vehicle("paper")
 
@@ -101,7 +101,7 @@ def test_a_cable_pulls_down_the_current_as_hard_as_drawn():
     """The tank's own law of a cable gives the pull that the seed drew, along the current, at the start."""
     from wakewise.simulation.tank.tether import Tether
     from wakewise.simulation.water import SteadyCurrent
-    from wakewise_paper.wash_reduction.library import drawn
+    from wakewise_paper.wash_reduction.scenario_files import drawn
 
     parts, what = parts_of(Trial(scenario="tether/paper", method="dp", seed=2)), drawn("tether", 2)
     current = np.array(what.current_W_m_s)

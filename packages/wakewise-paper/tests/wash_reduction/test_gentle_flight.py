@@ -7,8 +7,8 @@ import pytest
 from wakewise.control.trim import net_buoyancy_N
 from wakewise.operation.worlds.makers import true_vehicle
 from wakewise.robot.vehicles.ballast import Block
+from wakewise_paper.wash_reduction.ballasted_world import ballasted_world
 from wakewise_paper.wash_reduction.flight import FIGURES, Trial, fly_trial, parts_of
-from wakewise_paper.wash_reduction.trimmed import ballasted_world
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,15 @@ import pytest
 
 from wakewise.core.errors import InputError
 from wakewise_paper.wash_reduction.flight import TRIM, Trial, parts_of, wrong_current
-from wakewise_paper.wash_reduction.library import SCENARIOS, VEHICLES, drawn, fields_of, load_scenario_file, names_of
 from wakewise_paper.wash_reduction.plan import METHODS
+from wakewise_paper.wash_reduction.scenario_files import (
+    SCENARIOS,
+    VEHICLES,
+    drawn,
+    fields_of,
+    load_scenario_file,
+    names_of,
+)
 
 
 @pytest.mark.parametrize("name", SCENARIOS)

@@ -4,7 +4,7 @@ import numpy as np
 
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import BodyState
-from wakewise.operation.worlds.wake_world import InstantWater, paper_jets
+from wakewise.operation.worlds.quasi_steady_world import InstantWater, paper_jets
 from wakewise.robot.vehicles import load_vehicle
 from wakewise.scene.targets import coral, place_on_bed
 from wakewise.simulation.tank import TankSettings

@@ -10,7 +10,14 @@ from wakewise_paper.cli.bench_worlds import show_worlds
 from wakewise_paper.world_study import bench
 from wakewise_paper.world_study.figures import method_figures, ratios
 from wakewise_paper.world_study.flight import FLIGHT_FIGURES, MODEL_FIGURES, WorldTrial, fly_trial, short_flight
-from wakewise_paper.world_study.judge import CLEAR, CLEAR_M, clear_points, judge_table, judge_trials, judged_trial
+from wakewise_paper.world_study.lattice_comparison import (
+    CLEAR,
+    CLEAR_M,
+    clear_points,
+    judge_table,
+    judge_trials,
+    judged_trial,
+)
 
 SPEED = "target_speed_mean_m_s"
 
@@ -36,8 +43,10 @@ def made_up(monkeypatch, tmp_path):
     monkeypatch.setattr(bench, "_engine", lambda _: Here())
     monkeypatch.setattr("wakewise_paper.world_study.flight.fly_trial", flight)
     monkeypatch.setattr("wakewise_paper.world_study.flight.scan_trial", scan)
-    monkeypatch.setattr("wakewise_paper.world_study.judge.judged_trial", lambda trial: flight(trial) | {CLEAR: 2.0})
-    monkeypatch.setattr("wakewise_paper.side_by_side.warm", lambda **_: None)
+    monkeypatch.setattr(
+        "wakewise_paper.world_study.lattice_comparison.judged_trial", lambda trial: flight(trial) | {CLEAR: 2.0}
+    )
+    monkeypatch.setattr("wakewise_paper.flight_batches.warm", lambda **_: None)
     return tmp_path
 
 

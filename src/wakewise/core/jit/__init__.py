@@ -1,3 +1,3 @@
-"""All that concerns the compiler: `njit` (`compiled.py`, `kernels.py`), its cache (`cache_folder.py`),
+"""All that concerns the compiler: `njit` (`njit.py`, `kernel_cache.py`), its cache (`cache_dir.py`),
 `precompile.py`.
 """

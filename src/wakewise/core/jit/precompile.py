@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from wakewise.core.errors import InputError
-from wakewise.core.jit.cache_folder import VARIABLE, can_be_written, is_interpreted, user_cache
+from wakewise.core.jit.cache_dir import VARIABLE, can_be_written, is_interpreted, user_cache
 
 TypeWords = str | list[Any] | dict[str, list[Any]]
 LIST = Path(__file__).with_name("kernels.json")
@@ -42,7 +42,7 @@ class Listed:
     name : str
         Its full name, as in wakewise.planning.kernels.horizon.
     types : tuple
-        Of its arguments, in the words of `wakewise.core.jit.kernels.type_of`.
+        Of its arguments, in the words of `wakewise.core.jit.kernel_cache.type_of`.
     job : str
         The first of `JOBS` that calls it.
     cost_s : float
@@ -266,7 +266,7 @@ def _made_from(job: str) -> str:
     import llvmlite.binding as llvm
     import numba
 
-    from wakewise.core.jit.kernels import digest
+    from wakewise.core.jit.kernel_cache import digest
 
     root = Path(__file__).resolve().parents[2]
     whole = sha256(f"{numba.__version__} {sys.version_info[:2]} {llvm.get_host_cpu_name()}".encode())
@@ -280,7 +280,7 @@ def _made_from(job: str) -> str:
 def _compile_what_is_asked(asked: Iterable[str], answers: IO[str]) -> None:
     """Compile the kernels that lines of JSON name, and answer each line with one."""
     from wakewise.core.jit.haste import hasten
-    from wakewise.core.jit.kernels import type_from
+    from wakewise.core.jit.kernel_cache import type_from
 
     hasten()
     # Looking for garbage is a fifth of Numba's time in Python; done seldom, it costs memory that goes with the process.

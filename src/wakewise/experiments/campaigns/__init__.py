@@ -1,12 +1,13 @@
 """Campaigns: many trials, made on one computer or a cluster, each once, whatever is killed on the way.
 
-What people write is a campaign file (`definition.py`, `outside.py`), whose trials fly scenarios (`flights.py`). A trial
-is plain values (`task.py`), its folder is the truth (`store.py`), and whoever makes it claims it (`claims.py`) and
-notes each attempt (`attempts.py`). Start reading in `run.py`, the driver's loop. An attempt is made in a process
-(`worker.py`) that a slot minds (`slot.py`, `memory.py`); an engine says where slots are: in processes of this computer
-(`engines.py`) or on a Dask cluster (`cluster.py`). `index.py` is a cache of the folders, `plan.py` what they were made
-for, `table.py` what came of them, `contest.py` what is compared with what and `glance.py` who won, with `pictures.py`
-for a page; `versions.py` says which source made a trial, and `statistics/` what figures of many trials say.
+What people write is a campaign file (`definition.py`, `provenance.py`), whose trials fly scenarios (`flights.py`). A
+trial is plain values (`task.py`), its folder is the truth (`store.py`), and whoever makes it claims it
+(`trial_lock.py`) and notes each attempt (`attempt_log.py`). Start reading in `run.py`, the driver's loop. An attempt is
+made in a process (`worker.py`) that a slot minds (`worker_process.py`, `memory.py`); an engine says where slots are: in
+processes of this computer (`engines.py`) or on a Dask cluster (`cluster.py`). `index.py` is a cache of the folders,
+`plan.py` what they were made for, `table.py` what came of them, `contrasts.py` what is compared with what and
+`summary.py` who won, with `pictures.py` for a page; `versions.py` says which source made a trial, and `statistics/`
+what figures of many trials say.
 """
 
 from typing import TYPE_CHECKING

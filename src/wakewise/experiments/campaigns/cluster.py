@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.core.optional_dependencies import need
 from wakewise.experiments.campaigns.engines import Crew, check_workers, cores, threads_each
-from wakewise.experiments.campaigns.slot import close_slots
 from wakewise.experiments.campaigns.versions import source_version
+from wakewise.experiments.campaigns.worker_process import close_slots
 
 if TYPE_CHECKING:
     from distributed import Client

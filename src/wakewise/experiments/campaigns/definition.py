@@ -18,7 +18,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.files import not_a_name
 from wakewise.core.safe_yaml import yaml_file
 from wakewise.core.settings import Seed, Settings
-from wakewise.experiments.campaigns.outside import check_there, outside_of
+from wakewise.experiments.campaigns.provenance import check_there, outside_of
 from wakewise.experiments.campaigns.task import Task
 from wakewise.experiments.campaigns.versions import FLIES, PHOTOGRAPHS
 from wakewise.operation.scenario import PRESETS, Scenario, describe_fault, load_scenario

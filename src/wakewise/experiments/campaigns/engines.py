@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Protocol
 
 from wakewise.core.errors import InputError
-from wakewise.experiments.campaigns.slot import close_slots
+from wakewise.experiments.campaigns.worker_process import close_slots
 
 MOST_WORKERS = 1024
 
@@ -23,7 +23,7 @@ class Crew:
     Parameters
     ----------
     executor : Executor
-        Makes calls of `wakewise.experiments.campaigns.slot.attempt`.
+        Makes calls of `wakewise.experiments.campaigns.worker_process.attempt`.
     threads : int
         Of each attempt's libraries.
     size : callable

@@ -18,7 +18,7 @@ import polars as pl
 from wakewise.core.files import whole_file
 from wakewise.experiments.campaigns.task import Figures, WorkProgress
 from wakewise.experiments.trials.metrics import UNITS, Gathering
-from wakewise.experiments.trials.yardstick import add_yardsticks
+from wakewise.experiments.trials.reference_values import add_yardsticks
 from wakewise.operation import Scenario, fly
 from wakewise.operation.flight_log import timings_of
 from wakewise.operation.scenario import check_scenario

@@ -16,8 +16,8 @@ from pathlib import Path
 import polars as pl
 
 from wakewise.core.files import whole_file
-from wakewise.experiments.campaigns import attempts
-from wakewise.experiments.campaigns.attempts import ATTEMPTS, Attempts, read_attempts
+from wakewise.experiments.campaigns import attempt_log
+from wakewise.experiments.campaigns.attempt_log import ATTEMPTS, Attempts, read_attempts
 from wakewise.experiments.campaigns.store import FIGURES, Store, read_figures
 from wakewise.experiments.campaigns.task import Figure
 
@@ -110,7 +110,7 @@ def _listed_of(row: dict[str, object]) -> Listed:
     told = Attempts(
         begun=int(str(row["begun"])),
         failed=int(str(row["failed"])),
-        how=attempts.how_of(how),
+        how=attempt_log.how_of(how),
         reason=None if row["reason"] is None else str(row["reason"]),
     )
     return Listed(

@@ -13,7 +13,7 @@ from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import whole_file, write_json
 from wakewise.scene.targets import Target
 from wakewise.vision.evaluation import Crop, compare_surface
-from wakewise.vision.pictures import read_picture
+from wakewise.vision.image_decoding import read_picture
 from wakewise.vision.reconstruction import read_cloud
 
 PICTURES_AT_S = (0.0, 5.0, 10.0)

@@ -20,14 +20,14 @@ from pathlib import Path
 
 from wakewise.core.errors import FULL, InputError
 from wakewise.core.interfaces import Progress, no_progress
-from wakewise.experiments.campaigns import attempts, claims
+from wakewise.experiments.campaigns import attempt_log, trial_lock
 from wakewise.experiments.campaigns.engines import Crew, Engine
 from wakewise.experiments.campaigns.index import listing
-from wakewise.experiments.campaigns.slot import Report, attempt
 from wakewise.experiments.campaigns.store import Store, open_store, told_if_full
 from wakewise.experiments.campaigns.task import Outcome, Task
 from wakewise.experiments.campaigns.versions import source_version
 from wakewise.experiments.campaigns.worker import Ticket
+from wakewise.experiments.campaigns.worker_process import Report, attempt
 
 DRIVERS = ".drivers"
 _LOOK_S = 0.2
@@ -148,7 +148,7 @@ class _Driver:
         for key, task in unique.items():
             kept = listed.get(key)
             if kept is not None and kept.figures is None and kept.attempts.is_failure(retries) and again:
-                attempts.anew(store.place(key))
+                attempt_log.anew(store.place(key))
                 kept = None
             if kept is None or not (kept.figures is not None or kept.attempts.is_failure(retries)):
                 self.pending.append(task)
@@ -193,7 +193,7 @@ class _Driver:
         key, place = task.key, self._store.place(task.key)
         if self._is_settled(task):
             return
-        holder, beat = claims.holder_of(place), claims.beat_of(place)
+        holder, beat = trial_lock.holder_of(place), trial_lock.beat_of(place)
         left = self._abandoned.pop(key, None)
         if holder is not None and not holder.is_gone and (left is None or left != beat):
             self._held[key] = _Held(task, beat, time.monotonic())
@@ -220,13 +220,13 @@ class _Driver:
             report = Report(key=key, how="died", reason=" ".join(f"{type(fault).__name__}: {fault}".split()))
             place = self._store.place(key)
             place.mkdir(parents=True, exist_ok=True)
-            attempts.end(place, "died", report.reason, 0.0)
+            attempt_log.end(place, "died", report.reason, 0.0)
         if report.reason == FULL:
             raise OSError(errno.ENOSPC, FULL)
         self._met[key] += report.how == "computer"
         if report.how == "held":
             place = self._store.place(key)
-            self._held[key] = _Held(task, claims.beat_of(place), time.monotonic())
+            self._held[key] = _Held(task, trial_lock.beat_of(place), time.monotonic())
             return
         if self._is_settled(task):
             if report.how == "done":
@@ -241,7 +241,7 @@ class _Driver:
         """Whether a trial is finished or has failed for good; then its outcome is kept."""
         place = self._store.place(task.key)
         outcome = self._store.outcome(task)
-        if outcome.figures is None and not attempts.read_attempts(place).is_failure(self._retries):
+        if outcome.figures is None and not attempt_log.read_attempts(place).is_failure(self._retries):
             return False
         self._done[task.key] = outcome
         return True
@@ -250,7 +250,7 @@ class _Driver:
         """Take up again what another process has given back, or whose holder is gone."""
         for key, held in list(self._held.items()):
             place = self._store.place(key)
-            holder, beat = claims.holder_of(place), claims.beat_of(place)
+            holder, beat = trial_lock.holder_of(place), trial_lock.beat_of(place)
             now = time.monotonic()
             if holder is not None and not holder.is_gone:
                 if beat != held.beat:
@@ -284,19 +284,19 @@ def _driver_file(folder: Path) -> Iterator[Path]:
     living_drivers(folder)
     path = place / f"{os.getpid()}-{os.urandom(4).hex()}.json"
     try:
-        path.write_text(json.dumps(asdict(claims.this_process())), encoding="utf-8")
+        path.write_text(json.dumps(asdict(trial_lock.this_process())), encoding="utf-8")
         yield path
     finally:
         with suppress(OSError):
             path.unlink(missing_ok=True)
 
 
-def living_drivers(folder: Path) -> list[claims.Holder]:
+def living_drivers(folder: Path) -> list[trial_lock.Holder]:
     """Drivers that are at a campaign; files of those that are gone are removed."""
     found = []
     for path in sorted((folder / DRIVERS).glob("*.json")):
         try:
-            holder = claims.Holder(**json.loads(path.read_text(encoding="utf-8")))
+            holder = trial_lock.Holder(**json.loads(path.read_text(encoding="utf-8")))
         except (OSError, ValueError, TypeError):
             continue
         if holder.is_gone:

@@ -20,7 +20,7 @@ from typing import Any
 
 from wakewise.core.errors import FULL, EnvironmentFailure, InputError, is_full
 from wakewise.core.files import write_json
-from wakewise.experiments.campaigns import attempts
+from wakewise.experiments.campaigns import attempt_log
 from wakewise.experiments.campaigns.task import Figure, Outcome, Task
 
 FORMAT = 1
@@ -54,7 +54,7 @@ class Store:
         """What has become of a trial so far."""
         place = self.place(task.key)
         kept = read_figures(place)
-        told = attempts.read_attempts(place)
+        told = attempt_log.read_attempts(place)
         if kept is not None:
             return Outcome(
                 task=task, figures=kept[0], attempts=max(1, told.begun), took_s=kept[1], known=known, how="done"

@@ -13,8 +13,8 @@ import polars as pl
 
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
-from wakewise.experiments.campaigns import claims
-from wakewise.experiments.campaigns.attempts import FINAL, TRIED, Attempts
+from wakewise.experiments.campaigns import trial_lock
+from wakewise.experiments.campaigns.attempt_log import FINAL, TRIED, Attempts
 from wakewise.experiments.campaigns.definition import FACTORS
 from wakewise.experiments.campaigns.index import listing
 from wakewise.experiments.campaigns.plan import Entry, Plan, read_plan
@@ -198,7 +198,7 @@ def _as_text(words: pl.Expr) -> pl.Expr:
 
 def _state(store: Store, key: str, told: Attempts) -> State:
     """Where a trial is that has no figures."""
-    holder = claims.holder_of(store.place(key)) if told.begun else None
+    holder = trial_lock.holder_of(store.place(key)) if told.begun else None
     if holder is not None and not holder.is_gone:
         return "running"
     return "failed" if told.how in (*FINAL, *TRIED) else "waiting"

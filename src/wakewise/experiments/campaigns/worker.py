@@ -24,7 +24,7 @@ from typing import Any
 
 from wakewise.core.errors import FULL, EnvironmentFailure, environment_failure, is_full
 from wakewise.core.files import write_json
-from wakewise.experiments.campaigns import attempts, claims
+from wakewise.experiments.campaigns import attempt_log, trial_lock
 from wakewise.experiments.campaigns.store import FIGURES, LOG, TRIAL, WORK, write_figures
 from wakewise.experiments.campaigns.task import Work, WorkProgress, function_named
 from wakewise.experiments.campaigns.versions import source_version
@@ -79,7 +79,7 @@ def work_on(
     held = False
     try:
         place.mkdir(parents=True, exist_ok=True)
-        held = claims.take(place, ticket.abandoned_beat)
+        held = trial_lock.take(place, ticket.abandoned_beat)
         if not held:
             return {"how": "held", "reason": None, "took_s": 0.0}
         if (place / FIGURES).exists():  # another driver was faster
@@ -87,12 +87,12 @@ def work_on(
         _tidy(place)
         if not (place / TRIAL).exists():
             write_json(place / TRIAL, ticket.trial | {"versions": _versions()}, lasting=True)
-        attempts.begin(place, **asdict(claims.this_process()))
+        attempt_log.begin(place, **asdict(trial_lock.this_process()))
         begun()
         told = _tried(ticket, place, send, quiet)
         told["took_s"] = time.monotonic() - began
         with suppress(OSError):  # a full disk: the driver is told
-            attempts.end(place, told["how"], told["reason"], told["took_s"])
+            attempt_log.end(place, told["how"], told["reason"], told["took_s"])
         return told
     except OSError as fault:
         failure = environment_failure(fault) or fault
@@ -100,7 +100,7 @@ def work_on(
     finally:
         if held:
             with suppress(OSError):
-                claims.release(place)
+                trial_lock.release(place)
 
 
 def _tried(ticket: Ticket, place: Path, send: WorkProgress, quiet: bool) -> dict[str, Any]:
@@ -113,7 +113,7 @@ def _tried(ticket: Ticket, place: Path, send: WorkProgress, quiet: bool) -> dict
             _check_version(ticket)
             work: Work = function_named(ticket.trial["work"])
             figures = work(ticket.trial["settings"], folder, send)
-            if not claims.is_mine(place):
+            if not trial_lock.is_mine(place):
                 raise EnvironmentFailure("another computer took the trial over: this one was not heard of for too long")
             write_figures(place, figures, time.monotonic() - began)
     except Exception as fault:  # whatever the work raises is the trial's outcome, unless the computer is at fault

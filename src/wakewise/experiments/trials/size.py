@@ -15,7 +15,7 @@ from wakewise.core.errors import InputError
 from wakewise.scene.targets import MeshDistance
 from wakewise.vision.evaluation import Crop, evaluate_surface
 from wakewise.vision.evaluation.alignment import umeyama
-from wakewise.vision.evaluation.surface import Mesh
+from wakewise.vision.evaluation.cloud_to_surface import Mesh
 
 SIZE_FIGURES = ("scale_error_pct", "rmse_scaled_mm")
 SAMPLES = 5_000

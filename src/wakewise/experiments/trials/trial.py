@@ -21,10 +21,10 @@ from wakewise.core.optional_dependencies import need
 from wakewise.core.run_lock import alone
 from wakewise.experiments.trials.coverage import FROM_MODEL, coverage_figures
 from wakewise.experiments.trials.metrics import Figures, Gathering, comparison
+from wakewise.experiments.trials.reference_values import add_yardsticks
 from wakewise.experiments.trials.size import SIZE_FIGURES, size_figures
 from wakewise.experiments.trials.stages import Ledger, Quiet, Watch, of_the_computer
 from wakewise.experiments.trials.surface import SurfaceMaker
-from wakewise.experiments.trials.yardstick import add_yardsticks
 from wakewise.operation import (
     Darkroom,
     Parts,
@@ -327,7 +327,7 @@ def _rmse_mean_shape_mm(parts: Parts, folder: Path, cloud: Array) -> float | Non
 
 def _size(parts: Parts, folder: Path, photos: pl.DataFrame, cloud: Array, distance: MeshDistance) -> dict[str, float]:
     """Figures of the model's size; that they could not be computed takes no other figure away."""
-    from wakewise.vision.reconstruction.views import camera_centres
+    from wakewise.vision.reconstruction.registered_photos import camera_centres
 
     true = dict(zip(photos["name"], photos.select("true_x_m", "true_y_m", "true_z_m").to_numpy(), strict=True))
     crop = Crop(bed_z_m=parts.target.bed_z_m)

@@ -22,13 +22,13 @@ from wakewise.control.intent import PAPER_W_TRACK
 from wakewise.control.switching import Switched
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState, Controller, Goal
-from wakewise.operation.teleop.desk import WAYS, Desk, DeskState
+from wakewise.operation.teleop.arbitration import BRAKING_M_S2, Sphere, steered, turned
+from wakewise.operation.teleop.collision_limiter import KeepOff
 from wakewise.operation.teleop.input import CENTRED, Controls, ControlSource
-from wakewise.operation.teleop.input.trace import TraceWriter
-from wakewise.operation.teleop.keep_off import KeepOff
+from wakewise.operation.teleop.input.control_log import TraceWriter
 from wakewise.operation.teleop.motion import Motion
-from wakewise.operation.teleop.scanning import Mission, Scan
-from wakewise.operation.teleop.steering import BRAKING_M_S2, Sphere, steered, turned
+from wakewise.operation.teleop.operator_state import WAYS, Desk, DeskState
+from wakewise.operation.teleop.resumable_mission import Mission, Scan
 from wakewise.scene.missions import CameraAim
 
 if TYPE_CHECKING:

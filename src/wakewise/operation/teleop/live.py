@@ -26,10 +26,10 @@ from wakewise.operation.flight_log import PARTS, FlightLog, hands_part, has_part
 from wakewise.operation.flying import FLIGHT_JOBS, WATER_EVERY_S, blamed, loop_of, recorder_of
 from wakewise.operation.loop import Step
 from wakewise.operation.parts import Parts
-from wakewise.operation.teleop.input.trace import TraceWriter
+from wakewise.operation.teleop.input.control_log import TraceWriter
 from wakewise.operation.teleop.live_folder import gather
-from wakewise.operation.teleop.pace import Pace
-from wakewise.operation.teleop.shutter import Shutter
+from wakewise.operation.teleop.photo_trigger import Shutter
+from wakewise.operation.teleop.realtime_pacer import Pace
 from wakewise.operation.trial_folder import claim, flown_by_hand, write_truth
 
 SWITCH_S = 2e-4

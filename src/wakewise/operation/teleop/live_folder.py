@@ -14,7 +14,7 @@ from wakewise.core.geometry import Pose
 from wakewise.core.optional_dependencies import has
 from wakewise.operation.flight_log import drop_parts, has_parts, parts_exposures, parts_hands, parts_table, steps_of
 from wakewise.operation.recorder import write_record
-from wakewise.operation.teleop.input.trace import TRACE_FILE
+from wakewise.operation.teleop.input.control_log import TRACE_FILE
 from wakewise.operation.trial_folder import write_views
 
 if TYPE_CHECKING:

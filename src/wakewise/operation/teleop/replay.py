@@ -11,12 +11,12 @@ from wakewise.core.errors import InputError
 from wakewise.operation.parts import Parts
 from wakewise.operation.scenario import Scenario, read_scenario
 from wakewise.operation.teleop.assisted import assisted
-from wakewise.operation.teleop.desk import Desk
+from wakewise.operation.teleop.input.control_log import TRACE_FILE, Trace, read_trace
 from wakewise.operation.teleop.input.script import Script
 from wakewise.operation.teleop.input.sources import hands_from
-from wakewise.operation.teleop.input.trace import TRACE_FILE, Trace, read_trace
 from wakewise.operation.teleop.live import LiveFlight
-from wakewise.operation.teleop.shutter import Shutter
+from wakewise.operation.teleop.operator_state import Desk
+from wakewise.operation.teleop.photo_trigger import Shutter
 
 AFTER_S = 3.0
 """How long a flight goes on after the last entry of a script; estimate: from full stick to rest takes 1.5 s."""

@@ -27,12 +27,12 @@ from wakewise.core.interfaces import BodyState, Measurement, Plant, ScalarGrid, 
 from wakewise.robot.thrusters import electrical_power_W
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Target
-from wakewise.simulation.lattice.live import LiveBox, disk_points
+from wakewise.simulation.lattice.forced_lattice import LiveBox, disk_points
 from wakewise.simulation.tank import Sensors, TankSettings, VehiclePlant
 from wakewise.simulation.tank.camera_joint import CameraJoint
-from wakewise.simulation.tank.measuring import TargetProbes
 from wakewise.simulation.tank.sediment import SiltLaws
 from wakewise.simulation.tank.settings import PLANT_STEP_S
+from wakewise.simulation.tank.water_truth import TargetProbes
 from wakewise.simulation.water import AmbientSum, SteadyCurrent
 
 CELL_M = 0.025

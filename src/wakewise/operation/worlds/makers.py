@@ -14,7 +14,7 @@ from wakewise.core.interfaces import BodyState, World
 from wakewise.core.plugins import find
 from wakewise.operation.worlds.lattice_world import LatticeWorld, box_half_size_m
 from wakewise.operation.worlds.library import load_world, world_names
-from wakewise.operation.worlds.wake_world import InstantWorld, Jets, free_jet_field, lattice_jets, paper_jets
+from wakewise.operation.worlds.quasi_steady_world import InstantWorld, Jets, free_jet_field, lattice_jets, paper_jets
 from wakewise.robot.vehicles import Vehicle, perturbed, with_drag
 from wakewise.simulation.tank import TankWorld
 

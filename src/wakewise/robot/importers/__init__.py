@@ -5,13 +5,13 @@ never guessed.
 
 Start reading in `read.py` (`import_vehicle`: which reader takes a file) and `find.py` (a vehicle by library name, by
 path, by format). Readers: `urdf.py`, `sdf.py`, `stonefish.py` with `stonefish_thrusters.py`, `matrices.py` and
-`yamls.py` with `yaml_parameters.py`; formats from outside are found through the entry points
+`safe_yaml_nodes.py` with `yaml_parameters.py`; formats from outside are found through the entry points
 `wakewise.vehicle_formats`. Their helpers: `layouts.py` and `thruster_lists.py` (thrusters in lists, with
-`angles.py`), `wrench_rows.py` (what the rows of a matrix are), `names.py` (what thrusters' names say), `unread.py`
-(keys that no reader took) and `plausible.py` (what any vehicle must fulfil), `xacro*.py`, `expressions.py` and
-`scopes.py` expand macros, `xml.py` and `packages.py` find files, `bodies.py`, `plugins.py` with `thruster_forms.py`,
-`water.py`, `outline.py` and `found.py` put a vehicle together, `stated_matrix.py` reads the matrix that a file
-states, to be held against its geometry.
+`angles.py`), `wrench_rows.py` (what the rows of a matrix are), `names.py` (what thrusters' names say), `unused_keys.py`
+(keys that no reader took) and `thruster_checks.py` (what any vehicle must fulfil), `xacro*.py`, `expressions.py` and
+`scopes.py` expand macros, `xml.py` and `packages.py` find files, `robot_description.py`, `gazebo_thrusters.py` with
+`gazebo_thruster_models.py`, `water.py`, `hull_and_camera.py` and `parsed_vehicle.py` put a vehicle together,
+`stated_matrix.py` reads the matrix that a file states, to be held against its geometry.
 """
 
 from wakewise.robot.importers.find import any_vehicle, compare_with, find_vehicle

@@ -8,9 +8,10 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.robot.importers.angles import read_angles, unit_of
-from wakewise.robot.importers.bodies import pose_of
-from wakewise.robot.importers.found import QUESTION, Found, FoundThruster
-from wakewise.robot.importers.plausible import is_unit, require_count
+from wakewise.robot.importers.parsed_vehicle import QUESTION, Found, FoundThruster
+from wakewise.robot.importers.robot_description import pose_of
+from wakewise.robot.importers.safe_yaml_nodes import Item
+from wakewise.robot.importers.thruster_checks import is_unit, require_count
 from wakewise.robot.importers.thruster_lists import (
     POSES,
     TURN_RULE,
@@ -20,7 +21,6 @@ from wakewise.robot.importers.thruster_lists import (
 )
 from wakewise.robot.importers.xml import PlacedError
 from wakewise.robot.importers.yaml_parameters import Entries, find
-from wakewise.robot.importers.yamls import Item
 
 _NAMES = re.compile(r"^(thrusters?|motors?)(_?(names?|ids?|labels?|order))?$|^names$", re.IGNORECASE)
 _POSITIONS = ("thruster_position", "thruster_positions", "positions", "thruster_locations", "locations")

@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.robot.importers.found import QUESTION, Found, Frame
 from wakewise.robot.importers.layouts import listed_names, read_geometry
 from wakewise.robot.importers.names import vote
-from wakewise.robot.importers.plausible import claims_in, require_count, require_same_count
+from wakewise.robot.importers.parsed_vehicle import QUESTION, Found, Frame
+from wakewise.robot.importers.safe_yaml_nodes import Item
+from wakewise.robot.importers.thruster_checks import claims_in, require_count, require_same_count
 from wakewise.robot.importers.thruster_lists import LOOKS_LIKE_THRUSTERS
-from wakewise.robot.importers.unread import not_read, title, words_in
+from wakewise.robot.importers.unused_keys import not_read, title, words_in
 from wakewise.robot.importers.wrench_rows import (
     Order,
     component_in_comment,
@@ -24,7 +25,6 @@ from wakewise.robot.importers.wrench_rows import (
 )
 from wakewise.robot.importers.xml import PlacedError
 from wakewise.robot.importers.yaml_parameters import Entries, read_parameters
-from wakewise.robot.importers.yamls import Item
 
 _MATRIX_KEY = re.compile(
     r"(^|_)(tam|b_matrix|mixer|mixing)(_|$)|allocation|configuration_matrix|thruster_matrix|thrust_matrix|input_matrix$",

@@ -11,8 +11,12 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
-from wakewise.robot.importers.bodies import Bodies, read_camera, read_displacement, read_mass
-from wakewise.robot.importers.found import (
+from wakewise.robot.importers.gazebo_thruster_models import words
+from wakewise.robot.importers.gazebo_thrusters import read_thrusters
+from wakewise.robot.importers.hull_and_camera import read_outline
+from wakewise.robot.importers.matrices import read_matrix_only, read_yaml
+from wakewise.robot.importers.packages import Folders
+from wakewise.robot.importers.parsed_vehicle import (
     FRAME_CHOICES,
     QUESTION,
     THRUST_CHOICES,
@@ -20,20 +24,17 @@ from wakewise.robot.importers.found import (
     make_draft,
     wrench_rows_to_frd,
 )
-from wakewise.robot.importers.matrices import read_matrix_only, read_yaml
-from wakewise.robot.importers.outline import read_outline
-from wakewise.robot.importers.packages import Folders
-from wakewise.robot.importers.plausible import (
+from wakewise.robot.importers.robot_description import Bodies, read_camera, read_displacement, read_mass
+from wakewise.robot.importers.safe_yaml_nodes import parse_yaml
+from wakewise.robot.importers.sdf import left_out, read_sdf
+from wakewise.robot.importers.stonefish import read_stonefish
+from wakewise.robot.importers.thruster_checks import (
     question_inertia,
     question_names,
     question_rank,
     require_count,
     require_force_columns,
 )
-from wakewise.robot.importers.plugins import read_thrusters
-from wakewise.robot.importers.sdf import left_out, read_sdf
-from wakewise.robot.importers.stonefish import read_stonefish
-from wakewise.robot.importers.thruster_forms import words
 from wakewise.robot.importers.urdf import read_urdf
 from wakewise.robot.importers.water import read_water
 from wakewise.robot.importers.wrench_rows import (
@@ -47,7 +48,6 @@ from wakewise.robot.importers.wrench_rows import (
 )
 from wakewise.robot.importers.xacro import Xacro
 from wakewise.robot.importers.xml import Element, PlacedError, parse_xml, read_text
-from wakewise.robot.importers.yamls import parse_yaml
 from wakewise.robot.vehicles.draft import VehicleDraft
 from wakewise.robot.vehicles.vehicle import Provenance
 

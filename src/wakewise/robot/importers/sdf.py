@@ -8,7 +8,8 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
-from wakewise.robot.importers.bodies import (
+from wakewise.robot.importers.packages import Folders
+from wakewise.robot.importers.robot_description import (
     PART_NAME,
     Bodies,
     Joint,
@@ -17,7 +18,6 @@ from wakewise.robot.importers.bodies import (
     collision_shape,
     inertia_matrix,
 )
-from wakewise.robot.importers.packages import Folders
 from wakewise.robot.importers.urdf import CAMERA_TYPES, camera, pose_element
 from wakewise.robot.importers.xml import Element, PlacedError, number, numbers, parse_xml, read_text
 

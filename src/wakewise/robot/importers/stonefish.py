@@ -12,10 +12,10 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.robot.importers.bodies import Bodies, Joint, Link, checked_mass, read_mass
 from wakewise.robot.importers.expressions import evaluate
-from wakewise.robot.importers.found import Found
 from wakewise.robot.importers.packages import Folders
+from wakewise.robot.importers.parsed_vehicle import Found
+from wakewise.robot.importers.robot_description import Bodies, Joint, Link, checked_mass, read_mass
 from wakewise.robot.importers.stonefish_thrusters import count, read_thrusters
 from wakewise.robot.importers.urdf import origin
 from wakewise.robot.importers.xml import Element, Place, PlacedError, number, numbers, parse_xml, read_text

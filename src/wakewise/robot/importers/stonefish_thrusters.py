@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from wakewise.robot.importers.bodies import Bodies, moving_parts
-from wakewise.robot.importers.found import QUESTION, Found, FoundThruster
-from wakewise.robot.importers.plugins import question_steered
-from wakewise.robot.importers.thruster_forms import disk_area_m2, short
+from wakewise.robot.importers.gazebo_thruster_models import disk_area_m2, short
+from wakewise.robot.importers.gazebo_thrusters import question_steered
+from wakewise.robot.importers.parsed_vehicle import QUESTION, Found, FoundThruster
+from wakewise.robot.importers.robot_description import Bodies, moving_parts
 from wakewise.robot.importers.urdf import origin
 from wakewise.robot.importers.xml import Element, PlacedError, number, numbers
 

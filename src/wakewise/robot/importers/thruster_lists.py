@@ -10,12 +10,12 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
 from wakewise.robot.importers.angles import read_angles, unit_of
-from wakewise.robot.importers.bodies import pose_of
-from wakewise.robot.importers.found import QUESTION, Found, FoundThruster
-from wakewise.robot.importers.plausible import is_unit, require_count
+from wakewise.robot.importers.parsed_vehicle import QUESTION, Found, FoundThruster
+from wakewise.robot.importers.robot_description import pose_of
+from wakewise.robot.importers.safe_yaml_nodes import Item
+from wakewise.robot.importers.thruster_checks import is_unit, require_count
 from wakewise.robot.importers.xml import PlacedError
 from wakewise.robot.importers.yaml_parameters import Entries, three
-from wakewise.robot.importers.yamls import Item
 
 _BARE = re.compile(r"^thrusters?(_list)?$", re.IGNORECASE)
 _NUMBERED = re.compile(r"^thruster_?\d+$", re.IGNORECASE)

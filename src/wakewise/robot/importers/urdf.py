@@ -7,7 +7,7 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
 from wakewise.robot.importers.angles import require_radians
-from wakewise.robot.importers.bodies import (
+from wakewise.robot.importers.robot_description import (
     IDENTITY,
     PART_NAME,
     Bodies,

@@ -7,9 +7,9 @@ import re
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.robot.importers.bodies import Bodies
-from wakewise.robot.importers.found import Found, symmetrised
-from wakewise.robot.importers.thruster_forms import short, words
+from wakewise.robot.importers.gazebo_thruster_models import short, words
+from wakewise.robot.importers.parsed_vehicle import Found, symmetrised
+from wakewise.robot.importers.robot_description import Bodies
 from wakewise.robot.importers.xml import Element, PlacedError, number, numbers
 
 _FORCES = "xyzkmn"

@@ -10,8 +10,8 @@ import numpy as np
 
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
-from wakewise.robot.importers.found import QUESTION, wrench_rows_to_frd
-from wakewise.robot.importers.plausible import UNIT_SLACK, is_unit
+from wakewise.robot.importers.parsed_vehicle import QUESTION, wrench_rows_to_frd
+from wakewise.robot.importers.thruster_checks import UNIT_SLACK, is_unit
 from wakewise.robot.importers.xml import Place, PlacedError
 
 _WORDS = (

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.physics import GRAVITY_M_S2
-from wakewise.robot.importers.bodies import PART_NAME, inertia_matrix
-from wakewise.robot.importers.found import Found
+from wakewise.core.constants import GRAVITY_M_S2
+from wakewise.robot.importers.parsed_vehicle import Found
+from wakewise.robot.importers.robot_description import PART_NAME, inertia_matrix
+from wakewise.robot.importers.safe_yaml_nodes import Item
 from wakewise.robot.importers.water import store
 from wakewise.robot.importers.xml import PlacedError
-from wakewise.robot.importers.yamls import Item
 
 _MASS = ("mass", "mass_kg")
 Entries = list[tuple[tuple[str, ...], Item]]

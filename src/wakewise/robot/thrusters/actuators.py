@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.physics import TRIM_WATER_KG_M3
+from wakewise.core.constants import TRIM_WATER_KG_M3
 from wakewise.robot.thrusters.thrust_curve import ThrustCurve
 
 FIGURE_OF_MERIT_FORWARD = 0.333

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from wakewise.core.arrays import Array, freeze, frozen
 from wakewise.core.errors import InputError
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 from wakewise.robot.thrusters.thrust_curve import ThrustCurve
 
 PULSE_STEP_US = 1.0

@@ -12,9 +12,9 @@ import numpy as np
 from scipy.optimize import isotonic_regression
 
 from wakewise.core.arrays import Array, freeze
+from wakewise.core.constants import GRAVITY_M_S2
+from wakewise.core.csv_separators import other_separator
 from wakewise.core.errors import InputError
-from wakewise.core.physics import GRAVITY_M_S2
-from wakewise.core.separators import other_separator
 from wakewise.robot.thrusters.thrust_curve import NEUTRAL_US, CurveSide, ThrustCurve
 
 KGF_N = GRAVITY_M_S2

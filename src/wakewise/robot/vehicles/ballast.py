@@ -16,8 +16,8 @@ import numpy as np
 from pydantic import Field
 
 from wakewise.core.arrays import Array
+from wakewise.core.constants import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.core.errors import InputError
-from wakewise.core.physics import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.core.settings import Settings
 from wakewise.robot.vehicles.vehicle import Vehicle
 

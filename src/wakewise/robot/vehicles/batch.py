@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
-from wakewise.core.jit.compiled import assign, njit, prange
+from wakewise.core.jit.njit import assign, njit, prange
 from wakewise.robot.vehicles.dynamics import RigidBody
 from wakewise.robot.vehicles.runge_kutta import rk4_stages
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.physics import GRAVITY_M_S2, TRIM_WATER_KG_M3
+from wakewise.core.constants import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.robot.vehicles.check import (
     WRENCH_AXES,
     AnyVehicle,

@@ -21,8 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from wakewise.core.arrays import Array, freeze
+from wakewise.core.constants import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.core.errors import InputError
-from wakewise.core.physics import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.robot.vehicles import fossen, kernels
 from wakewise.robot.vehicles.fossen import rigid_body_mass
 from wakewise.robot.vehicles.runge_kutta import rk4_kernel

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 
 Three = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from wakewise.core.constants import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.core.errors import InputError
-from wakewise.core.physics import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.robot.vehicles.hydrodynamics import Hydrodynamics
 from wakewise.robot.vehicles.vehicle import Vehicle
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 from wakewise.robot.vehicles.kernels import INVERSE, rate_jacobian_kernel, rate_kernel
 
 COLUMNS = 16

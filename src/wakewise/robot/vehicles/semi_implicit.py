@@ -22,7 +22,7 @@ from __future__ import annotations
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 from wakewise.robot.vehicles.kernels import Six, Three, add_quasi_linear_change, quasi_linear, restoring, rotate, times
 from wakewise.robot.vehicles.runge_kutta import COLUMNS
 

@@ -3,20 +3,20 @@
 Start reading in `route.py` (legs, shutter, the pilot that follows them) and `orbit.py` (viewpoints on layered
 hemispheres), `order.py` (which of them is the first); `aim.py` is what points the camera there (pitch, tilt joint or
 both), `clearance.py` refuses what would touch and tilts that the joint cannot follow, `settings.py` is what a user may
-say. `coverage.py` says what of the target photographs have seen well (`patches.py`, `sight.py`) and where to go next
-(`within_reach.py`), `missed.py` why a part was not seen.
+say. `coverage.py` says what of the target photographs have seen well (`surface_patches.py`, `visibility.py`) and where
+to go next (`reachability.py`), `coverage_gaps.py` why a part was not seen.
 """
 
 from wakewise.scene.missions.aim import CameraAim, aim_of
 from wakewise.scene.missions.clearance import TankBounds, check_clearance, check_tilt
 from wakewise.scene.missions.coverage import Coverage
-from wakewise.scene.missions.missed import Missed, missed
+from wakewise.scene.missions.coverage_gaps import Missed, missed
 from wakewise.scene.missions.orbit import Orbit, layered_orbits
-from wakewise.scene.missions.patches import Patches, patches_of
+from wakewise.scene.missions.reachability import Views, reachable_views
 from wakewise.scene.missions.route import SETTLING, Leg, Route, RoutePilot, open_route, plan_route
 from wakewise.scene.missions.settings import MissionSettings
-from wakewise.scene.missions.sight import Need
-from wakewise.scene.missions.within_reach import Views, reachable_views
+from wakewise.scene.missions.surface_patches import Patches, patches_of
+from wakewise.scene.missions.visibility import Need
 
 __all__ = [
     "SETTLING",

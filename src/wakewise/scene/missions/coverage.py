@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from wakewise.core.arrays import Array, BoolArray
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.core.jit.compiled import njit
-from wakewise.scene.missions.patches import Patches
-from wakewise.scene.missions.sight import Lens, Need, well_shown
-from wakewise.scene.missions.within_reach import Views, way_words
+from wakewise.core.jit.njit import njit
+from wakewise.scene.missions.reachability import Views, way_words
+from wakewise.scene.missions.surface_patches import Patches
+from wakewise.scene.missions.visibility import Lens, Need, well_shown
 
 Counts = NDArray[np.uint8]
 
@@ -163,7 +163,7 @@ class Coverage:
         """Share that is seen well with a photograph to spare, 0 to 1, at most `share`.
 
         Where photographs overlap no more than they must, thin or rough parts may come out worse than expected: of ten
-        models, each had what lies between the two, to two points (docs/decisions/0046).
+        models, each had what lies between the two, to two points (docs/research-log/0046).
         """
         if len(self.partners) == 0:
             return 0.0

@@ -1,9 +1,9 @@
 """Where orbits are begun: as they are listed, or each at its view downstream of the target.
 
 A vehicle that waits, approaches or climbs upstream of the target has its wash carried on to it, and what was blown
-there is still felt a quarter of a minute later, on the far side of the orbit (docs/decisions/0040). Settling, approach,
-climbs and the first half of each orbit, which goes up against the current, then lie where the wash is carried away.
-Views are the same; only which of a circle's views is its first changes.
+there is still felt a quarter of a minute later, on the far side of the orbit (docs/research-log/0040). Settling,
+approach, climbs and the first half of each orbit, which goes up against the current, then lie where the wash is carried
+away. Views are the same; only which of a circle's views is its first changes.
 """
 
 from __future__ import annotations

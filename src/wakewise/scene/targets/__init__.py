@@ -4,19 +4,19 @@ Delicate features are found from the mesh or marked by a person, and may count m
 
 Start reading in `target.py` (a mesh on its bed), `find.py` (a target by name) and `region.py` (points that stand for
 its water). `corals.py` and `soft.py` with `fields.py` grow corals, `mesh.py` reads files, `sampling.py` spreads points,
-`distance.py` and `rays.py` measure, `delicate.py` and `marks.py` say what is delicate. `sway.py` with `sections.py`
-says how a soft one bends, `tissues.py` what it is made of.
+`distance.py` and `rays.py` measure, `fragility.py` and `fragility_marks.py` say what is delicate. `elasticity.py` with
+`sections.py` says how a soft one bends, `tissues.py` what it is made of.
 """
 
 from wakewise.scene.targets.corals import coral, coral_kinds, soft_kinds, stony_kinds
-from wakewise.scene.targets.delicate import Delicacy, delicacy
 from wakewise.scene.targets.distance import MeshDistance
+from wakewise.scene.targets.elasticity import Sway, Tissue, turned_normals
 from wakewise.scene.targets.find import find_mesh, find_target, is_mesh_file
-from wakewise.scene.targets.marks import Marks, read_marks, read_vertex_scores
+from wakewise.scene.targets.fragility import Delicacy, delicacy
+from wakewise.scene.targets.fragility_marks import Marks, read_marks, read_vertex_scores
 from wakewise.scene.targets.mesh import Mesh, load_mesh, read_mesh, write_mesh
 from wakewise.scene.targets.region import Measure, Region, region_measure, sample_region
 from wakewise.scene.targets.sampling import sampling_error_pct
-from wakewise.scene.targets.sway import Sway, Tissue, turned_normals
 from wakewise.scene.targets.target import Target, place_on_bed
 from wakewise.scene.targets.tissues import TISSUES
 

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from wakewise.core.arrays import Array, IntArray
 from wakewise.core.errors import InputError
-from wakewise.core.jit.compiled import njit, prange
+from wakewise.core.jit.njit import njit, prange
 
 _LEAF = 4
 

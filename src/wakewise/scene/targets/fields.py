@@ -12,7 +12,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import njit, prange
+from wakewise.core.jit.njit import njit, prange
 from wakewise.scene.targets.mesh import Mesh
 
 OUTSIDE_M = 1.0

@@ -17,7 +17,7 @@ from wakewise.core.arrays import Array, IntArray, freeze, frozen_indices
 from wakewise.core.checks import path_of
 from wakewise.core.errors import InputError
 from wakewise.core.files import write_bytes
-from wakewise.core.sizes import broken_ply
+from wakewise.core.size_limits import broken_ply
 
 READABLE_SUFFIXES = (".ply", ".stl", ".obj", ".off", ".glb")
 PLAUSIBLE_SIZE_M = (0.02, 2.0)

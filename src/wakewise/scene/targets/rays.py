@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
-from wakewise.core.jit.compiled import njit, prange
+from wakewise.core.jit.njit import njit, prange
 from wakewise.scene.targets.mesh import Mesh
 
 LEAF = 4

@@ -28,8 +28,8 @@ from scipy.spatial import KDTree
 
 from wakewise.core.arrays import Array, BoolArray, IntArray, freeze
 from wakewise.core.errors import InputError
-from wakewise.scene.targets.delicate import Delicacy
 from wakewise.scene.targets.distance import MeshDistance
+from wakewise.scene.targets.fragility import Delicacy
 from wakewise.scene.targets.mesh import Mesh
 from wakewise.scene.targets.rays import Rays
 from wakewise.scene.targets.sampling import cell_middles, centroidal, relaxed, reweighted

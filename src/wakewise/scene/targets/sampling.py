@@ -28,7 +28,7 @@ from scipy.spatial.distance import cdist
 
 from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.errors import InputError
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 
 LIKENESS_M = 0.06
 """Length l of the likeness: widths s of 2.4 to 4.2 cm, a round jet's at 0.4 to 0.7 m (half-width slope 0.096)."""

@@ -17,7 +17,7 @@ tan(delta) is about 0.3 and the damping half of that, 0.15 of critical: by analo
 
 from __future__ import annotations
 
-from wakewise.scene.targets.sway import Tissue
+from wakewise.scene.targets.elasticity import Tissue
 
 _DAMPING = 0.15
 

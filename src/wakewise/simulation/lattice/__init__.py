@@ -4,10 +4,11 @@ The water of a trial is made of parcels (`wakewise.simulation.water`), which are
 knows no law of jets: it solves for the flow of a pushing disk, and laws, parcels and wake models are held against it.
 
 Start reading in `cases.py` (what was computed) and `flow.py` (its velocity at points). `kernel.py` is the solver with
-its parts `stencil.py`, `collision.py`, `faces.py` and `memory.py`, and `twin.py` its readable twin; `engines.py` picks
-that or a graphics card (`cuda_engine.py`, `cuda_kernel.py`). `run.py` and `compute.py` are a computation, `live.py`
-with `live_kernel.py` water for a flight, `bodies.py` solid boxes, `averages.py` and `meanfield.py` what is kept of it,
-`laws.py` what it says of the laws of round jets, `crossing.py` of jets that cross and `past_box.py` past a box.
+its parts `stencil.py`, `collision.py`, `faces.py` and `streaming_stores.py`, and `reference_step.py` its readable twin;
+`engines.py` picks that or a graphics card (`cuda_engine.py`, `cuda_kernel.py`). `run.py` and `compute.py` are a
+computation, `forced_lattice.py` with `forced_lattice_kernel.py` water for a flight, `bounce_back.py` solid boxes,
+`averages.py` and `meanfield.py` what is kept of it, `laws.py` what it says of the laws of round jets, `crossing.py` of
+jets that cross and `deflected_jet.py` past a box.
 """
 
 from wakewise.simulation.lattice.cases import CASES, Case, DiskJet, case_hash, find_case

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import njit, prange
+from wakewise.core.jit.njit import njit, prange
 
 MOMENTS = 8
 """What is averaged in every cell: p, u, v, w, uu, vv, ww, vw."""

@@ -10,7 +10,7 @@ from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.errors import InputError
 from wakewise.core.optional_dependencies import has, how_to_install
 from wakewise.simulation.lattice.averages import MOMENTS, accumulate
-from wakewise.simulation.lattice.bodies import Bodies
+from wakewise.simulation.lattice.bounce_back import Bodies
 from wakewise.simulation.lattice.kernel import push, step, velocity
 from wakewise.simulation.lattice.stencil import Lattice, box, plane_row, still_water
 

@@ -19,9 +19,8 @@ import numpy as np
 from numba import float32
 
 from wakewise.core.arrays import IntArray
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 from wakewise.simulation.lattice.collision import Populations
-from wakewise.simulation.lattice.memory import peek, poke
 from wakewise.simulation.lattice.stencil import (
     OPEN,
     OPPOSITE,
@@ -34,6 +33,7 @@ from wakewise.simulation.lattice.stencil import (
     Lattice,
     origin,
 )
+from wakewise.simulation.lattice.streaming_stores import peek, poke
 
 BEYOND = np.array(
     [

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from wakewise.core.arrays import Array, freeze
+from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.errors import InputError
-from wakewise.core.physics import FRESH_WATER_KG_M3
 from wakewise.simulation.lattice.meanfield import MeanField
 
 

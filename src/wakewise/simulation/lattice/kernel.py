@@ -11,11 +11,11 @@ import numpy as np
 from numba import float32
 
 from wakewise.core.arrays import Array, IntArray
-from wakewise.core.jit.compiled import njit, prange
+from wakewise.core.jit.njit import njit, prange
 from wakewise.simulation.lattice.collision import collide, collide_forced
 from wakewise.simulation.lattice.faces import fill_slots
-from wakewise.simulation.lattice.memory import LINE, copy_line, peek, poke, settle_stores, stream_line
 from wakewise.simulation.lattice.stencil import PERIODIC, PIECE, VELOCITIES, Lattice, box, origin
+from wakewise.simulation.lattice.streaming_stores import LINE, copy_line, peek, poke, settle_stores, stream_line
 
 _CACHED = 2**20
 """Populations of a lattice that a core's second-level cache holds for the next step."""

@@ -13,7 +13,7 @@ from scipy.ndimage import map_coordinates
 from wakewise.core.arrays import Array, IntArray, frozen
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import whole_file
-from wakewise.simulation.lattice.bodies import solid_cells
+from wakewise.simulation.lattice.bounce_back import solid_cells
 from wakewise.simulation.lattice.cases import AXES, Case, DiskJet, case_hash
 from wakewise.simulation.lattice.engines import make_engine
 from wakewise.simulation.lattice.stencil import OPEN, WALL, smagorinsky_factor

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import njit
-from wakewise.simulation.lattice.memory import LINE
+from wakewise.core.jit.njit import njit
+from wakewise.simulation.lattice.streaming_stores import LINE
 
 Lattice = NDArray[np.float32]
 

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 
 _NONE = np.zeros((0, 3))
 _TOUCH_M = 1e-6  # a hull that was set back onto something still touches it

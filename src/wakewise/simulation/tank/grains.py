@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wakewise.core.arrays import Array
+from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
-from wakewise.core.jit.compiled import njit
-from wakewise.core.physics import GRAVITY_M_S2
+from wakewise.core.jit.njit import njit
 
 VISCOSITY_M2_S = 1.0e-6  # of fresh water at 20 degrees
 VON_KARMAN = 0.40

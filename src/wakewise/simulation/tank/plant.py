@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from wakewise.core.arrays import Array
+from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose, matrix_from_quat, skew
 from wakewise.core.interfaces import BodyState
-from wakewise.core.jit.compiled import njit
-from wakewise.core.physics import GRAVITY_M_S2
+from wakewise.core.jit.njit import njit
 from wakewise.robot.thrusters import saturate, thruster_lag
 from wakewise.robot.vehicles import Vehicle, compile_body
 from wakewise.robot.vehicles.kernels import rotate

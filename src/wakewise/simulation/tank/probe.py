@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wakewise.core.arrays import Array, BoolArray, freeze
+from wakewise.core.constants import TRIM_WATER_KG_M3
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise.core.physics import TRIM_WATER_KG_M3
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Mesh, Target
 from wakewise.simulation.lattice import LatticeFlow, MeanField, load_mean_field
 from wakewise.simulation.tank.contact import Surroundings
 from wakewise.simulation.tank.probe_tables import ThrustHistory
 from wakewise.simulation.water.blockage import Blockage
-from wakewise.simulation.water.closure import PLAIN, SWIRLING
+from wakewise.simulation.water.round_jet_closure import PLAIN, SWIRLING
 from wakewise.simulation.water.water import Water
 
 FLOWS = ("parcels", "lattice")

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.core.arrays import Array, freeze
+from wakewise.core.csv_separators import other_separator
 from wakewise.core.errors import InputError
-from wakewise.core.separators import other_separator
 from wakewise.robot.vehicles import Vehicle
 
 _NUMBERED = re.compile(r"(?:thrust|thruster|t)?[_ ]?(\d+)", re.IGNORECASE)

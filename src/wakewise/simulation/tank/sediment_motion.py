@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 from wakewise.simulation.tank.grains import friction_from
 
 LEAST_LOOSE_KG_M2 = 1e-9  # less than this above the firm layer is none

@@ -26,8 +26,8 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import Measurement
-from wakewise.core.jit.compiled import njit
-from wakewise.simulation.tank.lasting import Lasting
+from wakewise.core.jit.njit import njit
+from wakewise.simulation.tank.gauss_markov import Lasting
 from wakewise.simulation.tank.settings import SensorSettings, Span
 
 OUTLIER_M, OUTLIER_RAD = 0.1, 0.2

@@ -17,24 +17,24 @@ from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Target
 from wakewise.simulation.tank.ambient import build_ambient
 from wakewise.simulation.tank.camera_joint import CameraJoint
-from wakewise.simulation.tank.fill import tank_water
 from wakewise.simulation.tank.flakes import Flakes
 from wakewise.simulation.tank.grains import STRESS_INTENSITY, speed_at_stress_m_s
-from wakewise.simulation.tank.lane import Lane
-from wakewise.simulation.tank.measuring import TargetProbes
+from wakewise.simulation.tank.initial_water import tank_water
 from wakewise.simulation.tank.plant import VehiclePlant
 from wakewise.simulation.tank.probes import surface_points
 from wakewise.simulation.tank.sediment import SHEAR_HEIGHT_M, Silt, SiltLaws
 from wakewise.simulation.tank.sensors import Sensors
 from wakewise.simulation.tank.settings import MAX_SILT_PARTICLES, TankSettings
-from wakewise.simulation.tank.swaying import Swaying, Yielding
+from wakewise.simulation.tank.soft_body import Swaying, Yielding
 from wakewise.simulation.tank.swell import Swell
 from wakewise.simulation.tank.tether import Tether
+from wakewise.simulation.tank.water_truth import TargetProbes
+from wakewise.simulation.tank.worker_thread import Lane
 from wakewise.simulation.water import AiryWave, AmbientSum
 from wakewise.simulation.water.hullwake import HullPush
 from wakewise.simulation.water.induction import impulse_velocity
-from wakewise.simulation.water.instant import Instant
 from wakewise.simulation.water.water import Water
+from wakewise.simulation.water.water_snapshot import Instant
 
 GRID_SPACING_M = 0.05
 _GRID_HALF_M = 0.8

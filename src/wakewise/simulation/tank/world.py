@@ -13,7 +13,7 @@ from wakewise.core.interfaces import BodyState, FlakeCloud, Plant, Posture, Scal
 from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.targets import Target
 from wakewise.simulation.tank.settings import TankSettings
-from wakewise.simulation.tank.swaying import Yielding
+from wakewise.simulation.tank.soft_body import Yielding
 from wakewise.simulation.tank.tank import Tank
 
 

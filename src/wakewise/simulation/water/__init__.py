@@ -4,13 +4,13 @@ The controllers' wake models (`wakewise.wake`) are not used here, nor is this ro
 truth would prove nothing. Jets are made of impulse parcels that take time to travel, entrain, merge, strike the bed
 and run out along it.
 
-Start reading in `water.py` (what callers see), `stepping.py` (one compiled step of all of it) and `instant.py` (the
-velocity at any points, now). `parcels.py`, `closure.py` and `drift.py` are a free jet, `fans.py` and `meeting.py` jets
-that cross and meet, `hullwake.py` what a hull leaves, `walljets.py` and `bedjets*.py` jets on the bed, `blockage.py`
-and `bodyjets.py` the target and jets that come up to it, `faces.py` walls, `clusters.py`, `induction.py`,
-`space_order.py` and `chunks.py` fast sums,
-`currents.py` (its turbulence summed by `modes.py`) and `current_series.py` what moves without thrusters.
-Laws and their sources stand beside the equations.
+Start reading in `water.py` (what callers see), `stepping.py` (one compiled step of all of it) and `water_snapshot.py`
+(the velocity at any points, now). `parcels.py`, `round_jet_closure.py` and `parcel_advection.py` are a free jet,
+`crossing_jets.py` and `colliding_jets.py` jets that cross and meet, `hullwake.py` what a hull leaves, `walljets.py` and
+`bedjets*.py` jets on the bed, `blockage.py` and `jet_deflection.py` the target and jets that come up to it, `faces.py`
+walls, `clusters.py`, `induction.py`, `space_order.py` and `blocked_sums.py` fast sums, `currents.py` (its turbulence
+summed by `fourier_turbulence.py`) and `current_series.py` what moves without thrusters. Laws and their sources stand
+beside the equations.
 """
 
 from wakewise.simulation.water.current_series import read_current_series

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
-from wakewise.core.jit.compiled import assign, njit
+from wakewise.core.jit.njit import assign, njit
 from wakewise.simulation.water.bedjets_sums import (
     COLUMNS,
     LOG_WIDTH,
@@ -36,7 +36,7 @@ from wakewise.simulation.water.bedjets_sums import (
     log_overlap,
     sum_planes,
 )
-from wakewise.simulation.water.chunks import over_points
+from wakewise.simulation.water.blocked_sums import over_points
 
 WALL_JET_SPEED = 1.16  # u_max r / sqrt(M), Rajaratnam 1976
 STRIKE_HEIGHT = 1.75  # of the parcel's sigma: 0.14 H, where the bed's pressure begins to turn the jet (Beltaos 1974)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
-from wakewise.core.jit.compiled import assign_rows, njit
+from wakewise.core.jit.njit import assign_rows, njit
 
 WALL_JET_SPREAD = 0.093  # delta over R for which the layer below, entrainment included, is half as fast at 0.09 R
 LOG_WIDTH = 0.3  # L: neighbouring rings overlap; it sets how sharp a front is, not how fast

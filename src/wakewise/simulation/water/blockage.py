@@ -17,9 +17,9 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from wakewise.core.arrays import Array, IntArray, freeze
-from wakewise.core.jit.compiled import assign, njit
+from wakewise.core.jit.njit import assign, njit
 from wakewise.scene.targets import Target
-from wakewise.simulation.water.chunks import over_points
+from wakewise.simulation.water.blocked_sums import over_points
 from wakewise.simulation.water.induction import SINGLE, FixedSources, smooth_share, sum_sources
 from wakewise.simulation.water.space_order import in_space
 

@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
-from wakewise.core.jit.compiled import njit
-from wakewise.simulation.water.chunks import over_points
+from wakewise.core.jit.njit import njit
+from wakewise.simulation.water.blocked_sums import over_points
 from wakewise.simulation.water.induction import SINGLE, impulse_velocity
 from wakewise.simulation.water.space_order import FEW_POINTS, sorted_keys
 

@@ -12,8 +12,8 @@ from typing import ClassVar
 import numpy as np
 
 from wakewise.core.arrays import Array, freeze
+from wakewise.core.csv_separators import other_separator
 from wakewise.core.errors import InputError
-from wakewise.core.separators import other_separator
 
 FASTEST_M_S = 3.0
 """Above this a column is taken to be in another unit: few tidal streams, and no tank, run faster."""

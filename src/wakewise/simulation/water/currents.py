@@ -15,13 +15,13 @@ from typing import ClassVar
 import numpy as np
 
 from wakewise.core.arrays import Array, freeze
+from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Current
-from wakewise.core.physics import GRAVITY_M_S2
-from wakewise.simulation.water.closure import PLAIN
 from wakewise.simulation.water.faces import Room
+from wakewise.simulation.water.fourier_turbulence import add_modes
 from wakewise.simulation.water.induction import impulse_velocity
-from wakewise.simulation.water.modes import add_modes
+from wakewise.simulation.water.round_jet_closure import PLAIN
 
 _ROW_SPACING = 0.6  # of sigma: a row of Gaussians this dense is smooth to 1e-6
 _MODES = 48

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import assign, assign_rows, njit
+from wakewise.core.jit.njit import assign, assign_rows, njit
 
 LEAST_IMAGE_M_S = 5e-5
 """Images in walls and surface that would not reach this speed there are left out; the bed's are all kept."""

@@ -1,8 +1,8 @@
 """The wake of a hull: what drag takes from the water's motion past the hull, given back to the water behind it.
 
 A hull that moves through the water drags some of it along. The force that this costs, F, is the water's loss: parcels
-of impulse -F dt / rho, sent from the lee of the hull, carry it on (`wakewise.simulation.water.closure`, *Wakes*). A
-vehicle that hovers in a current so leaves no momentum in the mean: its jets carry what its wake lacks.
+of impulse -F dt / rho, sent from the lee of the hull, carry it on (`wakewise.simulation.water.round_jet_closure`,
+*Wakes*). A vehicle that hovers in a current so leaves no momentum in the mean: its jets carry what its wake lacks.
 
 The wake begins as wide as the hull: as a Gaussian whose middle is as fast as a top hat's of the hull's frontal area
 would be, sigma = sqrt(A / 2 pi), the relation of a jet's sigma and its disk. A hull whose drag coefficient is above 2
@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wakewise.core.arrays import Array, freeze
-from wakewise.simulation.water.drift import EMISSION_SPACING
+from wakewise.simulation.water.parcel_advection import EMISSION_SPACING
 from wakewise.simulation.water.parcels import Parcels
 
 _STILL_M_S = 1e-6  # slower water past the hull leaves it without a lee

@@ -26,8 +26,8 @@ from typing import Any
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import njit
-from wakewise.simulation.water.chunks import over_points
+from wakewise.core.jit.njit import njit
+from wakewise.simulation.water.blocked_sums import over_points
 
 _SCALE = 12.0
 _FAR = _SCALE**-1.5 / (4 * math.pi)

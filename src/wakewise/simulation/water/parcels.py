@@ -1,7 +1,7 @@
 """Impulse parcels: what the free jets of the simulated water are made of, and the velocity that they induce.
 
 The sum itself, and what a parcel is, are in `wakewise.simulation.water.induction`; how parcels move and grow in
-`wakewise.simulation.water.closure`.
+`wakewise.simulation.water.round_jet_closure`.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
-from wakewise.core.jit.compiled import njit
-from wakewise.simulation.water.closure import FIRST_D, disk_share
+from wakewise.core.jit.njit import njit
 from wakewise.simulation.water.faces import Room
 from wakewise.simulation.water.induction import impulse_velocity
+from wakewise.simulation.water.round_jet_closure import FIRST_D, disk_share
 
 MERGE_SPACING = 0.7  # of sigma: a closer pair becomes one, so rows are no coarser than 1.4 sigma (ripple 1e-4),
 _OLD_D, _OLD_SPACING = 2.0, 1.4  # and from sigma over D of 2 to 2.8 on they are 1.4 times as coarse (ripple 1 %)

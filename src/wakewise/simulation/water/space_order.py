@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 
 FEW_POINTS = 40
 """Fewer are taken as they come."""

@@ -12,16 +12,16 @@ from typing import NamedTuple
 import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
-from wakewise.core.jit.compiled import assign, assign_rows, njit
+from wakewise.core.jit.njit import assign, assign_rows, njit
 from wakewise.simulation.water.bedjets import STRIKE_HEIGHT, Layers
 from wakewise.simulation.water.bedjets_sums import sum_planes
 from wakewise.simulation.water.blockage import BodyRows, add_body, answer
-from wakewise.simulation.water.bodyjets import lead_round, strike_body
 from wakewise.simulation.water.clusters import clustered, sum_field
-from wakewise.simulation.water.drift import drift, due, fade_gusts, send, slugs
+from wakewise.simulation.water.colliding_jets import turn_aside
+from wakewise.simulation.water.crossing_jets import fan_out
 from wakewise.simulation.water.faces import mirrored
-from wakewise.simulation.water.fans import fan_out
-from wakewise.simulation.water.meeting import turn_aside
+from wakewise.simulation.water.jet_deflection import lead_round, strike_body
+from wakewise.simulation.water.parcel_advection import drift, due, fade_gusts, send, slugs
 from wakewise.simulation.water.parcels import MERGE_SPACING, Jets, kept_only, merge_across, merge_rows
 from wakewise.simulation.water.space_order import ordered
 from wakewise.simulation.water.walljets import Planes, grow, ring_places, start_ring, thin, wall_rows

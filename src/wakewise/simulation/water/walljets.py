@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wakewise.core.arrays import Array, IntArray
-from wakewise.core.jit.compiled import assign, assign_rows, njit
+from wakewise.core.jit.njit import assign, assign_rows, njit
 from wakewise.simulation.water.bedjets import (
     STRIKE_HEIGHT,
     Layers,
@@ -26,7 +26,9 @@ _MOST = 400  # rings
 _REST = 3.0  # wall jets rest at this many times the parcels' rest speed: on the bed 3 mm/s,
 _SHEET_REST = 10.0  # and the jets of a meeting, of which there may be many, at this many
 SPREADS_FASTER = 3.0
-"""How many times as fast as a wall jet the radial jet of a meeting spreads: see `wakewise.simulation.water.meeting`."""
+"""How many times as fast as a wall jet the radial jet of a meeting spreads: see
+`wakewise.simulation.water.colliding_jets`.
+"""
 _SHEETS = 128  # room for planes in which jets meet: those remembered, and those whose rings still run
 
 

@@ -1,18 +1,18 @@
 """The simulated water: jets of impulse parcels, wall jets where they strike, a solid target, and the water's motion.
 
 Every thruster sends parcels of impulse (thrust x time / density) along its jet, from its disk;
-`wakewise.simulation.water.closure` says how they grow and travel. Travel time, merging of neighbouring jets, bending in
-a current and wakes that linger follow from the parcels' motion; nothing is prescribed for them. Bed, surface and walls
-mirror the jets (`faces`), turn what strikes them into wall jets (`bedjets`), jets that cross fan out (`fans`), jets
-that meet head-on turn aside (`meeting`), the target turns water (`blockage`) and jets (`bodyjets`) aside, and a hull
-leaves a wake (`hullwake`).
+`wakewise.simulation.water.round_jet_closure` says how they grow and travel. Travel time, merging of neighbouring jets,
+bending in a current and wakes that linger follow from the parcels' motion; nothing is prescribed for them. Bed, surface
+and walls mirror the jets (`faces`), turn what strikes them into wall jets (`bedjets`), jets that cross fan out
+(`fans`), jets that meet head-on turn aside (`meeting`), the target turns water (`blockage`) and jets (`bodyjets`)
+aside, and a hull leaves a wake (`hullwake`).
 
 What it does not hold: swirl shows in the width of a jet only; wall jets carry no turbulence of their own and do not
 collide (those on the same ground add their momentum); there is no boundary layer of hull and target, nor a wake of the
 target; the bed right below a jet is struck in pulses (mean stress right, fluctuation about half of the mean). After a
 thruster has stopped, its wake dies sooner than the lattice's: the speed lasts 16 to 22 % less, the volume flux 10 to
 14 %, the half-time at six diameters is 29 % and the energy's life 34 to 46 % shorter. How far each law is met is told
-in `wakewise.simulation.tank.limits`.
+in `wakewise.simulation.tank.validation_limits`.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ from wakewise.core.arrays import Array
 from wakewise.core.interfaces import Current
 from wakewise.simulation.water.bedjets import Layers, Rings
 from wakewise.simulation.water.blockage import Blockage, BodyRows
-from wakewise.simulation.water.closure import PLAIN, PUFF_SPREAD, Spreading, first_sigma_m
-from wakewise.simulation.water.drift import EMISSION_SPACING, count_sent
+from wakewise.simulation.water.crossing_jets import RAYS
 from wakewise.simulation.water.faces import Room
-from wakewise.simulation.water.fans import RAYS
 from wakewise.simulation.water.hullwake import HullPush, HullWake
 from wakewise.simulation.water.induction import SINGLE
-from wakewise.simulation.water.instant import Instant
+from wakewise.simulation.water.parcel_advection import EMISSION_SPACING, count_sent
 from wakewise.simulation.water.parcels import GUST_PER_TURBULENCE, MERGE_SPACING, Parcels, merged, merged_across
+from wakewise.simulation.water.round_jet_closure import PLAIN, PUFF_SPREAD, Spreading, first_sigma_m
 from wakewise.simulation.water.space_order import curve
 from wakewise.simulation.water.stepping import Laws, Tally, Thrusters, advance, places_of
 from wakewise.simulation.water.walljets import Planes, WallRows, wall_rows
+from wakewise.simulation.water.water_snapshot import Instant
 
 _ROOM = 512  # parcels and rings to begin with; there is always room for a ring of each parcel
 

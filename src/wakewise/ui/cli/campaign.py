@@ -205,7 +205,7 @@ def make_page(folder: Folder, compare: Compare = "", out: PageOut = None, json: 
     from dataclasses import asdict
 
     from wakewise.core.optional_dependencies import need
-    from wakewise.experiments.campaigns.contest import contest, places
+    from wakewise.experiments.campaigns.contrasts import contest, places
     from wakewise.experiments.campaigns.table import results
 
     need("the page of a campaign", "reports")

@@ -89,7 +89,7 @@ def cockpit(
     from wakewise.operation import load_scenario
     from wakewise.ui.cockpit.server import Server
     from wakewise.ui.cockpit.session import Session
-    from wakewise.ui.web.gate import is_loopback, origin_of
+    from wakewise.ui.web.origin_check import is_loopback, origin_of
 
     origins = tuple(origin_of(text) for text in origin or ())
     changes = overrides(sets, seed=seed, vehicle=vehicle, target=target, target_size=target_size, world=world)

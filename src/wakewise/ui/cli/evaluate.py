@@ -195,7 +195,7 @@ def _measured(
         read_thresholds,
         suspicious_scale,
     )
-    from wakewise.vision.evaluation.surface import suspicious_extent
+    from wakewise.vision.evaluation.cloud_to_surface import suspicious_extent
     from wakewise.vision.reconstruction import read_cloud, read_reference_cameras
 
     mesh = None

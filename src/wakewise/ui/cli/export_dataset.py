@@ -42,7 +42,7 @@ def export_dataset(folder: Path, out: Path | None, words: DatasetWords, json: bo
         _check(folder, words, out, json)
         return
     from wakewise.experiments.trials.dataset import build_dataset, read_words
-    from wakewise.experiments.trials.dataset.words import QUESTIONS
+    from wakewise.experiments.trials.dataset.statement import QUESTIONS
 
     path = out or folder / "export" / "dataset"
     told = read_words(

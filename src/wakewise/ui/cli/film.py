@@ -61,7 +61,7 @@ def film(
     need("wakewise film", "photos", "reports")
     from wakewise.ui.film import VIEWS, compared_trials, write_film, write_rows
     from wakewise.ui.reports import write_comparison, write_report
-    from wakewise.ui.reports.looks import FILMS
+    from wakewise.ui.reports.media import FILMS
 
     if (trial is None) == (rows is None):
         raise InputError("film: give either the folder of a trial, or --rows with the folder of a comparison")

@@ -17,24 +17,24 @@ from typer.core import TyperGroup
 
 from wakewise import __version__
 from wakewise.core.errors import InputError, MissingExtra, WakewiseError, environment_failure
-from wakewise.core.jit import cache_folder
+from wakewise.core.jit import cache_dir
 from wakewise.ui.cli import (
     allocate,
     calibrate,
     campaign,
     cockpit,
-    colour,
+    color,
     compare,
     evaluate,
     export,
     film,
+    precompile,
     reconstruct,
     scan,
     tank,
     target,
     vehicle,
     wake,
-    warm,
     world,
 )
 from wakewise.ui.cli.commands import FLIGHT, PANELS, PHOTOGRAPHS, STUDIES, VEHICLES, Command, installed_commands
@@ -52,12 +52,12 @@ _COMMANDS = (
     Command(PHOTOGRAPHS, "reconstruct", reconstruct.reconstruct_photos),
     Command(PHOTOGRAPHS, "evaluate", evaluate.evaluate),
     Command(PHOTOGRAPHS, "calibrate", calibrate.calibrate),
-    Command(PHOTOGRAPHS, "colour", colour.colour),
+    Command(PHOTOGRAPHS, "colour", color.colour),
     Command(VEHICLES, "vehicle", vehicle.app),
     Command(VEHICLES, "allocate", allocate.allocate),
     Command(VEHICLES, "wake", wake.app),
     Command(STUDIES, "campaign", campaign.app),
-    Command(STUDIES, "warm", warm.warm),
+    Command(STUDIES, "warm", precompile.warm),
     *installed_commands(),
 )
 
@@ -251,8 +251,8 @@ def main() -> None:
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a job in the background has it ignored
         signal.signal(signal.SIGINT, _interrupt)
     sys.unraisablehook, sys.excepthook = _unraisable, _uncaught
-    if cache_folder.CHOSEN is not None:
-        _say(f"compiled code is kept in {cache_folder.CHOSEN}: the package's folder and the user's cache are read-only")
+    if cache_dir.CHOSEN is not None:
+        _say(f"compiled code is kept in {cache_dir.CHOSEN}: the package's folder and the user's cache are read-only")
     code = run()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is said: an impatient Ctrl-C must not end it with a stack
     sys.exit(code)

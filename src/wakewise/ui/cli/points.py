@@ -26,9 +26,9 @@ def read_points(path: Path, vehicle: Vehicle, X_WB: Pose) -> tuple[Array, Array]
 
     import numpy as np
 
+    from wakewise.core.csv_separators import other_separator
     from wakewise.core.errors import InputError
     from wakewise.core.safe_yaml import YamlError, text_of
-    from wakewise.core.separators import other_separator
 
     columns = ("x_m", "y_m", "z_m", "weight")
     try:

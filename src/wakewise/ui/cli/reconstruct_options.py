@@ -83,7 +83,7 @@ def wishes_of(
 def frames_of(photos: Path, out: Path) -> Path:
     """The folder of photographs: what was given, or frames of the film that was given, which are counted."""
     from wakewise.ui.cli.console import Bars as Progress
-    from wakewise.vision.reconstruction.film_frames import is_film, take_frames
+    from wakewise.vision.reconstruction.video_frames import is_film, take_frames
 
     if not is_film(photos):
         return photos
@@ -100,8 +100,8 @@ def look_first(photos: Path, out: Path, threads: int, json: bool) -> None:
     from wakewise.core.optional_dependencies import need
     from wakewise.ui.cli.console import Bars as Progress
     from wakewise.ui.cli.console import print_json, write_page
-    from wakewise.ui.reports.look import write_look
-    from wakewise.vision.reconstruction.look import look_at
+    from wakewise.ui.reports.photo_preview import write_look
+    from wakewise.vision.reconstruction.photo_preview import look_at
 
     need("wakewise reconstruct --look", "reports")
     if out.resolve() == photos.resolve():

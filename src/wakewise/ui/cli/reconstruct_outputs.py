@@ -78,8 +78,8 @@ def _extent(out: Path, photos: Path, model: Model, remake: Remake, progress: Any
     import shutil
     import tempfile
 
-    from wakewise.vision.reconstruction.halves import FIGURES, measure_halves
-    from wakewise.vision.reconstruction.views import camera_centres
+    from wakewise.vision.reconstruction.registered_photos import camera_centres
+    from wakewise.vision.reconstruction.split_half_check import FIGURES, measure_halves
 
     names = sorted(camera_centres(out / "sparse"))
 

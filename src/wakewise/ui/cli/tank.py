@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wakewise.core.physics import TRIM_WATER_KG_M3
+from wakewise.core.constants import TRIM_WATER_KG_M3
 from wakewise.ui.cli.console import print_json
 from wakewise.ui.cli.options import Json, seed_option
 

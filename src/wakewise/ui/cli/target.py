@@ -136,9 +136,9 @@ def _sway(target: Target) -> dict[str, object] | None:
     """How a soft procedural target bends; None of one that is rigid by its kind."""
     import numpy as np
 
-    from wakewise.core.physics import TRIM_WATER_KG_M3
+    from wakewise.core.constants import TRIM_WATER_KG_M3
     from wakewise.scene.targets import TISSUES, Sway
-    from wakewise.simulation.tank.swaying import Pieces, standing_m
+    from wakewise.simulation.tank.soft_body import Pieces, standing_m
 
     if target.name not in TISSUES:
         return None

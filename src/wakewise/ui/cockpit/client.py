@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from websockets.asyncio.server import ServerConnection
 
-from wakewise.ui.cockpit.show import Picture
+from wakewise.ui.cockpit.view_model import Picture
 
 _MOST_WAITING = 64
 """Notes that wait for a client at most; of more the oldest are lost to it."""

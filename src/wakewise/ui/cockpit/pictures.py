@@ -7,7 +7,7 @@ import contextlib
 from collections.abc import Callable, Iterable
 
 from wakewise.ui.cockpit.client import Client
-from wakewise.ui.cockpit.show import Show
+from wakewise.ui.cockpit.view_model import Show
 
 PICTURE_EVERY_S = 1.0 / 15.0
 OLD_S = 0.3

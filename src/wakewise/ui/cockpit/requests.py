@@ -12,7 +12,7 @@ from websockets.typing import Subprotocol
 
 from wakewise.ui.cockpit.connection import PageConnection, answer
 from wakewise.ui.web.files import Files
-from wakewise.ui.web.gate import TOKEN_HEADER, Caller, Gate, page_headers
+from wakewise.ui.web.origin_check import TOKEN_HEADER, Caller, Gate, page_headers
 
 SUBPROTOCOL, TOKEN_PREFIX = Subprotocol("wakewise"), "token."
 """What a page offers with its handshake: a browser can say its token there, and nowhere else in that request."""

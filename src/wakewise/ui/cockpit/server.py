@@ -25,7 +25,8 @@ from websockets.http11 import Request, Response
 from wakewise.core.errors import InputError
 from wakewise.ui.cockpit.client import Client
 from wakewise.ui.cockpit.connection import PageConnection
-from wakewise.ui.cockpit.extras import page_files
+from wakewise.ui.cockpit.control_mailbox import DEVICE, Holding
+from wakewise.ui.cockpit.ground_station_listing import page_files
 from wakewise.ui.cockpit.messages import (
     MOST_BYTES,
     Amiss,
@@ -41,11 +42,10 @@ from wakewise.ui.cockpit.messages import (
 )
 from wakewise.ui.cockpit.pictures import show_pictures
 from wakewise.ui.cockpit.requests import SUBPROTOCOL, respond, wrong
-from wakewise.ui.cockpit.seat import DEVICE, Holding
-from wakewise.ui.cockpit.show import Note, Show, as_json
+from wakewise.ui.cockpit.view_model import Note, Show, as_json
 from wakewise.ui.web.addresses import page_addresses
 from wakewise.ui.web.files import Files
-from wakewise.ui.web.gate import Gate, is_loopback, same
+from wakewise.ui.web.origin_check import Gate, is_loopback, same
 from wakewise.ui.web.pending import Pending
 
 PROTOCOL = 1

@@ -20,17 +20,17 @@ import numpy as np
 from wakewise.core.errors import StageError, WakewiseError
 from wakewise.operation import Parts, Scenario
 from wakewise.operation.teleop.assisted import AssistedPilot, assisted
-from wakewise.operation.teleop.desk import MODES, RANGES, WAYS, Desk, DeskState, regime
 from wakewise.operation.teleop.input.controls import CENTRED, ControlSource
 from wakewise.operation.teleop.live import LiveFlight
-from wakewise.ui.cockpit.frames import LiveCamera, View
-from wakewise.ui.cockpit.gauges import Gauges
-from wakewise.ui.cockpit.guide import LiveGuide
-from wakewise.ui.cockpit.lookout import Lookout
+from wakewise.operation.teleop.operator_state import MODES, RANGES, WAYS, Desk, DeskState, regime
+from wakewise.ui.cockpit.control_mailbox import Seat
+from wakewise.ui.cockpit.flight_snapshot import Lookout
+from wakewise.ui.cockpit.live_camera import LiveCamera, View
+from wakewise.ui.cockpit.live_coverage import LiveGuide
 from wakewise.ui.cockpit.scene import Scene, open_scene
-from wakewise.ui.cockpit.seat import Seat
-from wakewise.ui.cockpit.show import Note, Picture
 from wakewise.ui.cockpit.state import Instruments, described, number, rounded, told_scenario
+from wakewise.ui.cockpit.view_model import Note, Picture
+from wakewise.ui.cockpit.wake_readout import Gauges
 
 TENDED_S, SCENE_EVERY_S = 0.05, 0.2
 _MOST_NOTES = 200

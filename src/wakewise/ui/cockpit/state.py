@@ -15,9 +15,9 @@ import numpy as np
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import euler_from_quat
 from wakewise.operation import Parts
-from wakewise.simulation.tank.measuring import STILL_M_S
-from wakewise.ui.cockpit.gauges import Gauges
-from wakewise.ui.cockpit.lookout import SAMPLED_S, WINDOW_S, Lookout, Moment
+from wakewise.simulation.tank.water_truth import STILL_M_S
+from wakewise.ui.cockpit.flight_snapshot import SAMPLED_S, WINDOW_S, Lookout, Moment
+from wakewise.ui.cockpit.wake_readout import Gauges
 
 POINTS_EVERY, GAUGES_EVERY = 5, 2
 """States between two looks at the water of every point, and at D: with a current these cost the most."""

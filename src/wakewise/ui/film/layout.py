@@ -12,8 +12,7 @@ from PIL import Image as Pictures
 from PIL import ImageDraw
 
 from wakewise.core.arrays import Array
-from wakewise.ui.film.outside import FASTEST_M_S, speed_colours
-from wakewise.ui.film.paint import (
+from wakewise.ui.film.drawing import (
     CARD,
     CORAL,
     INK,
@@ -28,7 +27,8 @@ from wakewise.ui.film.paint import (
     paste,
     write,
 )
-from wakewise.ui.reports.words import number
+from wakewise.ui.film.external_view import FASTEST_M_S, speed_colours
+from wakewise.ui.reports.text import number
 
 View = Literal["both", "outside", "camera"]
 VIEWS: tuple[View, ...] = ("both", "outside", "camera")

@@ -23,15 +23,15 @@ from wakewise.operation import Scenario, read_exposures, read_scenario
 from wakewise.operation.exposures import ExposureRecord
 from wakewise.scene.targets import stony_kinds
 from wakewise.ui.film.encode import check_film_name, film_writer
+from wakewise.ui.film.external_view import FOV_RAD, Outside
 from wakewise.ui.film.layout import HEIGHT, VIEWS, WIDTH, Moment, Page, Story, View
-from wakewise.ui.film.outside import FOV_RAD, Outside
-from wakewise.ui.film.vantage import vantage
+from wakewise.ui.film.viewpoint import vantage
 from wakewise.ui.film.wash import Motion, Tracers, wash_of
 from wakewise.ui.reports import figures
 from wakewise.ui.reports.trial import Trial, read_trial
 from wakewise.ui.reports.vehicle.hull import hull_of
+from wakewise.vision.image_decoding import read_picture
 from wakewise.vision.imaging import PinholeCamera, SiltOptics
-from wakewise.vision.pictures import read_picture
 
 FPS = 12.0
 SECONDS = 20.0

@@ -23,15 +23,15 @@ from wakewise.core.files import whole_file
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import no_progress
 from wakewise.operation import Scenario, read_exposures, read_scenario
+from wakewise.ui.film.drawing import INK, MUTED, PAPER, paste, write
+from wakewise.ui.film.external_view import FOV_RAD, Outside
 from wakewise.ui.film.layout import cover
 from wakewise.ui.film.make import silt_at
-from wakewise.ui.film.outside import FOV_RAD, Outside
-from wakewise.ui.film.paint import INK, MUTED, PAPER, paste, write
-from wakewise.ui.film.vantage import vantage
+from wakewise.ui.film.viewpoint import vantage
 from wakewise.ui.film.wash import Motion, wash_of
+from wakewise.ui.reports.text import number
 from wakewise.ui.reports.trial import Trial, read_trial
 from wakewise.ui.reports.vehicle.hull import hull_of
-from wakewise.ui.reports.words import number
 from wakewise.vision.imaging import PinholeCamera, SiltOptics, photograph
 
 TIMES_S = (0.0, 5.0, 10.0)

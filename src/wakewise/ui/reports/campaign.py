@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from wakewise.core.files import write_text
-from wakewise.experiments.campaigns.contest import comparable, contest, measures, places
-from wakewise.experiments.campaigns.glance import FEWEST, Glance, Measure, Place
+from wakewise.experiments.campaigns.contrasts import comparable, contest, measures, places
+from wakewise.experiments.campaigns.summary import FEWEST, Glance, Measure, Place
 from wakewise.experiments.campaigns.table import Results, failures, group_table
 from wakewise.experiments.trials import UNITS
 from wakewise.ui.reports.methods_compared import methods_compared, price, profiles, won
 from wakewise.ui.reports.page import fold, missing, plot, section, whole_page
+from wakewise.ui.reports.text import duration, number
 from wakewise.ui.reports.trial_pictures import worst_panels
-from wakewise.ui.reports.words import duration, number
 
 PAGE = "campaign.html"
 _DRAWN = ("rmse_mm", "target_speed_mean_m_s", "energy_kJ")

@@ -13,15 +13,15 @@ from wakewise.core.files import write_text
 from wakewise.experiments.trials.metrics import BETTER
 from wakewise.ui.reports import figures
 from wakewise.ui.reports.errors import ModelErrors, model_errors
-from wakewise.ui.reports.ink import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, data_uri, error_colours
 from wakewise.ui.reports.limits import limits_section
-from wakewise.ui.reports.looks import coloured_model
+from wakewise.ui.reports.media import coloured_model
 from wakewise.ui.reports.page import absence, error_scale, fold, missing, panel, pictures, plot, section, whole_page
 from wakewise.ui.reports.photos import embed
+from wakewise.ui.reports.svg_style import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, data_uri, error_colours
+from wakewise.ui.reports.text import grouped, number, shown, unit, verdict
 from wakewise.ui.reports.trial import Trial, read_trial
 from wakewise.ui.reports.views import SIDES, Frame, coverage_colours, draw_cloud, draw_surface
-from wakewise.ui.reports.words import grouped, number, shown, unit, verdict
-from wakewise.vision.pictures import read_picture
+from wakewise.vision.image_decoding import read_picture
 
 VIEW_PIXELS = 300
 PHOTO_WIDTH = 720

@@ -9,13 +9,13 @@ from wakewise.core.arrays import Array, BoolArray
 from wakewise.core.errors import InputError
 from wakewise.experiments.trials.coverage import Shot, coverage_of
 from wakewise.operation import Scenario
+from wakewise.operation.calibration_error import found_target
 from wakewise.operation.seeds import Seeds
-from wakewise.operation.survey import found_target
 from wakewise.scene.missions import Coverage, missed
 from wakewise.scene.targets import Mesh, Target
-from wakewise.ui.reports.draft import Draft
-from wakewise.ui.reports.ink import NOT_COUNTED, NOT_COVERED, rgb
 from wakewise.ui.reports.page import absence, chip, missing, panel, pictures
+from wakewise.ui.reports.page_parts import Draft
+from wakewise.ui.reports.svg_style import NOT_COUNTED, NOT_COVERED, rgb
 from wakewise.ui.reports.trial import Surface, Trial
 from wakewise.ui.reports.views import SIDES, Frame, draw_surface
 

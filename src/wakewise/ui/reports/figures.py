@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from wakewise.core.arrays import Array, IntArray
 from wakewise.ui.reports.errors import CloudErrors
-from wakewise.ui.reports.ink import (
+from wakewise.ui.reports.svg_style import (
     CARD,
     CORAL,
     ERROR_LIMIT_MM,

@@ -9,7 +9,7 @@ from html import escape
 
 from wakewise.operation.worlds.lattice_world import CELL_M
 from wakewise.operation.worlds.makers import WORLDS, flow_name
-from wakewise.simulation.tank.limits import ABSENT, limits_table
+from wakewise.simulation.tank.validation_limits import ABSENT, limits_table
 from wakewise.ui.reports.page import fold, missing, prose, section
 from wakewise.ui.reports.trial import Trial
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from wakewise.experiments.campaigns.glance import Glance, Measure, Place
 from wakewise.experiments.campaigns.statistics import performance_profile, stratified_bootstrap
+from wakewise.experiments.campaigns.summary import Glance, Measure, Place
 from wakewise.ui.reports.figures import NARROW_IN, WIDTH_IN
-from wakewise.ui.reports.ink import CORAL, INK, MUTED, SAND, SLATE, TEAL, VIOLET, dress, key, new_figure
-from wakewise.ui.reports.words import number, percent
+from wakewise.ui.reports.svg_style import CORAL, INK, MUTED, SAND, SLATE, TEAL, VIOLET, dress, key, new_figure
+from wakewise.ui.reports.text import number, percent
 
 Row = Mapping[str, Any]
 _ALIKE = 0.005

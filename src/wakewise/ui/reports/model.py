@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from wakewise.core.arrays import Array
 from wakewise.ui.reports import figures
-from wakewise.ui.reports.draft import Draft
 from wakewise.ui.reports.errors import CloudErrors, ModelErrors, cloud_errors, model_errors
-from wakewise.ui.reports.ink import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, error_colours
-from wakewise.ui.reports.looks import coloured_model
+from wakewise.ui.reports.media import coloured_model
 from wakewise.ui.reports.page import absence, chip, error_scale, missing, panel, pictures, plot, scene_box, section
+from wakewise.ui.reports.page_parts import Draft
 from wakewise.ui.reports.scene3d import CAMERA_RGB, HULL_RGB, PATH_RGB, PLANNED_RGB, scene_html
+from wakewise.ui.reports.svg_style import NOT_COUNTED, NOT_COVERED, OVER_LIMIT, error_colours
+from wakewise.ui.reports.text import number
 from wakewise.ui.reports.trial import Surface, Trial
 from wakewise.ui.reports.views import OUTLOOK, SIDES, Drawing, Frame, coverage_colours, draw_cloud, draw_surface
-from wakewise.ui.reports.words import number
 
 VIEW_PIXELS = 360
 

@@ -11,7 +11,7 @@ from string import Template
 
 from matplotlib.figure import Figure
 
-from wakewise.ui.reports.ink import ERROR_LIMIT_MM, ERROR_STOPS, OVER_LIMIT, css_gradient, inline_svg
+from wakewise.ui.reports.svg_style import ERROR_LIMIT_MM, ERROR_STOPS, OVER_LIMIT, css_gradient, inline_svg
 from wakewise.ui.reports.trial import Trial
 from wakewise.ui.reports.views import View
 

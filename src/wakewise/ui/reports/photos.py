@@ -7,11 +7,11 @@ from html import escape
 
 import cv2
 
-from wakewise.ui.reports.ink import data_uri
 from wakewise.ui.reports.page import fold
+from wakewise.ui.reports.svg_style import data_uri
+from wakewise.ui.reports.text import number
 from wakewise.ui.reports.trial import Photograph, Trial
-from wakewise.ui.reports.words import number
-from wakewise.vision.pictures import read_picture
+from wakewise.vision.image_decoding import read_picture
 
 BUDGET_BYTES = 4_000_000
 """Rough size of all embedded photographs together; many photographs are embedded smaller."""

@@ -9,18 +9,18 @@ from pathlib import Path
 from wakewise.core.files import write_text
 from wakewise.ui.reports import figures
 from wakewise.ui.reports.coverage import coverage_html
-from wakewise.ui.reports.draft import Draft
 from wakewise.ui.reports.limits import limits_section
-from wakewise.ui.reports.looks import colours_html, film_html
+from wakewise.ui.reports.media import colours_html, film_html
 from wakewise.ui.reports.model import before_colours, before_mesh, model_section
 from wakewise.ui.reports.page import absence, fold, missing, plot, prose, section, tile, whole_page
+from wakewise.ui.reports.page_parts import Draft
 from wakewise.ui.reports.photos import contact_sheet
+from wakewise.ui.reports.references import yardstick_html
 from wakewise.ui.reports.scene3d import vehicle_of
+from wakewise.ui.reports.text import grouped, number, shown, unit, verdict
 from wakewise.ui.reports.trial import Trial, read_trial
 from wakewise.ui.reports.trim import trim_html
-from wakewise.ui.reports.words import grouped, number, shown, unit, verdict
-from wakewise.ui.reports.yardstick import yardstick_html
-from wakewise.vision.evaluation.surface import SUCCESS_COMPLETENESS_PCT, SUCCESS_RMSE_MM
+from wakewise.vision.evaluation.cloud_to_surface import SUCCESS_COMPLETENESS_PCT, SUCCESS_RMSE_MM
 
 PARTS = (
     ("yardstick", "Yardstick"),

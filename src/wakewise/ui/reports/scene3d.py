@@ -23,12 +23,12 @@ from wakewise.core.geometry import Pose, quat_multiply
 from wakewise.robot.importers import any_vehicle
 from wakewise.robot.vehicles import Vehicle
 from wakewise.ui.reports.errors import ModelErrors
-from wakewise.ui.reports.ink import error_colours
-from wakewise.ui.reports.looks import coloured_model
+from wakewise.ui.reports.media import coloured_model
+from wakewise.ui.reports.svg_style import error_colours
 from wakewise.ui.reports.trial import Photograph, Surface, Trial
 from wakewise.ui.reports.vehicle.hull import hull_of
 from wakewise.ui.reports.views import OUTLOOK
-from wakewise.vision.pictures import read_picture
+from wakewise.vision.image_decoding import read_picture
 
 # NED to ENU: swap x and y, turn z round; a half turn about the line between x and y.
 R_UW = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])

@@ -19,9 +19,9 @@ from wakewise.core.arrays import Array, BoolArray, IntArray
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file, write_bytes, write_text
 from wakewise.scene.targets import Delicacy, Region, Target
-from wakewise.scene.targets.delicate import DELICATE_FROM, SHARP_PER_M, THIN_M
-from wakewise.ui.reports.ink import INK, LINE, MUTED, SLATE, TEAL, dress, new_figure
+from wakewise.scene.targets.fragility import DELICATE_FROM, SHARP_PER_M, THIN_M
 from wakewise.ui.reports.page import plot, tile, whole_page
+from wakewise.ui.reports.svg_style import INK, LINE, MUTED, SLATE, TEAL, dress, new_figure
 from wakewise.ui.reports.trial import Surface
 from wakewise.ui.reports.views import Frame, View, draw_surface
 

@@ -14,13 +14,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from wakewise.core.arrays import Array
-from wakewise.experiments.campaigns.glance import Measure, Place, worst_trials
 from wakewise.experiments.campaigns.pictures import MODEL, photographs_of
-from wakewise.ui.reports.ink import data_uri, error_colours
+from wakewise.experiments.campaigns.summary import Measure, Place, worst_trials
 from wakewise.ui.reports.page import error_scale, panel
+from wakewise.ui.reports.svg_style import data_uri, error_colours
+from wakewise.ui.reports.text import number
 from wakewise.ui.reports.views import SIDES, Frame, draw_cloud
-from wakewise.ui.reports.words import number
-from wakewise.vision.pictures import read_picture
+from wakewise.vision.image_decoding import read_picture
 
 PIXELS = 260
 _SHEET = ("north", "east", "above")

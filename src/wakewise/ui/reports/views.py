@@ -10,7 +10,7 @@ from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
 
 from wakewise.core.arrays import Array, BoolArray
-from wakewise.ui.reports.ink import NOT_COUNTED, NOT_COVERED, data_uri, error_colours, rgb
+from wakewise.ui.reports.svg_style import NOT_COUNTED, NOT_COVERED, data_uri, error_colours, rgb
 from wakewise.ui.reports.trial import Surface
 
 SAMPLES_PER_PIXEL = 4

@@ -1,9 +1,9 @@
 """How good a flight and a model were: alignment, accuracy and completeness, flight figures.
 
-Pure functions whose results carry their unit in their name. Start reading in `surface.py` (a cloud against the true
-surface) and `flight.py` (a flight's figures from its steps). `alignment.py` brings a model into the truth's frame
+Pure functions whose results carry their unit in their name. Start reading in `cloud_to_surface.py` (a cloud against the
+true surface) and `flight.py` (a flight's figures from its steps). `alignment.py` brings a model into the truth's frame
 (Umeyama, ICP), `thresholds.py` counts what lies within, `extent.py` measures area and volume, `depth_maps.py` and
-`against_cloud.py` judge against laser scans, `soundness.py` counts a mesh's faults, `definitions.py` says what each
+`cloud_to_cloud.py` judge against laser scans, `soundness.py` counts a mesh's faults, `definitions.py` says what each
 figure is.
 """
 
@@ -12,20 +12,9 @@ from typing import TYPE_CHECKING
 from wakewise.core.lazy_imports import lazy_door
 
 if TYPE_CHECKING:
-    from wakewise.vision.evaluation.against_cloud import CLOUD_DEFINITIONS, CloudComparison, compare_clouds, extent_m
     from wakewise.vision.evaluation.alignment import Refinement, Similarity, refine_icp, robust_similarity, umeyama
-    from wakewise.vision.evaluation.definitions import MESH_REFERENCE as MESH_REFERENCE_DEFINITIONS
-    from wakewise.vision.evaluation.definitions import SURFACE as SURFACE_DEFINITIONS
-    from wakewise.vision.evaluation.depth_maps import (
-        DEPTH_DEFINITIONS,
-        DepthScore,
-        DepthView,
-        compare_depths,
-        read_depth_views,
-    )
-    from wakewise.vision.evaluation.flight import SWAY_FIGURES, attitude_rmse_deg, flight_figures
-    from wakewise.vision.evaluation.soundness import MeshFaults, mesh_faults
-    from wakewise.vision.evaluation.surface import (
+    from wakewise.vision.evaluation.cloud_to_cloud import CLOUD_DEFINITIONS, CloudComparison, compare_clouds, extent_m
+    from wakewise.vision.evaluation.cloud_to_surface import (
         Comparison,
         Crop,
         Surface,
@@ -38,6 +27,17 @@ if TYPE_CHECKING:
         suspicious_scale,
         thin,
     )
+    from wakewise.vision.evaluation.definitions import MESH_REFERENCE as MESH_REFERENCE_DEFINITIONS
+    from wakewise.vision.evaluation.definitions import SURFACE as SURFACE_DEFINITIONS
+    from wakewise.vision.evaluation.depth_maps import (
+        DEPTH_DEFINITIONS,
+        DepthScore,
+        DepthView,
+        compare_depths,
+        read_depth_views,
+    )
+    from wakewise.vision.evaluation.flight import SWAY_FIGURES, attitude_rmse_deg, flight_figures
+    from wakewise.vision.evaluation.soundness import MeshFaults, mesh_faults
     from wakewise.vision.evaluation.thresholds import Share, read_thresholds, shares
 
 __all__ = [

@@ -11,8 +11,8 @@ from scipy.spatial import KDTree
 
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError, StageError
-from wakewise.core.sizes import check_arrays
-from wakewise.vision.evaluation.surface import thin
+from wakewise.core.size_limits import check_arrays
+from wakewise.vision.evaluation.cloud_to_surface import thin
 
 THRESHOLDS_MM = (5, 10, 20, 50)
 

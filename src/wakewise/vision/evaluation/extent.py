@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wakewise.vision.evaluation.surface import Crop, Mesh
+from wakewise.vision.evaluation.cloud_to_surface import Crop, Mesh
 
 
 def area_and_volume(mesh: Mesh, crop: Crop) -> tuple[float, float]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wakewise.vision.evaluation.surface import Mesh
+from wakewise.vision.evaluation.cloud_to_surface import Mesh
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,8 +7,8 @@ poses, the true silt and a seed.
 Start reading in `photograph.py` (one photograph, step by step) and `scene.py` (what stands there). `camera.py`,
 `lens.py` and `camera_model.py` are the camera, also behind a flat port; `renderer.py`, `shading.py`, `texture.py`,
 `lighting.py`, `panels.py` and `daylight.py` the picture without water, `bed_view.py`, `height_field.py` and
-`nearby.py` what makes it fast; `optics.py`, `forward_scatter.py`, `grids.py` and `particles.py` the water,
-`metering.py`, `blur.py` and `sensor.py` the exposure.
+`tile_culling.py` what makes it fast; `optics.py`, `forward_scatter.py`, `grids.py` and `particles.py` the water,
+`auto_exposure.py`, `blur.py` and `sensor.py` the exposure.
 """
 
 from typing import TYPE_CHECKING

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 from wakewise.vision.imaging.height_field import BLOCK, meet
 from wakewise.vision.imaging.lens import IDEAL, ray_at
 from wakewise.vision.imaging.lighting import lamps_on, spread_at

@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 from wakewise.vision.imaging.renderer import BAND_ROWS, Image, in_threads
 
 FORWARD_SHARE = 0.5

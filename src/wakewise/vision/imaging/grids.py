@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 
 
 @njit

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wakewise.core.arrays import Array, IntArray
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 
 BLOCK = 8
 """Cells along a block's side."""

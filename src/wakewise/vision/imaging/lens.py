@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 
 IDEAL, DISTORTED, PORT = 0.0, 1.0, 2.0
 NEWTON_STEPS = 30

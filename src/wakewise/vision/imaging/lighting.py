@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 from wakewise.vision.imaging.lens import IDEAL, ray_at
 
 

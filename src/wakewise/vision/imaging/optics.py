@@ -22,7 +22,7 @@ from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import ScalarGrid
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 from wakewise.vision.imaging.camera import Camera
 from wakewise.vision.imaging.forward_scatter import FORWARD_SHARE, forward_scattered, lobe_rad, mean_square_lever
 from wakewise.vision.imaging.grids import sample_levels

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from wakewise.core.arrays import Array, freeze
 from wakewise.core.errors import InputError
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 
 SPOTS = 8
 """Spots on each panel that stand for its face."""

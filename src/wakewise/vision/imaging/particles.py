@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from wakewise.core.arrays import Array
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import FlakeCloud, ScalarGrid
-from wakewise.core.jit.compiled import njit, prange
+from wakewise.core.jit.njit import njit, prange
 from wakewise.vision.imaging.blur import GLOBAL, Shutter, pose_at
 from wakewise.vision.imaging.camera import Camera
 from wakewise.vision.imaging.grids import sample_levels

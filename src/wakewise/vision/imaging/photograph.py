@@ -13,9 +13,9 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.core.interfaces import FlakeCloud, ScalarGrid
+from wakewise.vision.imaging.auto_exposure import Chosen, automatic
 from wakewise.vision.imaging.blur import motion_blur, pose_at
 from wakewise.vision.imaging.camera import Camera
-from wakewise.vision.imaging.metering import Chosen, automatic
 from wakewise.vision.imaging.optics import SiltOptics, haze_between, through_water
 from wakewise.vision.imaging.particles import draw_flakes, flakes_before
 from wakewise.vision.imaging.renderer import Image, Render, render

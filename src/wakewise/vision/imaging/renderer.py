@@ -23,9 +23,9 @@ from wakewise.core.geometry import Pose
 from wakewise.vision.imaging.bed_view import draw_bed, project_bed
 from wakewise.vision.imaging.camera import Camera
 from wakewise.vision.imaging.lens import IDEAL
-from wakewise.vision.imaging.nearby import TILE_PX, may_meet
 from wakewise.vision.imaging.scene import BED, Scene
 from wakewise.vision.imaging.shading import aim, average, needs_more, overlay
+from wakewise.vision.imaging.tile_culling import TILE_PX, may_meet
 
 Image = NDArray[np.float32]
 LAMP_REFERENCE_M = 0.5

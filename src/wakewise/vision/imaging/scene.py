@@ -22,9 +22,9 @@ from wakewise.core.errors import InputError
 from wakewise.scene.targets import Mesh, Target
 from wakewise.vision.imaging.daylight import bake_light
 from wakewise.vision.imaging.height_field import HeightField, grid_faces, height_field
-from wakewise.vision.imaging.nearby import Pieces
 from wakewise.vision.imaging.panels import Panels
 from wakewise.vision.imaging.texture import BED_MAP_LEVELS, BED_MAP_SIZE, BED_TEXEL_M, Maps, bake_bed, bed_heights
+from wakewise.vision.imaging.tile_culling import Pieces
 
 TARGET, BED, STONE = 0, 1, 2
 """Numbers of the three kinds of surface, as ray casting returns them."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wakewise.core.arrays import Array
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 from wakewise.vision.imaging.renderer import BAND_ROWS, Image, in_threads
 
 _TABLE_SIZE = 4096

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 from wakewise.vision.imaging.bed_view import FAR_M, bed_colour
 from wakewise.vision.imaging.height_field import meet
 from wakewise.vision.imaging.lens import ray_at

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wakewise.core.jit.compiled import njit, prange
+from wakewise.core.jit.njit import njit, prange
 
 FINEST_CELL_M = 0.0015
 BED_TEXEL_M = 0.00075

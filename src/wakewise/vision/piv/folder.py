@@ -61,7 +61,7 @@ def _read(path: Path) -> Picture:
     need("reading pictures of a jet", "piv", only=("cv2",))
     import cv2
 
-    from wakewise.vision.pictures import read_picture
+    from wakewise.vision.image_decoding import read_picture
 
     picture = read_picture(path, cv2.IMREAD_GRAYSCALE)
     if picture is None:

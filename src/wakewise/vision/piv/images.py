@@ -11,7 +11,7 @@ from pydantic import Field
 
 from wakewise.core.arrays import Array
 from wakewise.core.interfaces import Flow
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 from wakewise.core.settings import Settings
 from wakewise.vision.piv.tracers import Sheet, TracerSettings, carried, seed_sheet
 

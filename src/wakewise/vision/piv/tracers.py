@@ -8,9 +8,9 @@ import numpy as np
 from pydantic import Field
 
 from wakewise.core.arrays import Array
+from wakewise.core.constants import FRESH_WATER_KG_M3 as WATER_DENSITY_KG_M3
+from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.interfaces import Flow
-from wakewise.core.physics import FRESH_WATER_KG_M3 as WATER_DENSITY_KG_M3
-from wakewise.core.physics import GRAVITY_M_S2
 from wakewise.core.settings import Settings
 
 WATER_VISCOSITY_PA_S = 1.0e-3

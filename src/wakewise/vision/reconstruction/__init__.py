@@ -2,18 +2,19 @@
 files.
 
 Start reading in `pipeline.py` (the stages in order, `steps.py` calls them). What comes in: `photos.py` (with
-`exif.py`), `film_frames.py`, `lenses.py` (with `bending.py`, what they do to rays), `lens_groups.py` and
-`own_lenses.py` (which photographs share a lens), `references.py`, `known_cameras.py` (with `colmap_files.py`) and
-`calibration.py`; `look.py` looks at photographs before anything long is done with them. `features.py`, `sift.py`,
-`pairs.py` and `look_alike.py` match, `mapping.py`, `solving.py` and `colmap.py` find cameras (structure from motion),
-`guided.py` and `seeded.py` do both from poses that are roughly known, `fixed.py` from cameras that stay, `verdict.py`
-says whether the result can be right. `stereo.py`, `dense.py`, `depth_store.py`, `fusion.py` and `cells.py` make the
-cloud, `meshing.py` the surface (`clouds.py` and `views.py` are what they share), `patchmatch.py` is COLMAP's own dense
-stereo where CUDA is; `stages.py` skips what is done (`stage_keys.py`: what a result hangs on). `scale/` gives metres by
-bars between coded targets, `masks.py` hides what is not to be looked at, `wishes.py` is what else may be asked for,
-`photo_facts.py` what is known of each photograph in the end. `las.py` writes points for surveyors, `level.py` is the
-plane of a flat subject, `halves.py` measures area, volume and rugosity and how they repeat. `nerf/` is a neural
-radiance field from the same photographs.
+`exif.py`), `video_frames.py`, `lenses.py` (with `distortion.py`, what they do to rays), `lens_groups.py` and
+`per_photo_intrinsics.py` (which photographs share a lens), `references.py`, `known_cameras.py` (with `colmap_files.py`)
+and `calibration.py`; `photo_preview.py` looks at photographs before anything long is done with them. `features.py`,
+`sift.py`, `pairs.py` and `image_retrieval.py` match, `mapping.py`, `solving.py` and `colmap.py` find cameras (structure
+from motion), `guided.py` and `prior_pose_mapping.py` do both from poses that are roughly known,
+`known_pose_triangulation.py` from cameras that stay, `model_quality.py` says whether the result can be right.
+`stereo.py`, `dense.py`, `depth_store.py`, `fusion.py` and `cells.py` make the cloud, `meshing.py` the surface
+(`clouds.py` and `registered_photos.py` are what they share), `patchmatch.py` is COLMAP's own dense stereo where CUDA
+is; `stages.py` skips what is done (`stage_keys.py`: what a result hangs on). `scale/` gives metres by bars between
+coded targets, `masks.py` hides what is not to be looked at, `request.py` is what else may be asked for,
+`photo_facts.py` what is known of each photograph in the end. `las.py` writes points for surveyors, `ground_plane.py` is
+the plane of a flat subject, `split_half_check.py` measures area, volume and rugosity and how they repeat. `nerf/` is a
+neural radiance field from the same photographs.
 """
 
 from typing import TYPE_CHECKING
@@ -29,8 +30,8 @@ if TYPE_CHECKING:
     from wakewise.vision.reconstruction.photos import Photo, read_photos
     from wakewise.vision.reconstruction.pipeline import Model, reconstruct
     from wakewise.vision.reconstruction.references import match_references, read_reference_cameras
+    from wakewise.vision.reconstruction.request import Box, Wishes
     from wakewise.vision.reconstruction.settings import ReconstructionSettings
-    from wakewise.vision.reconstruction.wishes import Box, Wishes
 
 __all__ = [
     "Board",

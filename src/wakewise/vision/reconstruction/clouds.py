@@ -12,7 +12,7 @@ from wakewise.core.arrays import Array, BoolArray, IntArray, freeze
 from wakewise.core.checks import path_of
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_file
-from wakewise.core.sizes import broken_ply
+from wakewise.core.size_limits import broken_ply
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

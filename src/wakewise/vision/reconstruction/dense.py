@@ -23,9 +23,9 @@ from wakewise.vision.reconstruction.depth_store import DepthStore
 from wakewise.vision.reconstruction.fusion import facing_normals, fuse, lonely
 from wakewise.vision.reconstruction.masks import masked
 from wakewise.vision.reconstruction.photos import Image, PhotoStore
+from wakewise.vision.reconstruction.registered_photos import Ball, View, rank_partners, read_views
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
 from wakewise.vision.reconstruction.stereo import DepthMap, pair_depth, rectifiable
-from wakewise.vision.reconstruction.views import Ball, View, rank_partners, read_views
 
 # Depth maps of at most this many other photos vote on a point.
 AGREEMENT_PX = 1.0

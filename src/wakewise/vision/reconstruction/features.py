@@ -17,9 +17,9 @@ from wakewise.core.interfaces import Progress
 from wakewise.core.run_lock import half_done
 from wakewise.vision.reconstruction.colmap import call, pycolmap, settle, workroom
 from wakewise.vision.reconstruction.guided import Poses, match_by_poses
+from wakewise.vision.reconstruction.image_retrieval import like_pairs, read_looks
 from wakewise.vision.reconstruction.lens_groups import LensGroup, group_photos
 from wakewise.vision.reconstruction.lenses import Lens
-from wakewise.vision.reconstruction.look_alike import like_pairs, read_looks
 from wakewise.vision.reconstruction.masks import write_for_colmap
 from wakewise.vision.reconstruction.pairs import Pairs
 from wakewise.vision.reconstruction.photos import Photo, PhotoStore

@@ -9,7 +9,7 @@ import small_gicp
 from scipy.spatial import KDTree
 
 from wakewise.core.arrays import Array, BoolArray, IntArray
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 from wakewise.vision.reconstruction.photos import Image
 from wakewise.vision.reconstruction.stereo import DepthImage, DepthMap
 

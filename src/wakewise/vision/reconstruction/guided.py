@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from wakewise.core.arrays import Array, BoolArray, IntArray, freeze
 from wakewise.core.geometry import matrix_from_quat, quat_from_rotvec, skew
 from wakewise.core.interfaces import Progress
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 from wakewise.vision.reconstruction.colmap import pycolmap
 from wakewise.vision.reconstruction.dense import in_order
 from wakewise.vision.reconstruction.pairs import Pairs

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from wakewise.core.arrays import Array
+from wakewise.core.csv_separators import other_separator
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import matrix_from_quat
-from wakewise.core.separators import other_separator
 from wakewise.vision.reconstruction.colmap_files import read_colmap
 from wakewise.vision.reconstruction.lenses import Lens
 from wakewise.vision.reconstruction.photos import Photo

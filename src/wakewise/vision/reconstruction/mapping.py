@@ -18,14 +18,14 @@ from wakewise.core.files import whole_folder
 from wakewise.core.interfaces import Progress
 from wakewise.vision.evaluation import robust_similarity
 from wakewise.vision.reconstruction.colmap import call, no_stderr, pycolmap, settle, workroom
-from wakewise.vision.reconstruction.fixed import map_at_poses
 from wakewise.vision.reconstruction.guided import Poses
-from wakewise.vision.reconstruction.own_lenses import LEAST_POINTS, OwnLenses, heaps, own_lenses, set_cameras
+from wakewise.vision.reconstruction.known_pose_triangulation import map_at_poses
+from wakewise.vision.reconstruction.model_quality import doubts, evidence, few_doubts, known_doubts
+from wakewise.vision.reconstruction.per_photo_intrinsics import LEAST_POINTS, OwnLenses, heaps, own_lenses, set_cameras
 from wakewise.vision.reconstruction.photos import PhotoStore
-from wakewise.vision.reconstruction.seeded import Seeded, map_from_poses
+from wakewise.vision.reconstruction.prior_pose_mapping import Seeded, map_from_poses
 from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
 from wakewise.vision.reconstruction.solving import BUNDLE_ITERATIONS, NEVER, solve, solve_again
-from wakewise.vision.reconstruction.verdict import doubts, evidence, few_doubts, known_doubts
 
 # Fewer registered photos are a failure; of fewer, lenses are not looked into.
 MIN_REGISTERED, LEAST_FOR_CHECK = 3, 5

@@ -16,10 +16,10 @@ import numpy as np
 
 from wakewise.core.arrays import BoolArray
 from wakewise.core.errors import InputError
-from wakewise.vision.pictures import read_picture
+from wakewise.vision.image_decoding import read_picture
 from wakewise.vision.reconstruction.photos import PNG, Image, Photo
+from wakewise.vision.reconstruction.registered_photos import View
 from wakewise.vision.reconstruction.stereo import DepthMap, resample
-from wakewise.vision.reconstruction.views import View
 
 NAMES = ("{name}.png", "{stem}.png", "{stem}_mask.png", "{stem}.tif", "{stem}.jpg", "{stem}.jpeg", "{stem}.bmp")
 """Names of the mask of photo `stem.suffix`: as COLMAP, as most, and as Metashape has them."""

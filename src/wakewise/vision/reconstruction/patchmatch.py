@@ -15,9 +15,9 @@ from wakewise.core.interfaces import Progress
 from wakewise.core.run_lock import half_done
 from wakewise.vision.reconstruction.clouds import read_cloud, write_cloud
 from wakewise.vision.reconstruction.colmap import call, pycolmap
+from wakewise.vision.reconstruction.registered_photos import Ball
 from wakewise.vision.reconstruction.settings import RANDOM_SEED, ReconstructionSettings
 from wakewise.vision.reconstruction.stages import need_room
-from wakewise.vision.reconstruction.views import Ball
 
 
 def require_cuda() -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wakewise.core.errors import EnvironmentFailure, InputError
-from wakewise.vision.pictures import AS_STORED, decode_picture
+from wakewise.vision.image_decoding import AS_STORED, decode_picture
 from wakewise.vision.reconstruction.exif import exif_words
 
 if TYPE_CHECKING:

@@ -16,10 +16,10 @@ from wakewise.core.files import write_json
 from wakewise.core.interfaces import Progress, no_progress
 from wakewise.core.run_lock import alone
 from wakewise.vision.reconstruction.guided import Poses
+from wakewise.vision.reconstruction.image_retrieval import LOOK_ALIKES
 from wakewise.vision.reconstruction.known_cameras import KnownCameras, match_known
 from wakewise.vision.reconstruction.lens_groups import group_photos, known_groups, named_lenses
 from wakewise.vision.reconstruction.lenses import Lens
-from wakewise.vision.reconstruction.look_alike import LOOK_ALIKES
 from wakewise.vision.reconstruction.mapping import MAPPINGS
 from wakewise.vision.reconstruction.masks import read_masks
 from wakewise.vision.reconstruction.meshing import FIGURES as MESH_FIGURES
@@ -28,12 +28,12 @@ from wakewise.vision.reconstruction.pairs import BAND_NEIGHBOURS, POSE_NEIGHBOUR
 from wakewise.vision.reconstruction.patchmatch import require_cuda
 from wakewise.vision.reconstruction.photos import Photo, PhotoStore, passed_over, read_photos, without_duplicates
 from wakewise.vision.reconstruction.references import match_references
+from wakewise.vision.reconstruction.registered_photos import Ball
+from wakewise.vision.reconstruction.request import Wishes
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
 from wakewise.vision.reconstruction.stage_keys import stage_key
 from wakewise.vision.reconstruction.stages import StageResult, make_folder, run_stage, withdraw
 from wakewise.vision.reconstruction.steps import dense_step, map_step, match_step, scale_step
-from wakewise.vision.reconstruction.views import Ball
-from wakewise.vision.reconstruction.wishes import Wishes
 
 LATER = ("scale_bars", "scale_fixes", "dense_points", "depth_maps", "point_spacing_mm", *MESH_FIGURES)
 """Figures of stages that may not be asked for."""

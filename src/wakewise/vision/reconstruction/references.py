@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from wakewise.core.arrays import Array
+from wakewise.core.csv_separators import other_separator
 from wakewise.core.errors import InputError
-from wakewise.core.separators import other_separator
 
 
 def read_reference_cameras(path: Path) -> dict[str, Array]:

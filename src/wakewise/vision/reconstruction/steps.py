@@ -10,18 +10,18 @@ from wakewise.core.interfaces import Progress
 from wakewise.vision.reconstruction.colmap import pycolmap
 from wakewise.vision.reconstruction.dense import densify
 from wakewise.vision.reconstruction.features import database_bytes, match_photos
-from wakewise.vision.reconstruction.fixed import common_sight
 from wakewise.vision.reconstruction.guided import Poses
+from wakewise.vision.reconstruction.known_pose_triangulation import common_sight
 from wakewise.vision.reconstruction.lens_groups import LensGroup
 from wakewise.vision.reconstruction.mapping import map_photos
 from wakewise.vision.reconstruction.pairs import Pairs
 from wakewise.vision.reconstruction.patchmatch import patch_match
 from wakewise.vision.reconstruction.photos import Photo, PhotoStore
+from wakewise.vision.reconstruction.registered_photos import Ball
+from wakewise.vision.reconstruction.request import Box, Wishes, cut_cloud
 from wakewise.vision.reconstruction.scale.stage import place_model, scale_model
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
 from wakewise.vision.reconstruction.stages import need_room
-from wakewise.vision.reconstruction.views import Ball
-from wakewise.vision.reconstruction.wishes import Box, Wishes, cut_cloud
 
 
 def match_step(

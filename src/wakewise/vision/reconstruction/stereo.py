@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wakewise.core.arrays import Array, BoolArray, freeze
-from wakewise.core.jit.compiled import njit
+from wakewise.core.jit.njit import njit
 from wakewise.vision.reconstruction.photos import Image
-from wakewise.vision.reconstruction.views import Ball, View
+from wakewise.vision.reconstruction.registered_photos import Ball, View
 
 DepthImage = NDArray[np.float32]
 BLOCK = 5

@@ -22,8 +22,8 @@ from wakewise.core.arrays import Array, IntArray, freeze
 from wakewise.core.errors import StageError
 from wakewise.core.files import whole_file
 from wakewise.core.interfaces import Progress, no_progress
-from wakewise.vision.pictures import read_picture
-from wakewise.vision.reconstruction.views import View, read_views
+from wakewise.vision.image_decoding import read_picture
+from wakewise.vision.reconstruction.registered_photos import View, read_views
 from wakewise.vision.texturing.photo_colours import project
 
 SIDES_PX = (512, 1024, 2048, 4096, 8192)

@@ -22,10 +22,10 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError, StageError
 from wakewise.core.files import whole_file
 from wakewise.core.interfaces import no_progress
-from wakewise.core.sizes import picture_depth
-from wakewise.vision.pictures import read_picture
+from wakewise.core.size_limits import picture_depth
+from wakewise.vision.image_decoding import read_picture
 from wakewise.vision.reconstruction import read_photos
-from wakewise.vision.reconstruction.views import View, read_views
+from wakewise.vision.reconstruction.registered_photos import View, read_views
 from wakewise.vision.texturing.colour import WaterFit, balanced, fit_water, without_water
 
 FIT_PHOTOS = 16

@@ -18,7 +18,7 @@ from made_trials import POSE, make_trial, target_mesh
 from wakewise.core.errors import InputError
 from wakewise.experiments.exports.frames import ros_body
 from wakewise.experiments.trials.dataset import build_dataset, check_dataset, read_words
-from wakewise.experiments.trials.dataset.words import Words
+from wakewise.experiments.trials.dataset.statement import Words
 from wakewise.ui.cli.main import run
 
 Capsys = pytest.CaptureFixture[str]

@@ -10,15 +10,15 @@ import typer
 from wakewise.ui.cli.console import Bars, print_json, shown, write_page
 from wakewise.ui.cli.options import Json
 from wakewise_ardusub.cli import link_ardusub, link_script, link_share, link_sitl
-from wakewise_ardusub.cli.link_meter import meter
 from wakewise_ardusub.cli.link_points import Ahead, Points, WakeModelName, region_ahead, region_words
 from wakewise_ardusub.cli.link_sensors import sensors
+from wakewise_ardusub.cli.link_wash_meter import meter
 
 if TYPE_CHECKING:
     from wakewise.robot.vehicles import Vehicle
     from wakewise.scene.targets import Region
-    from wakewise_ardusub.logs.gather import VehicleLog
-    from wakewise_ardusub.logs.hindsight import Hindsight
+    from wakewise_ardusub.logs.channels import VehicleLog
+    from wakewise_ardusub.logs.replay_allocation import Hindsight
     from wakewise_ardusub.logs.table import LogTable
 
 app = typer.Typer(help="Real vehicles and what they recorded.", rich_markup_mode=None)
@@ -120,7 +120,7 @@ def _hindsight(
     """Flown thrusts against others, or why there is none; a vehicle that was named must fit, the default may not."""
     from wakewise import wake
     from wakewise.core.errors import InputError
-    from wakewise_ardusub.logs.hindsight import hindsight
+    from wakewise_ardusub.logs.replay_allocation import hindsight
 
     model = wake.wake_model(wake_model)
     if found.identity.is_other:

@@ -29,8 +29,8 @@ from wakewise_ardusub.cli.link_ardusub_check import (
 
 if TYPE_CHECKING:
     from wakewise_ardusub.link.connection import Endpoint
+    from wakewise_ardusub.session.protected_region import WhatToSpare
     from wakewise_ardusub.session.session import SeaSession
-    from wakewise_ardusub.session.target import WhatToSpare
 
 DEFAULT_VEHICLE = "bluerov2-heavy"
 LINE_S = 0.2
@@ -170,10 +170,10 @@ def ardusub(
 
     from wakewise.operation import load_scenario, parse_overrides
     from wakewise_ardusub.link.connection import parse_connection
-    from wakewise_ardusub.link.engagement import Limits
-    from wakewise_ardusub.link.post import Post
+    from wakewise_ardusub.link.engagement_fsm import Limits
+    from wakewise_ardusub.link.mavlink_codec import Post
     from wakewise_ardusub.session.cameras import parse_camera
-    from wakewise_ardusub.session.join import SEA
+    from wakewise_ardusub.session.link_join import SEA
     from wakewise_ardusub.session.session import SeaSession
 
     vehicle_at = parse_connection(connection)
@@ -240,9 +240,9 @@ def _uninterrupted() -> Iterator[None]:
 def _carried(stack: ExitStack, vehicle_at: Endpoint, ground_at: Endpoint | None) -> tuple[Any, Any]:
     """What carries the bytes, and what is to be done once the session is there."""
     from wakewise.core.errors import InputError
-    from wakewise_ardusub.link.carriers import carrier_of, open_udp
-    from wakewise_ardusub.link.mediator import Mediator
-    from wakewise_ardusub.link.post import Tap
+    from wakewise_ardusub.link.mavlink_codec import Tap
+    from wakewise_ardusub.link.mavlink_relay import Mediator
+    from wakewise_ardusub.link.transports import carrier_of, open_udp
 
     if ground_at is None:
         carrier = carrier_of(vehicle_at)
@@ -305,8 +305,8 @@ def _spare(vehicle: str, target: str | None, ahead: float, points: Path | None) 
     from wakewise.core.geometry import Pose
     from wakewise.robot.importers import any_vehicle
     from wakewise.scene.targets import Region
-    from wakewise_ardusub.logs.hindsight import bow_points
-    from wakewise_ardusub.session.target import WhatToSpare
+    from wakewise_ardusub.logs.replay_allocation import bow_points
+    from wakewise_ardusub.session.protected_region import WhatToSpare
 
     if target is not None and points is not None:
         raise InputError("--target, --points: both say what to spare, give one")

@@ -72,7 +72,7 @@ def check_vehicle(
     from wakewise_ardusub.link.checks import Facts, check, verdict
     from wakewise_ardusub.link.motor_results import read_results
     from wakewise_ardusub.link.parameters import SYSTEM_NAMES, first_of, read_parameter_file
-    from wakewise_ardusub.link.survey import survey
+    from wakewise_ardusub.link.vehicle_survey import survey
 
     chosen = any_vehicle(vehicle)
     results = read_results(motor_results) if motor_results.exists() else None
@@ -103,7 +103,7 @@ def test_vehicle_motors(
     from wakewise_ardusub.link.motor_results import read_results, write_results
     from wakewise_ardusub.link.motor_test import planned_turns, run_motor_test
     from wakewise_ardusub.link.parameters import read_parameters
-    from wakewise_ardusub.link.survey import await_autopilot
+    from wakewise_ardusub.link.vehicle_survey import await_autopilot
 
     chosen = any_vehicle(vehicle)
     numbers = _motor_numbers(motors)

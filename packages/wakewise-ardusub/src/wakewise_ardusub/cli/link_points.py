@@ -46,7 +46,7 @@ def region_ahead(vehicle: Vehicle, ahead: float, points: Path | None) -> Region:
     from wakewise.core.geometry import Pose
     from wakewise.scene.targets import Region
     from wakewise.ui.cli.points import read_points
-    from wakewise_ardusub.logs.hindsight import bow_points
+    from wakewise_ardusub.logs.replay_allocation import bow_points
 
     if points is None:
         return bow_points(vehicle, ahead)

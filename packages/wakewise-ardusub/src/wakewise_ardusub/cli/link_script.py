@@ -96,8 +96,8 @@ def _uploaded(connection: str, system: int, *, start: bool) -> str:
     from wakewise.core.errors import InputError
     from wakewise_ardusub.link.connection import Connection, parse_connection
     from wakewise_ardusub.link.script import script_text
-    from wakewise_ardusub.link.survey import await_autopilot
     from wakewise_ardusub.link.upload import start_script, upload_script
+    from wakewise_ardusub.link.vehicle_survey import await_autopilot
 
     endpoint = parse_connection(connection, "--upload")
     if endpoint.way == "file":

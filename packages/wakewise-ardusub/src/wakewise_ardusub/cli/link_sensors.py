@@ -13,7 +13,7 @@ from wakewise.ui.cli.console import print_json, shown
 from wakewise.ui.cli.options import Json
 
 if TYPE_CHECKING:
-    from wakewise_ardusub.sensors.watching import Source
+    from wakewise_ardusub.sensors.sensor_polling import Source
 
 Depth = Annotated[
     Path | None, typer.Option("--depth", metavar="BUS", help="I2C bus of an MS5837, /dev/i2c-1.", show_default=False)
@@ -69,7 +69,7 @@ def sensors(
     """
     from wakewise.core.errors import InputError
     from wakewise_ardusub.sensors import PoseForwarder
-    from wakewise_ardusub.sensors.watching import watch
+    from wakewise_ardusub.sensors.sensor_polling import watch
 
     if json and seconds is None:
         raise InputError("--json: prints the figures at the end; give --seconds")
@@ -106,7 +106,7 @@ def _sources(
 ) -> list[Source]:
     from wakewise.core.errors import InputError
     from wakewise_ardusub.sensors import DepthSensor, InertialUnit, LinePoses, LinuxI2C, SerialPort, UdpSocket, mounting
-    from wakewise_ardusub.sensors.watching import DepthSource, InertialSource, PoseSource
+    from wakewise_ardusub.sensors.sensor_polling import DepthSource, InertialSource, PoseSource
 
     sources: list[Source] = []
     if zero and depth is None:

@@ -17,9 +17,9 @@ from wakewise.ui.cli.options import Json, Preset, ScenarioFile, Sets, Vehicle, W
 if TYPE_CHECKING:
     from wakewise.robot.vehicles import Vehicle as AnyVehicle
     from wakewise_ardusub.physics import PhysicsFigures
-    from wakewise_ardusub.physics.depth_watch import DepthWatch
-    from wakewise_ardusub.sitl.rim import Behind
-    from wakewise_ardusub.sitl.stand_in import StandIn
+    from wakewise_ardusub.physics.depth_monitor import DepthWatch
+    from wakewise_ardusub.sitl.simulated_autopilot import StandIn
+    from wakewise_ardusub.sitl.udp_endpoints import Behind
 
 DEFAULT_VEHICLE = "bluerov2-heavy"
 _STATION, _COMPANION, _WATCH = "127.0.0.1:14550", "127.0.0.1:14560", "127.0.0.1:14570"
@@ -186,9 +186,9 @@ def stand_in(
     need("wakewise link stand-in", "links", only=("pymavlink", "lupa"))
     from wakewise.robot.importers import any_vehicle
     from wakewise_ardusub.sitl.own_parameters import own_parameters, read_params
-    from wakewise_ardusub.sitl.piloted import Ashore, carry_to
-    from wakewise_ardusub.sitl.rim import Link, OverUdp, run
-    from wakewise_ardusub.sitl.stand_in import StandIn
+    from wakewise_ardusub.sitl.scripted_ground_station import Ashore, carry_to
+    from wakewise_ardusub.sitl.simulated_autopilot import StandIn
+    from wakewise_ardusub.sitl.udp_endpoints import Link, OverUdp, run
 
     if script is not None and no_script:
         raise InputError("--script and --no-script: one or the other")
@@ -218,7 +218,7 @@ def stand_in(
 def _scripts(file: Path | None) -> dict[str, str]:
     """The script that is shipped, or another one."""
     from wakewise.core.errors import InputError
-    from wakewise_ardusub.sitl.rehearsal import shipped_script
+    from wakewise_ardusub.sitl.inprocess_session import shipped_script
 
     if file is None:
         return shipped_script()
@@ -230,7 +230,7 @@ def _scripts(file: Path | None) -> dict[str, str]:
 
 def _embedded(vehicle: AnyVehicle, values: dict[str, float]) -> Behind:
     from wakewise_ardusub.physics import FreeWater, PulseTable
-    from wakewise_ardusub.sitl.rim import Embedded
+    from wakewise_ardusub.sitl.udp_endpoints import Embedded
 
     return Embedded(body=FreeWater(vehicle), table=PulseTable.of(vehicle, values))
 
@@ -254,7 +254,7 @@ def _depth_watch(stack: ExitStack, where: str) -> DepthWatch | None:
     from wakewise.core.errors import EnvironmentFailure
     from wakewise.core.optional_dependencies import has
     from wakewise_ardusub.link.connection import parse_connection
-    from wakewise_ardusub.physics.depth_watch import DepthWatch
+    from wakewise_ardusub.physics.depth_monitor import DepthWatch
 
     if where == "none":
         return None
@@ -262,9 +262,9 @@ def _depth_watch(stack: ExitStack, where: str) -> DepthWatch | None:
     if not has("links"):
         typer.echo("the autopilot's depth is not compared: the extra `links` is not installed", err=True)
         return None
-    from wakewise_ardusub.link.carriers import carrier_of
-    from wakewise_ardusub.link.post import Post
+    from wakewise_ardusub.link.mavlink_codec import Post
     from wakewise_ardusub.link.protocol import DEFAULT_SYSTEM
+    from wakewise_ardusub.link.transports import carrier_of
 
     try:
         carrier = carrier_of(parse_connection(f"udpin:{where}", "--watch"))

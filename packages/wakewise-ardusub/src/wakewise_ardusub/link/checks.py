@@ -11,7 +11,7 @@ from typing import Literal
 
 from wakewise.robot.vehicles import Vehicle
 from wakewise_ardusub.link.buttons import conflict, free_buttons, free_words, parameters_of
-from wakewise_ardusub.link.engagement import Limits
+from wakewise_ardusub.link.engagement_fsm import Limits
 from wakewise_ardusub.link.frames import FRAMES, match_motors
 from wakewise_ardusub.link.motor_results import MotorResults
 from wakewise_ardusub.link.parameters import GROUND_NAMES, SYSTEM_NAMES, first_of
@@ -25,7 +25,7 @@ from wakewise_ardusub.link.protocol import (
     SLOTS,
     TRIED_FIRMWARE,
 )
-from wakewise_ardusub.logs.gather import MODES
+from wakewise_ardusub.logs.channels import MODES
 from wakewise_ardusub.motors import channels_of_motors
 
 Verdict = Literal["go", "no-go", "unknown"]

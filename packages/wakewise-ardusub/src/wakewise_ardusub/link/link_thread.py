@@ -6,8 +6,8 @@ import threading
 from collections.abc import Iterable
 from typing import Protocol
 
-from wakewise_ardusub.link.listening import Said
-from wakewise_ardusub.link.warden import RELEASES, TICK_S, Warden
+from wakewise_ardusub.link.message_state import Said
+from wakewise_ardusub.link.output_gate import RELEASES, TICK_S, Warden
 
 MOST_AT_ONCE = 50
 """Messages taken between two looks at the clock, however many wait."""

@@ -22,7 +22,7 @@ from wakewise_ardusub.link.frames import force_words
 from wakewise_ardusub.link.motor_results import Answer, MotorResults, MotorSeen
 from wakewise_ardusub.link.output import motor_output
 from wakewise_ardusub.link.protocol import MIDDLE_US
-from wakewise_ardusub.link.survey import say_hello
+from wakewise_ardusub.link.vehicle_survey import say_hello
 from wakewise_ardusub.motors import pulses_of_thrusts, supply_in_table
 
 RENEW_S = 0.1

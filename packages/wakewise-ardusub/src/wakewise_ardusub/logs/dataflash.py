@@ -13,7 +13,7 @@ import struct
 from dataclasses import dataclass
 from typing import Any
 
-from wakewise_ardusub.logs.gather import SERVOS, Gather, Vessel
+from wakewise_ardusub.logs.channels import SERVOS, Gather, Vessel
 from wakewise_ardusub.logs.identity import firmware_of
 
 HEAD = b"\xa3\x95"

@@ -8,8 +8,8 @@ from typing import Any, cast
 import polars as pl
 
 from wakewise.core.files import whole_file, write_json, write_text
-from wakewise_ardusub.logs.gather import VehicleLog
-from wakewise_ardusub.logs.hindsight import Hindsight
+from wakewise_ardusub.logs.channels import VehicleLog
+from wakewise_ardusub.logs.replay_allocation import Hindsight
 from wakewise_ardusub.logs.table import LogTable
 
 STEPS, FACTS, PARAMETERS, PAGE = "steps.parquet", "log.json", "parameters.csv", "report.html"

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
-from wakewise_ardusub.logs.gather import SERVOS
+from wakewise_ardusub.logs.channels import SERVOS
 from wakewise_ardusub.logs.identity import NO_AUTOPILOT, enumerated
 
 WANTED = frozenset({
@@ -33,7 +33,7 @@ class Told(Protocol):
     """Where the samples and parameters of one system go."""
 
     def put(self, channel: str, time_s: float, values: Iterable[float]) -> None:
-        """Keep one sample of a channel (`wakewise_ardusub.logs.gather`)."""
+        """Keep one sample of a channel (`wakewise_ardusub.logs.channels`)."""
         ...
 
     def parameter(self, name: str, value: float) -> None:

@@ -14,7 +14,7 @@ import struct
 from io import BytesIO
 from typing import Any
 
-from wakewise_ardusub.logs.gather import Gather
+from wakewise_ardusub.logs.channels import Gather
 from wakewise_ardusub.logs.mavlink import take
 
 MAGIC = b"\x89MCAP0\r\n"

@@ -10,7 +10,7 @@ import numpy as np
 
 from wakewise.core.errors import InputError
 from wakewise.core.optional_dependencies import need
-from wakewise_ardusub.logs.gather import VehicleLog
+from wakewise_ardusub.logs.channels import VehicleLog
 
 FORMATS = "a telemetry log (.tlog), the autopilot's own (.BIN) or BlueOS's recording (.mcap)"
 _FOREIGN = {

@@ -12,9 +12,9 @@ import numpy as np
 import polars as pl
 
 from wakewise.core.arrays import Array
+from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.geometry import quat_from_euler
-from wakewise.core.physics import GRAVITY_M_S2
-from wakewise_ardusub.logs.gather import HELD_S, MODES, SERVOS, Series, VehicleLog
+from wakewise_ardusub.logs.channels import HELD_S, MODES, SERVOS, Series, VehicleLog
 
 RATE_HZ = 10.0
 MOST_ROWS = 500_000

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from wakewise_ardusub.logs.gather import Gather
+from wakewise_ardusub.logs.channels import Gather
 from wakewise_ardusub.logs.mavlink import WANTED, take
 
 Buffer = Any

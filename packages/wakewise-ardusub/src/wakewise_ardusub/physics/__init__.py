@@ -2,8 +2,8 @@
 
 Start reading in `physics.py` (a frame of pulses is answered by motion). `datagrams.py` is what is on the wire,
 `frames.py` which frames are new, `pulses.py` what a pulse gives, `free_water.py` a body for quick tests, `surface.py`
-and `lowering.py` where the water ends and how a vehicle comes under it, `depth_watch.py` whether the autopilot knows
-its depth, `udp.py` the socket. A tank is put behind it in `wakewise_ardusub.sitl_plant`.
+and `lowered_start.py` where the water ends and how a vehicle comes under it, `depth_monitor.py` whether the autopilot
+knows its depth, `udp.py` the socket. A tank is put behind it in `wakewise_ardusub.sitl_plant`.
 """
 
 from wakewise_ardusub.physics.datagrams import Motion, Request, read_reply, read_request, write_reply, write_request

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from wakewise.core.arrays import Array
+from wakewise.core.constants import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.core.geometry import Pose, matrix_from_quat, quat_multiply
 from wakewise.core.interfaces import BodyState
-from wakewise.core.physics import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.robot.thrusters import saturate, thruster_lag
 from wakewise.robot.vehicles import Vehicle, fossen
 from wakewise_ardusub.physics.datagrams import Motion

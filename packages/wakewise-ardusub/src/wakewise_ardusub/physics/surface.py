@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from wakewise.core.arrays import Array, freeze
+from wakewise.core.constants import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.core.geometry import Pose
-from wakewise.core.physics import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.robot.vehicles import Vehicle
 
 

@@ -12,7 +12,7 @@ import polars as pl
 
 from wakewise.core.files import write_text
 from wakewise.ui.reports.page import missing, plot, section, tile, whole_page
-from wakewise.ui.reports.words import NONE, fixed, number, shown
+from wakewise.ui.reports.text import NONE, fixed, number, shown
 from wakewise_ardusub.logs.folder import FACTS, PAGE, STEPS
 from wakewise_ardusub.reports import log_plots
 

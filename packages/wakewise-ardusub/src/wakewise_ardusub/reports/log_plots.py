@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from wakewise.core.arrays import Array
 from wakewise.ui.reports.figures import NARROW_IN, THRUSTS, WIDTH_IN
-from wakewise.ui.reports.ink import (
+from wakewise.ui.reports.svg_style import (
     CARD,
     CORAL,
     LINE,

@@ -2,8 +2,8 @@
 
 Start reading in `samples.py` (what comes out). `ms5837.py` is the pressure sensor of Bar30 and Bar02, `jy901.py`
 WitMotion's inertial unit, `line_poses.py` the plain protocol by which any program sends poses; MAVLink's own are read
-by `wakewise_ardusub.link.measuring`. `devices.py` is the serial port, the I2C bus and the socket themselves,
-`watching.py` reads them all and says what each says, `forwarding.py` hands poses on as MAVLink.
+by `wakewise_ardusub.link.telemetry_adapter`. `devices.py` is the serial port, the I2C bus and the socket themselves,
+`sensor_polling.py` reads them all and says what each says, `forwarding.py` hands poses on as MAVLink.
 """
 
 from typing import TYPE_CHECKING

@@ -2,7 +2,7 @@
 
 Fields and the layout of the covariance are those of MAVLink's common set
 (https://mavlink.io/en/messages/common.html#VISION_POSITION_ESTIMATE): NED and FRD, the upper triangle of a 6 x 6 matrix
-by rows, its first number NaN where it is not known. Who reads the message is `wakewise_ardusub.link.measuring`.
+by rows, its first number NaN where it is not known. Who reads the message is `wakewise_ardusub.link.telemetry_adapter`.
 """
 
 from __future__ import annotations

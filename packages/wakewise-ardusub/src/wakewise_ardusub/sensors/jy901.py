@@ -17,9 +17,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from wakewise.core.arrays import Array
+from wakewise.core.constants import GRAVITY_M_S2
 from wakewise.core.errors import InputError
 from wakewise.core.interfaces import Measurement
-from wakewise.core.physics import GRAVITY_M_S2
 
 HEAD = 0x55
 LENGTH = 11

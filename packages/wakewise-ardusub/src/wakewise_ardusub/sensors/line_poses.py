@@ -25,7 +25,7 @@ from wakewise.core.errors import InputError
 from wakewise.core.geometry import quat_from_euler
 from wakewise.core.interfaces import Measurement
 from wakewise.experiments.exports.frames import enu_of, ros_body
-from wakewise_ardusub.link.measuring import SenderClock
+from wakewise_ardusub.link.telemetry_adapter import SenderClock
 from wakewise_ardusub.sensors.samples import PoseSample, checked_place, checked_pose, checked_turn
 
 LONGEST_LINE = 2000

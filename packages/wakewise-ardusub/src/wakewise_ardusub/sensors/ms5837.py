@@ -12,9 +12,9 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
+from wakewise.core.constants import GRAVITY_M_S2, TRIM_WATER_KG_M3
 from wakewise.core.errors import EnvironmentFailure, InputError
 from wakewise.core.interfaces import Measurement
-from wakewise.core.physics import GRAVITY_M_S2, TRIM_WATER_KG_M3
 
 ADDRESS = 0x76
 RESET, READ_ADC, READ_PROM, CONVERT_PRESSURE, CONVERT_TEMPERATURE = 0x1E, 0x00, 0xA0, 0x40, 0x50

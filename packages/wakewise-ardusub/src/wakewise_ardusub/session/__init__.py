@@ -3,9 +3,9 @@
 The loop runs from when the vehicle is heard until the session ends, so that the estimate is good when the operator
 consents. While the pilot flies, the controller rests, the estimator is told what the servos do, and the goal is where
 the vehicle is; each engagement begins afresh from there. In which engagement a step is flown is settled once, when its
-goal is asked for, and thrusts of another are not sent (`wakewise_ardusub.link.warden`).
+goal is asked for, and thrusts of another are not sent (`wakewise_ardusub.link.output_gate`).
 
-Start reading in `session.py` (from a connection to a flight) and `join.py` (the parts); `turns.py` is who flies now,
-`target.py` what is spared, `cameras.py` who takes the photographs, `figures.py` what ground stations are told,
-`rehearsal.py` what is done before it counts.
+Start reading in `session.py` (from a connection to a flight) and `link_join.py` (the parts); `control_handover.py` is
+who flies now, `protected_region.py` what is spared, `cameras.py` who takes the photographs, `figures.py` what ground
+stations are told, `warm_up.py` what is done before it counts.
 """

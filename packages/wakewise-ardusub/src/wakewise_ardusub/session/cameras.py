@@ -24,9 +24,9 @@ from typing import Protocol
 
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
-from wakewise_ardusub.link.journal import Journal
-from wakewise_ardusub.link.listening import DIGICAM_CONTROL, IMAGE_START_CAPTURE
-from wakewise_ardusub.link.warden import Warden
+from wakewise_ardusub.link.message_state import DIGICAM_CONTROL, IMAGE_START_CAPTURE
+from wakewise_ardusub.link.output_gate import Warden
+from wakewise_ardusub.link.session_log import Journal
 
 PHOTOGRAPHS = "photographs"
 CAMERAS_FILE = "cameras.csv"

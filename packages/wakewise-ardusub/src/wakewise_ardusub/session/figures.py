@@ -18,9 +18,9 @@ from wakewise.operation.loop import Step
 from wakewise.operation.parts import Parts
 from wakewise.scene.missions import Coverage, patches_of
 from wakewise.wake import WakeView
+from wakewise_ardusub.link.output_gate import Warden
 from wakewise_ardusub.link.protocol import COVERAGE_NAME, DISTURBANCE_NAME, SAVED_NAME
-from wakewise_ardusub.link.warden import Warden
-from wakewise_ardusub.session.turns import Turn
+from wakewise_ardusub.session.control_handover import Turn
 
 FIGURES_S = 0.5
 STILL_M_S = 1e-4

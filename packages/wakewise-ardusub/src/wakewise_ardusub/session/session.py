@@ -25,15 +25,15 @@ from wakewise.operation.flying import FLIGHT_JOBS
 from wakewise.operation.scenario import Scenario
 from wakewise.operation.teleop.live import LiveFlight
 from wakewise.robot.importers import any_vehicle
-from wakewise_ardusub.link.drive import VehicleDrive
-from wakewise_ardusub.link.journal import JOURNAL_FILE, Journal
 from wakewise_ardusub.link.link_thread import LinkThread, Receiving
-from wakewise_ardusub.link.listening import attitude_of
-from wakewise_ardusub.link.warden import Send, Warden
+from wakewise_ardusub.link.message_state import attitude_of
+from wakewise_ardusub.link.motor_interface import VehicleDrive
+from wakewise_ardusub.link.output_gate import Send, Warden
+from wakewise_ardusub.link.session_log import JOURNAL_FILE, Journal
 from wakewise_ardusub.session.cameras import MakeCamera, note_view
-from wakewise_ardusub.session.join import AtSea, at_sea
-from wakewise_ardusub.session.rehearsal import rehearse
-from wakewise_ardusub.session.target import WhatToSpare, ball
+from wakewise_ardusub.session.link_join import AtSea, at_sea
+from wakewise_ardusub.session.protected_region import WhatToSpare, ball
+from wakewise_ardusub.session.warm_up import rehearse
 
 LOOK_S = 0.05
 LEFT_S = 2.0

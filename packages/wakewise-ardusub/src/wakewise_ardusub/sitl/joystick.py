@@ -20,7 +20,7 @@ from wakewise_ardusub.link.buttons import (
 from wakewise_ardusub.sitl.parameters import ParameterTable
 
 if TYPE_CHECKING:
-    from wakewise_ardusub.sitl.stand_in import StandIn
+    from wakewise_ardusub.sitl.simulated_autopilot import StandIn
 
 
 class Joystick:

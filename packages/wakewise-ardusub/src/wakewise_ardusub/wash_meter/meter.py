@@ -11,11 +11,11 @@ from wakewise.core.arrays import Array
 from wakewise.core.errors import InputError
 from wakewise.core.geometry import Pose
 from wakewise.wake.disturbance import split_roots
-from wakewise.wake.view import WakeView
-from wakewise_ardusub.logs.gather import SERVOS
+from wakewise.wake.influence import WakeView
+from wakewise_ardusub.logs.channels import SERVOS
 from wakewise_ardusub.motors import directions_of_motors, motor_channels
 from wakewise_ardusub.vehicle_summary import Craft
-from wakewise_ardusub.wash_meter.hearing import Hearing
+from wakewise_ardusub.wash_meter.vehicle_listener import Hearing
 from wakewise_ardusub.wash_savings import SHARES, Shares, Spared, Sparing, look, saved_pct
 
 MINUTE_S = 60.0

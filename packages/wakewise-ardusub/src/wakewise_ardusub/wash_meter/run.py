@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.ui.web.gate import is_loopback
+from wakewise.ui.web.origin_check import is_loopback
 from wakewise_ardusub.link.protocol import DISTURBANCE_NAME, SAVED_NAME
-from wakewise_ardusub.logs.gather import SERVOS
+from wakewise_ardusub.logs.channels import SERVOS
 from wakewise_ardusub.vehicle_summary import Craft
-from wakewise_ardusub.wash_meter.hearing import Hearing
 from wakewise_ardusub.wash_meter.history import History
+from wakewise_ardusub.wash_meter.json_state import told
+from wakewise_ardusub.wash_meter.mavlink_socket import Wire
 from wakewise_ardusub.wash_meter.meter import Meter, Reading, Sum
 from wakewise_ardusub.wash_meter.record import Record
 from wakewise_ardusub.wash_meter.server import Server
 from wakewise_ardusub.wash_meter.settings import TICK_S, MeterSettings
-from wakewise_ardusub.wash_meter.wire import Wire
-from wakewise_ardusub.wash_meter.words import told
+from wakewise_ardusub.wash_meter.vehicle_listener import Hearing
 
 BEAT_S, PUBLISH_S, ASK_S = 1.0, 0.5, 0.5
 _MOST_ROUNDS, _AT_ONCE = 5, 6

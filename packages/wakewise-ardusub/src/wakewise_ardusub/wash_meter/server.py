@@ -1,8 +1,8 @@
 """The page's server: its files, the state as JSON, and three things that a page may wish of the meter.
 
 Only the standard library, one thread a request. A page asks again and again (five times a second), which passes through
-any proxy, BlueOS' too. Who may ask is `wakewise.ui.web.gate`'s: this computer by its own names, others with the token
-unless the pilot has said that everybody on the network may.
+any proxy, BlueOS' too. Who may ask is `wakewise.ui.web.origin_check`'s: this computer by its own names, others with the
+token unless the pilot has said that everybody on the network may.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from typing import Any
 
 from wakewise.core.errors import InputError
 from wakewise.ui.web.addresses import page_addresses
+from wakewise.ui.web.blueos import Offer, as_json
 from wakewise.ui.web.files import File, Files
-from wakewise.ui.web.gate import TOKEN_HEADER, Caller, Gate, is_loopback, page_headers
+from wakewise.ui.web.origin_check import TOKEN_HEADER, Caller, Gate, is_loopback, page_headers
 from wakewise.ui.web.pending import Pending
-from wakewise.ui.web.stations import Offer, as_json
 
 PAGE = Path(__file__).with_name("page")
 OFFER = Offer(

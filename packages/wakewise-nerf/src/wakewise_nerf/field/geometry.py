@@ -13,8 +13,8 @@ from wakewise.core.interfaces import Progress
 from wakewise.vision.reconstruction.cells import CellMeans
 from wakewise.vision.reconstruction.clouds import Cloud
 from wakewise.vision.reconstruction.fusion import facing_normals, fuse, lonely
+from wakewise.vision.reconstruction.registered_photos import Ball
 from wakewise.vision.reconstruction.stereo import DepthMap
-from wakewise.vision.reconstruction.views import Ball
 from wakewise_nerf.field.posed import PosedPhoto
 
 # Depth maps of at most this many other views vote on a point.

@@ -15,9 +15,9 @@ from wakewise.core.interfaces import Progress, no_progress
 from wakewise.vision.reconstruction.clouds import write_cloud
 from wakewise.vision.reconstruction.meshing import FIGURES as MESH_FIGURES
 from wakewise.vision.reconstruction.meshing import mesh_points
+from wakewise.vision.reconstruction.registered_photos import Ball
 from wakewise.vision.reconstruction.settings import ReconstructionSettings
 from wakewise.vision.reconstruction.stages import StageResult, fingerprint, make_folder, run_stage
-from wakewise.vision.reconstruction.views import Ball
 from wakewise_nerf.field.backend import pick_device
 from wakewise_nerf.field.geometry import depth_camera, depth_map, fuse_depth
 from wakewise_nerf.field.posed import PosedPhoto, read_model, read_posed, sees, surroundings
@@ -80,9 +80,9 @@ def build_field(
     ball = surroundings(model) if region is None else _ball(region)
     posed = read_posed(model, photos, ball, settings.photo_px)
     # PyTorch is an extra, so what needs it is imported only now.
-    from wakewise_nerf.field import judging, rays, training
+    from wakewise_nerf.field import held_out_views, rays, training
 
-    learn, held_out = judging.split(posed, settings.held_out_every)
+    learn, held_out = held_out_views.split(posed, settings.held_out_every)
     used = settings.model_dump(exclude=_JUST_HOW)
     train_key = fingerprint(VERSION, "train", used, _digest(posed), ball.centre_W_m.tolist(), ball.radius_m)
     checkpoint = out / "checkpoint.pt"
@@ -122,7 +122,7 @@ def build_field(
             # The rectangle's corners look past the region.
             rays_C[~sees(rays_C, camera.R_CW @ (ball.centre_W_m - camera.p_WC_m), ball.radius_m)] = np.nan
             directions = (rays_C @ camera.R_CW).astype(np.float32)
-            colours, distance = judging.draw_surface(trained(), rays.origin_in(photo, ball), directions)
+            colours, distance = held_out_views.draw_surface(trained(), rays.origin_in(photo, ball), directions)
             shown = np.rint(255.0 * np.clip(colours, 0.0, 1.0)).astype(np.uint8)
             maps.append(depth_map(index, camera, ball.radius_m * distance, shown, ball))
         cloud, spacing = fuse_depth(maps, settings.agreeing_views, progress)
@@ -136,7 +136,7 @@ def build_field(
         "views",
         fingerprint(train_key, "views"),
         tuple(out / "views" / f"{Path(photo.name).stem}.png" for photo in held_out),
-        lambda: judging.judge(trained(), held_out, ball, out / "views", progress),
+        lambda: held_out_views.judge(trained(), held_out, ball, out / "views", progress),
     )
     points_key = fingerprint(train_key, "points", settings.depth_px, settings.agreeing_views)
     results["points"] = run_stage(out, "points", points_key, (out / "points.ply",), fused)

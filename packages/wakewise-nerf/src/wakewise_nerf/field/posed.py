@@ -13,7 +13,7 @@ from wakewise.core.arrays import Array, BoolArray, freeze
 from wakewise.core.errors import InputError, StageError
 from wakewise.vision.reconstruction.colmap import pycolmap
 from wakewise.vision.reconstruction.photos import decode
-from wakewise.vision.reconstruction.views import Ball
+from wakewise.vision.reconstruction.registered_photos import Ball
 
 Floats = NDArray[np.float32]
 Bytes = NDArray[np.uint8]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from wakewise.vision.reconstruction.views import Ball
+from wakewise.vision.reconstruction.registered_photos import Ball
 from wakewise_nerf.field.posed import PosedPhoto
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import typer
 
 from wakewise.ui.cli.console import print_table, shown
-from wakewise_paper.cli.bench_wash_reduction import reduction
+from wakewise_paper.cli.bench_wash import reduction
 
 _BARS = (
     ("velocity_deviation_pct", "velocity_deviation_interval_pct", "velocity deviation, %", "< 15"),

@@ -103,7 +103,7 @@ def learn(
 ) -> None:
     """Train the learned rival on tank and lattice; hold every model against water that none was fitted to."""
     from wakewise.wake.learned import load_network
-    from wakewise_paper.learned_wake import judging
+    from wakewise_paper.learned_wake import evaluation
     from wakewise_paper.learned_wake.making import Recipe, make
 
     with Bars().stage("learn") as progress:
@@ -111,7 +111,7 @@ def learn(
             network = load_network()
         else:
             network, _ = make(Recipe(draws=draws, steps=steps, seed=seed), out, progress)
-        result = judging.judge(network, judging.held_out(held_out, progress=progress))
+        result = evaluation.judge(network, evaluation.held_out(held_out, progress=progress))
     if json:
         print_json(result | {"out": None if out is None else str(out)})
         return

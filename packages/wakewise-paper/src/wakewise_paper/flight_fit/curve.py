@@ -20,10 +20,10 @@ from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.missions import Leg, Route
 from wakewise.vision.imaging import PinholeCamera
 from wakewise.wake import RoundJet
-from wakewise_paper.flight_fit.fitting import FlightFit, fit_flight
-from wakewise_paper.flight_fit.held import held_sightings
-from wakewise_paper.flight_fit.sightings import Sightings, Watcher
-from wakewise_paper.learned_wake.judging import Score, unit_f
+from wakewise_paper.flight_fit.flake_likelihood import FlightFit, fit_flight
+from wakewise_paper.flight_fit.flake_tracks import Sightings, Watcher
+from wakewise_paper.flight_fit.held_vehicle import held_sightings
+from wakewise_paper.learned_wake.evaluation import Score, unit_f
 from wakewise_paper.learned_wake.truth import Drawn, even_parcel_rows
 
 MINUTES = (0.5, 1.0, 2.0, 5.0)

@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wakewise.core.arrays import Array
+from wakewise.core.constants import FRESH_WATER_KG_M3
 from wakewise.core.interfaces import Progress, no_progress
-from wakewise.core.physics import FRESH_WATER_KG_M3
 from wakewise.simulation.lattice import CASES, Case, DiskJet, LatticeRun, load_mean_field
 from wakewise.simulation.water import Water
-from wakewise.simulation.water.closure import Spreading
+from wakewise.simulation.water.round_jet_closure import Spreading
 from wakewise.wake.learned import MEMORY_S
 from wakewise.wake.network import EDGES, JetPoints, history_bins, remembered
 

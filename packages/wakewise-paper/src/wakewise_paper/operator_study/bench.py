@@ -2,7 +2,7 @@
 
 For each world and w_track, `wake-aware` against direct allocation (`dp`) on the same seeds, by a script and by the
 human model; `unaware` at the same w_track and `bow-rule` beside them. What is flown and how it is judged was written
-down before the first flight (docs/decisions/0047). Flights are kept: a run that was stopped goes on.
+down before the first flight (docs/research-log/0047). Flights are kept: a run that was stopped goes on.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from wakewise.experiments.campaigns import Processes
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.operation import load_scenario
 from wakewise.operation.worlds.library import load_world
-from wakewise_paper import side_by_side
+from wakewise_paper import flight_batches
+from wakewise_paper.flight_batches import Failure, Key
 from wakewise_paper.flight_store import FLIES, FlightStore, store_folder
 from wakewise_paper.operator_study import paper
 from wakewise_paper.operator_study.figures import Flights, Known, sliced, table
@@ -35,8 +36,7 @@ from wakewise_paper.operator_study.plan import (
     wished_w_tracks,
     wished_worlds,
 )
-from wakewise_paper.operator_study.waters import water_of
-from wakewise_paper.side_by_side import Failure, Key
+from wakewise_paper.operator_study.worlds import water_of
 from wakewise_paper.wash_reduction.figures import Row
 
 SOURCES = (
@@ -70,9 +70,9 @@ def run(options: BenchOptions) -> dict[str, Any]:
     left_s = sum(flight_s(trial) for trial in trials.values() if store.load(trial, _FLY) is None)
     words = f"{len(trials)} flights, some {left_s / 60.0 / options.workers:.0f} min of {options.workers} free cores"
     options.progress(0, max(len(trials), 1), words)
-    rows, failures, kept = side_by_side.fly_all(trials, _FLY, store, options, _engine)
+    rows, failures, kept = flight_batches.fly_all(trials, _FLY, store, options, _engine)
     own = paper.paper_trials(w_tracks, min(options.seeds, paper.SEEDS))
-    papers, lost, known = side_by_side.fly_all(own, _FLY_PAPER, store, options, _engine)
+    papers, lost, known = flight_batches.fly_all(own, _FLY_PAPER, store, options, _engine)
     told = Told(trials, rows, failures)
     default = load_scenario("quick", None, {}).world
     tables = {name: world_figures(name, w_tracks, told) for name in worlds}

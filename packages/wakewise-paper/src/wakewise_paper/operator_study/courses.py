@@ -17,7 +17,7 @@ from wakewise.operation.teleop.input import Controls
 from wakewise.scene.missions import Leg, Route
 from wakewise.scene.missions.route import rest_to_rest
 from wakewise.scene.targets import Target
-from wakewise_paper.wash_reduction.courses import SETTLE_S, joined, resting, top_above_centre_m
+from wakewise_paper.wash_reduction.routes import SETTLE_S, joined, resting, top_above_centre_m
 
 SPEED_M_S, CLIMB_M_S = 0.10, 0.05
 SLEW_M_S2 = 0.1

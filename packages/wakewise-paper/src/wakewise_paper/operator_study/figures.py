@@ -12,7 +12,7 @@ import numpy as np
 
 from wakewise_paper.operator_study.flight import DEVIATIONS, FIGURES
 from wakewise_paper.wash_reduction.figures import LEAST_M_S, SPEED, Row, log_reduction_pct, means, pairs_of, ratio
-from wakewise_paper.wash_reduction.headline import TROUBLE_M_S
+from wakewise_paper.wash_reduction.summary_table import TROUBLE_M_S
 
 LEAST_D = 0.25e-6
 """D below counts as this in logarithms, (m/s)^2: the square of the least speed that counts."""

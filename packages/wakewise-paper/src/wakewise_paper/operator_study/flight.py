@@ -15,18 +15,18 @@ from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState, Witness
 from wakewise.operation import Parts, Scenario, fly
 from wakewise.operation.loop import Step
+from wakewise.operation.teleop.assist_modes import level_frame
 from wakewise.operation.teleop.assisted import AssistedPilot, assisted_pilot
-from wakewise.operation.teleop.assists import level_frame
-from wakewise.operation.teleop.desk import Desk, DeskState
-from wakewise.operation.teleop.hands import PersonsHands
 from wakewise.operation.teleop.input import ControlSource
+from wakewise.operation.teleop.operator_state import Desk, DeskState
+from wakewise.operation.teleop.simulated_operator import PersonsHands
 from wakewise.scene.missions import SETTLING, RoutePilot
 from wakewise.vision.evaluation import flight_figures
+from wakewise_paper.operator_study.controller_probe import Overheard
 from wakewise_paper.operator_study.courses import COURSES, SQUARE, CourseHands, look_route, operator_route, start_pose
-from wakewise_paper.operator_study.heard import Overheard
-from wakewise_paper.operator_study.waters import water_of
-from wakewise_paper.wash_reduction.courses import SETTLE_S
+from wakewise_paper.operator_study.worlds import water_of
 from wakewise_paper.wash_reduction.paper import WATER_EVERY_S
+from wakewise_paper.wash_reduction.routes import SETTLE_S
 
 PILOTS = ("script", "human")
 LOOK = "look"

@@ -1,5 +1,5 @@
 """The same in the paper's own world, circular: the planner's model is the water
-(`wakewise.operation.worlds.wake_world`).
+(`wakewise.operation.worlds.quasi_steady_world`).
 
 `wake-aware` against `unaware` at the same weight, same commands, same seeds, by the paper's cost alone (no levers). The
 operator asks for 0.1 m/s, reached at 0.1 m/s2. Two courses. `front`: sideways, up, back and down in front of the
@@ -23,14 +23,14 @@ from wakewise.core.arrays import Array
 from wakewise.core.interfaces import BodyState, Goal, Witness
 from wakewise.operation import Scenario, fly
 from wakewise.operation.loop import Step
-from wakewise.operation.worlds.wake_world import InstantWorld, paper_jets
+from wakewise.operation.worlds.quasi_steady_world import InstantWorld, paper_jets
 from wakewise.robot.vehicles import load_vehicle, perturbed
 from wakewise.scene.missions import open_route
 from wakewise.simulation.tank import TankSettings
 from wakewise.wake import WakeSettings, WakeView, disturbance, wake_model
+from wakewise_paper.flight_batches import Key
+from wakewise_paper.operator_study.controller_probe import Overheard
 from wakewise_paper.operator_study.flight import deviations
-from wakewise_paper.operator_study.heard import Overheard
-from wakewise_paper.side_by_side import Key
 from wakewise_paper.wash_reduction.figures import Row
 from wakewise_paper.wash_reduction.paper import OFF, PAPER_WAKE, paper_place
 

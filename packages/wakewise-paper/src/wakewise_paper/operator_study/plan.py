@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from wakewise.control.intent import PAPER_W_TRACK
 from wakewise.core.errors import InputError
-from wakewise.operation.teleop.desk import RANGES
+from wakewise.operation.teleop.operator_state import RANGES
 from wakewise.operation.worlds.library import world_names
+from wakewise_paper.flight_batches import Key
 from wakewise_paper.operator_study.flight import PILOTS, OperatorTrial
-from wakewise_paper.operator_study.waters import CONTROL, TROUBLE
-from wakewise_paper.side_by_side import Key
+from wakewise_paper.operator_study.worlds import CONTROL, TROUBLE
 
 W_TRACKS = (1.0, 2.0, 5.0, 10.0, 20.0)
 DIRECT, OURS, UNAWARE, RULE = "dp", "wake-aware", "unaware", "bow-rule"

@@ -9,7 +9,7 @@ from typing import Any
 
 from wakewise.core.files import write_text
 from wakewise.ui.reports.page import missing, plot, section, tile, whole_page
-from wakewise.ui.reports.words import NONE, fixed, number, shown
+from wakewise.ui.reports.text import NONE, fixed, number, shown
 from wakewise_paper.reports.wake_plots import decays, profiles, scatters
 from wakewise_paper.wake_validation import WakeValidation
 

@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wakewise.core.arrays import Array
-from wakewise.core.physics import FRESH_WATER_KG_M3
-from wakewise.ui.reports.ink import CORAL, INK, LINE, MUTED, SAND, SLATE, TEAL, VIOLET, dress, new_figure
+from wakewise.core.constants import FRESH_WATER_KG_M3
+from wakewise.ui.reports.svg_style import CORAL, INK, LINE, MUTED, SAND, SLATE, TEAL, VIOLET, dress, new_figure
 from wakewise.wake.jets import AxialJet
 from wakewise.wake.samples import CORE, WAKE, JetSamples
 from wakewise.wake.scores import predicted_speed

@@ -6,8 +6,8 @@ methods of this package, and ways to stir less that need no such method.
 
 from __future__ import annotations
 
-from wakewise_paper.reproduction.blocks import APPROACHES, COMPARED
 from wakewise_paper.reproduction.claim import UNQUOTED, Claim
+from wakewise_paper.reproduction.table_trials import APPROACHES, COMPARED
 
 COLUMNS = (
     ("target_speed_mean_m_s", "wash at the target", "mm/s", 1e3),

@@ -24,9 +24,9 @@ from wakewise.operation.loop import Step
 from wakewise.scene.missions import SETTLING
 from wakewise.vision.evaluation import flight_figures
 from wakewise_paper.reproduction.piv_flights import PivWatch
-from wakewise_paper.wash_reduction.courses import gentle_route, station_route
+from wakewise_paper.wash_reduction.ballasted_world import ballasted_world, blocks_of
 from wakewise_paper.wash_reduction.paper import WATER_EVERY_S
-from wakewise_paper.wash_reduction.trimmed import ballasted_world, blocks_of
+from wakewise_paper.wash_reduction.routes import gentle_route, station_route
 
 COURSES = ("station", "round")
 SERIES = "series.npz"

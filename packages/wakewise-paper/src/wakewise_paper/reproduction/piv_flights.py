@@ -21,7 +21,7 @@ from wakewise.scene.targets import Target
 from wakewise.vision.piv.images import CameraSettings, photograph_pair
 from wakewise.vision.piv.processing import displacements
 from wakewise.vision.piv.tracers import Sheet, TracerSettings
-from wakewise_paper.wash_reduction.courses import SETTLE_S
+from wakewise_paper.wash_reduction.routes import SETTLE_S
 
 NEAR_M, CLEAR_M = 0.05, 0.004
 """Vectors count within this of the target's surface, and no nearer, where a window is half full of coral."""

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from wakewise.core.arrays import Array
-from wakewise.experiments.campaigns.glance import by_target
 from wakewise.experiments.campaigns.statistics import (
     WORST,
     Interval,
@@ -22,9 +21,10 @@ from wakewise.experiments.campaigns.statistics import (
     wilson,
 )
 from wakewise.experiments.campaigns.statistics.intervals import RESAMPLES, ratio_of_sums
+from wakewise.experiments.campaigns.summary import by_target
 from wakewise.experiments.campaigns.task import Outcome
-from wakewise_paper.reproduction.blocks import NOWHERE, Plan
 from wakewise_paper.reproduction.claim import ORDER, Claim
+from wakewise_paper.reproduction.table_trials import NOWHERE, Plan
 
 Row = dict[str, Any]
 Known = tuple[str, int]

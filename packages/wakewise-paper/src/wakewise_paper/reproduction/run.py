@@ -20,11 +20,11 @@ from wakewise.core.jit.precompile import warm
 from wakewise.experiments.campaigns import Processes
 from wakewise.experiments.campaigns import run as run_campaign
 from wakewise.experiments.campaigns.store import Store, open_store
-from wakewise_paper.reproduction.blocks import NOWHERE, TABLE, Block, Wish, blocks_of
 from wakewise_paper.reproduction.claim import TABLES
 from wakewise_paper.reproduction.comparison import comparison_claims
-from wakewise_paper.reproduction.quoted import CLAIMS
+from wakewise_paper.reproduction.published_tables import CLAIMS
 from wakewise_paper.reproduction.rows import Made, Row, Trials, once_rows, table_rows
+from wakewise_paper.reproduction.table_trials import NOWHERE, TABLE, Block, Wish, blocks_of
 
 MOST_TRIALS = 1000
 TRIAL_LIMIT_S = 3600.0

@@ -2,8 +2,8 @@
 
 Scenarios are files (`scenarios/`), stratified over trim and the side of the current (`strata.py`); the library's
 worlds count as scenarios, too. Seed k of a scenario is one world for all methods, so flights are compared in pairs;
-the headline was chosen beforehand (`headline.py`, docs/decisions/0033). The paper's own world is circular and says so
-(`paper.py`). What no controller could pass by sharing thrusts out is worked out where that is wished (`bound.py`).
+the headline was chosen beforehand (`headline.py`, docs/research-log/0033). The paper's own world is circular and says
+so (`paper.py`). What no controller could pass by sharing thrusts out is worked out where that is wished (`bound.py`).
 
 Flights are kept (`flight_store`): a run that was stopped goes on, and a second one only flies what is new.
 """
@@ -18,28 +18,28 @@ import numpy as np
 
 from wakewise.experiments.campaigns import Processes
 from wakewise.experiments.trials.timing import BenchOptions
-from wakewise_paper import side_by_side
+from wakewise_paper import flight_batches
+from wakewise_paper.flight_batches import Failure, Key
 from wakewise_paper.flight_store import FlightStore, store_folder
-from wakewise_paper.side_by_side import Failure, Key
-from wakewise_paper.wash_reduction.bound import BoundTrial
-from wakewise_paper.wash_reduction.bound_figures import bound_figures
+from wakewise_paper.wash_reduction.ablations import LEVERS, NONE, alone, left_out, wished_levers
+from wakewise_paper.wash_reduction.energy_optimum import BoundTrial
+from wakewise_paper.wash_reduction.energy_optimum_tables import bound_figures
 from wakewise_paper.wash_reduction.figures import SPEED, Row, log_reduction_pct, means, pairs_of, reduction_pct
 from wakewise_paper.wash_reduction.flight import FIGURES
-from wakewise_paper.wash_reduction.headline import PLACE, RIVALS, WRONG, headline, tag_of
-from wakewise_paper.wash_reduction.levers import LEVERS, NONE, alone, left_out, wished_levers
-from wakewise_paper.wash_reduction.library import names_of, title_of, trim_of
 from wakewise_paper.wash_reduction.paper import FIGURES as PAPER_FIGURES
 from wakewise_paper.wash_reduction.paper import METHODS as PAPER_METHODS
 from wakewise_paper.wash_reduction.paper import SEEDS as PAPER_SEEDS
 from wakewise_paper.wash_reduction.paper import PaperTrial
 from wakewise_paper.wash_reduction.plan import METHODS, flight_s, flown_methods, planned_trials
+from wakewise_paper.wash_reduction.scenario_files import names_of, title_of, trim_of
+from wakewise_paper.wash_reduction.summary_table import PLACE, RIVALS, WRONG, headline, tag_of
 
 MODEL_FIGURES = ("rmse_mm", "completeness_pct", "success_pct")
 PAPER = "paper"
 
 _engine = Processes
 _FLY, _FLY_PAPER = "wakewise_paper.wash_reduction.flight:fly_trial", "wakewise_paper.wash_reduction.paper:fly_paper"
-_BOUND = "wakewise_paper.wash_reduction.bound:fly_bound"
+_BOUND = "wakewise_paper.wash_reduction.energy_optimum:fly_bound"
 
 
 def run(options: BenchOptions) -> dict[str, Any]:
@@ -62,18 +62,18 @@ def run(options: BenchOptions) -> dict[str, Any]:
     expected = sum(flight_s(trial) for trial in trials.values() if store.load(trial, _FLY) is None)
     words = f"{len(trials)} flights, some {expected / 60.0 / options.workers:.0f} min of {options.workers} free cores"
     options.progress(0, max(len(trials), 1), words)
-    rows, failures, kept = side_by_side.fly_all(trials, _FLY, store, options, _engine)
+    rows, failures, kept = flight_batches.fly_all(trials, _FLY, store, options, _engine)
     papers: dict[Key, Row] = {}
     lost: list[Failure] = []
     known = 0
     if with_paper:
-        papers, lost, known = side_by_side.fly_all(
+        papers, lost, known = flight_batches.fly_all(
             paper_trials(methods, options.seeds), _FLY_PAPER, store, options, _engine
         )
     bounds: dict[Key, Row] = {}
     unbound: list[Failure] = []
     if options.bound:
-        bounds, unbound, _ = side_by_side.fly_all(
+        bounds, unbound, _ = flight_batches.fly_all(
             bound_trials(scenarios, options.bound), _BOUND, store, options, _engine
         )
     failed = {(failure.name, (failure.flow, failure.seed)) for failure in failures}

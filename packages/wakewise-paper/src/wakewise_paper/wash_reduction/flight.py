@@ -18,7 +18,9 @@ from wakewise.robot.vehicles import Vehicle
 from wakewise.scene.missions import SETTLING, Route
 from wakewise.simulation.tank.tether import DRAG_COEFFICIENT
 from wakewise.vision.evaluation import attitude_rmse_deg, flight_figures
-from wakewise_paper.wash_reduction.courses import (
+from wakewise_paper.wash_reduction.ballasted_world import ballasted_world, blocks_of
+from wakewise_paper.wash_reduction.paper import WATER_EVERY_S
+from wakewise_paper.wash_reduction.routes import (
     BRAKE_AT_M,
     CLOSE_M,
     HOVER_DEG,
@@ -30,9 +32,7 @@ from wakewise_paper.wash_reduction.courses import (
     station_route,
     transect_route,
 )
-from wakewise_paper.wash_reduction.library import WORLD, Drawn, drawn, fields_of, load_scenario_file
-from wakewise_paper.wash_reduction.paper import WATER_EVERY_S
-from wakewise_paper.wash_reduction.trimmed import ballasted_world, blocks_of
+from wakewise_paper.wash_reduction.scenario_files import WORLD, Drawn, drawn, fields_of, load_scenario_file
 from wakewise_paper.world_study.flight import WorldTrial, short_flight
 
 TRIM = "+trim"

@@ -1,4 +1,6 @@
-"""The paper's own world, circular: the planner's model is the water (`wakewise.operation.worlds.wake_world`)."""
+"""The paper's own world, circular: the planner's model is the water
+(`wakewise.operation.worlds.quasi_steady_world`).
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,7 @@ from wakewise.scene.missions import SETTLING
 from wakewise.scene.targets import Region, find_target, sample_region
 from wakewise.vision.evaluation import flight_figures
 from wakewise.wake import WakeSettings, WakeView, disturbance, wake_model
-from wakewise_paper.wash_reduction.courses import STANDOFF_M, gentle_route
+from wakewise_paper.wash_reduction.routes import STANDOFF_M, gentle_route
 
 WATER_EVERY_S = 0.25
 """How often the water is asked about in the flights of the benches."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from wakewise.control import MAKERS
 from wakewise.core.errors import InputError
 from wakewise.operation.worlds.library import load_world
-from wakewise_paper.side_by_side import Key
+from wakewise_paper.flight_batches import Key
+from wakewise_paper.wash_reduction.ablations import LEVER_SEEDS, Settings, lever_settings
 from wakewise_paper.wash_reduction.flight import TRIM, Trial
-from wakewise_paper.wash_reduction.headline import WRONG
-from wakewise_paper.wash_reduction.levers import LEVER_SEEDS, Settings, lever_settings
-from wakewise_paper.wash_reduction.library import WORLD
+from wakewise_paper.wash_reduction.scenario_files import WORLD
+from wakewise_paper.wash_reduction.summary_table import WRONG
 
 METHODS = (
     "dp",

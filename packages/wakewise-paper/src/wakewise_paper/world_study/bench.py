@@ -6,9 +6,9 @@ compared in pairs; intervals are 95 % of a bootstrap over seeds. Flights and sca
 on, and a second one only flies what is new.
 
 Emergent in these figures are: how jets decay, merge, meet walls and drift, within the laws that the tank is given
-(`wakewise.simulation.tank.limits` says how well each is met); what the bed lets go; how the target bends; what the
-camera makes of it. Typed in are those laws' constants, each with a source, and the worlds' numbers (`wakewise world
-show NAME`).
+(`wakewise.simulation.tank.validation_limits` says how well each is met); what the bed lets go; how the target bends;
+what the camera makes of it. Typed in are those laws' constants, each with a source, and the worlds' numbers (`wakewise
+world show NAME`).
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from wakewise.experiments.campaigns import Processes
 from wakewise.experiments.trials.timing import BenchOptions
 from wakewise.operation import load_scenario
 from wakewise.operation.worlds.library import load_world, world_names
-from wakewise_paper import side_by_side
+from wakewise_paper import flight_batches
+from wakewise_paper.flight_batches import Failure, Key, Row
 from wakewise_paper.flight_store import PHOTOGRAPHS, FlightStore, store_folder
-from wakewise_paper.side_by_side import Failure, Key, Row
 from wakewise_paper.world_study.figures import method_figures, ratios
 from wakewise_paper.world_study.flight import FLIGHT_FIGURES, MODEL_FIGURES, WorldTrial
-from wakewise_paper.world_study.judge import JUDGED, judge_table, judge_trials
+from wakewise_paper.world_study.lattice_comparison import JUDGED, judge_table, judge_trials
 
 METHODS = ("dp", "manual", "ardusub", "unaware", "smooth", "bow-rule", "instant", "wake-aware")
 """The first is what the others are held against."""
@@ -39,7 +39,7 @@ TYPED_IN = "constants of the laws and numbers of the worlds, each with its sourc
 
 _engine = Processes
 _FLY, _SCAN = (f"wakewise_paper.world_study.flight:{name}_trial" for name in ("fly", "scan"))
-_JUDGE = "wakewise_paper.world_study.judge:judged_trial"
+_JUDGE = "wakewise_paper.world_study.lattice_comparison:judged_trial"
 
 
 def run(options: BenchOptions) -> dict[str, Any]:
@@ -56,11 +56,11 @@ def run(options: BenchOptions) -> dict[str, Any]:
     flights = planned(worlds, methods, options.seeds)
     scans = planned(worlds, methods, options.models)
     folder = options.store or store_folder("worlds")
-    flown, lost, kept = side_by_side.fly_all(flights, _FLY, FlightStore(folder, options.fresh), options, _engine)
-    models, failed, had = side_by_side.fly_all(
+    flown, lost, kept = flight_batches.fly_all(flights, _FLY, FlightStore(folder, options.fresh), options, _engine)
+    models, failed, had = flight_batches.fly_all(
         scans, _SCAN, FlightStore(folder, options.fresh, PHOTOGRAPHS), options, _engine
     )
-    judged, unjudged, seen = side_by_side.fly_all(
+    judged, unjudged, seen = flight_batches.fly_all(
         judge_trials(options.judge, tuple(name for name in JUDGED if name in worlds)),
         _JUDGE,
         FlightStore(folder, options.fresh),

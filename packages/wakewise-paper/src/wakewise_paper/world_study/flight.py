@@ -16,8 +16,8 @@ from wakewise.operation import Parts, Scenario, fly
 from wakewise.operation.loop import Step
 from wakewise.scene.missions import SETTLING
 from wakewise.vision.evaluation import flight_figures
-from wakewise_paper.wash_reduction.courses import gentle_route
 from wakewise_paper.wash_reduction.paper import WATER_EVERY_S
+from wakewise_paper.wash_reduction.routes import gentle_route
 
 FLIGHT_FIGURES = (
     "target_speed_mean_m_s",

@@ -15,12 +15,12 @@ from wakewise.experiments.campaigns.task import Outcome, Task
 from wakewise.ui.reports.methods_compared import methods_compared, profiles
 from wakewise_paper.reports.reproduction import plots, write_pages, write_results
 from wakewise_paper.reports.reproduction.results import standalone_svg
-from wakewise_paper.reports.reproduction.words import machine, reproduced
-from wakewise_paper.reproduction.blocks import TABLE, Wish, blocks_of
+from wakewise_paper.reports.reproduction.sentences import machine, reproduced
+from wakewise_paper.reproduction.acceptance import JUDGED
 from wakewise_paper.reproduction.flights import SERIES
-from wakewise_paper.reproduction.judged import JUDGED
 from wakewise_paper.reproduction.rows import Made
 from wakewise_paper.reproduction.run import _figures, _Growing
+from wakewise_paper.reproduction.table_trials import TABLE, Wish, blocks_of
 
 
 def table(name, figures, trials=4, worlds=None):

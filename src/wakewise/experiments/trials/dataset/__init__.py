@@ -1,9 +1,10 @@
 """A data set of trials: what a crew could know and what is true, apart, with metadata, check sums and a data sheet.
 
-Start reading in `build.py` (a folder of trials becomes a data set, and can go on where it was cut off). `choice.py`
-finds the trials, `settings.py` reads what they were set to, `part.py` makes one trial's share, `columns.py` says which
-column is known and which is truth and what each means. `words.py` takes licence, creators and name, `metadata.py`
-writes Croissant, `sheet.py` the data sheet from `sheet.md`; `checking.py` says whether a data set is still what it was.
+Start reading in `build.py` (a folder of trials becomes a data set, and can go on where it was cut off).
+`trial_sources.py` finds the trials, `settings.py` reads what they were set to, `part.py` makes one trial's share,
+`columns.py` says which column is known and which is truth and what each means. `statement.py` takes licence, creators
+and name, `metadata.py` writes Croissant, `sheet.py` the data sheet from `sheet.md`; `checking.py` says whether a data
+set is still what it was.
 """
 
 from typing import TYPE_CHECKING
@@ -13,7 +14,7 @@ from wakewise.core.lazy_imports import lazy_door
 if TYPE_CHECKING:
     from wakewise.experiments.trials.dataset.build import Built, build_dataset
     from wakewise.experiments.trials.dataset.checking import Checked, check_dataset
-    from wakewise.experiments.trials.dataset.words import read_words
+    from wakewise.experiments.trials.dataset.statement import read_words
 
 __all__ = ["Built", "Checked", "build_dataset", "check_dataset", "read_words"]
 

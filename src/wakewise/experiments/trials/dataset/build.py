@@ -17,11 +17,11 @@ from wakewise.core.files import whole_file, write_json, write_text
 from wakewise.core.interfaces import no_progress
 from wakewise.core.run_lock import LOCK, alone
 from wakewise.experiments.exports.checksums import SUMS, sha256_of, sums_text
-from wakewise.experiments.trials.dataset.choice import Source, trials_of
 from wakewise.experiments.trials.dataset.metadata import FIGURES, METADATA, SHEET, TRIALS, columns_of, metadata
 from wakewise.experiments.trials.dataset.part import KNOWN, NOTE, TRUTH, Part, part_of
 from wakewise.experiments.trials.dataset.sheet import data_sheet, description_of
-from wakewise.experiments.trials.dataset.words import Words
+from wakewise.experiments.trials.dataset.statement import Words
+from wakewise.experiments.trials.dataset.trial_sources import Source, trials_of
 
 _PARTS = ".parts"
 

@@ -11,7 +11,7 @@ from wakewise.experiments.exports.checksums import SUMS, sha256_of
 from wakewise.experiments.exports.croissant import About, Column, FileObject, FileSet, Kind, Table, croissant
 from wakewise.experiments.trials.dataset.columns import meaning
 from wakewise.experiments.trials.dataset.part import KNOWN, TRUTH, Part
-from wakewise.experiments.trials.dataset.words import Words
+from wakewise.experiments.trials.dataset.statement import Words
 
 METADATA, SHEET, TRIALS, FIGURES = "croissant.json", "DATASHEET.md", "trials.parquet", "truth/figures.parquet"
 PARQUET = "application/x-parquet"

@@ -13,9 +13,9 @@ import polars as pl
 from wakewise.core.errors import InputError
 from wakewise.core.files import whole_folder
 from wakewise.experiments.exports.checksums import copied, sha256_of
-from wakewise.experiments.trials.dataset.choice import METRICS, SCENARIO, STEPS, Source
 from wakewise.experiments.trials.dataset.columns import known_and_true
 from wakewise.experiments.trials.dataset.settings import TrialSettings, figures_of, settings_of
+from wakewise.experiments.trials.dataset.trial_sources import METRICS, SCENARIO, STEPS, Source
 from wakewise.scene.targets import read_mesh
 
 KNOWN, TRUTH = "known", "truth"

@@ -14,7 +14,7 @@ import yaml
 
 from wakewise.core.errors import InputError
 from wakewise.core.safe_yaml import YamlError, read_yaml
-from wakewise.experiments.trials.dataset.choice import Source
+from wakewise.experiments.trials.dataset.trial_sources import Source
 
 
 @dataclass(frozen=True, kw_only=True)

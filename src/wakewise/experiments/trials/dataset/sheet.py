@@ -13,7 +13,7 @@ from importlib.resources import files
 from typing import Any
 
 from wakewise.experiments.trials.dataset.part import Part
-from wakewise.experiments.trials.dataset.words import QUESTIONS, Words
+from wakewise.experiments.trials.dataset.statement import QUESTIONS, Words
 
 UNSAID = "*For its makers to say.*"
 

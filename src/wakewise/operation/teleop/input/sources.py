@@ -12,7 +12,7 @@ from wakewise.operation.teleop.input.script import load_script
 
 def _record(path: Path) -> ControlSource:
     """The record of a flight; tables are imported where one is read, since every scenario knows of this file."""
-    from wakewise.operation.teleop.input.trace import read_trace
+    from wakewise.operation.teleop.input.control_log import read_trace
 
     return read_trace(path)
 

@@ -13,12 +13,12 @@ from matplotlib.figure import Figure
 from wakewise.core.arrays import IntArray
 from wakewise.core.errors import InputError
 from wakewise.core.files import write_text
-from wakewise.ui.reports.ink import TEAL, dress, new_figure
 from wakewise.ui.reports.page import chip, fold, missing, plot, scene_box, section, tile, whole_page
 from wakewise.ui.reports.photo_model.rows import facts_list, table_row
 from wakewise.ui.reports.photo_model.scale import scale_section, scale_tile
 from wakewise.ui.reports.photo_model.scene import model_scene
-from wakewise.ui.reports.words import NONE, fixed, number, shown
+from wakewise.ui.reports.svg_style import TEAL, dress, new_figure
+from wakewise.ui.reports.text import NONE, fixed, number, shown
 from wakewise.vision.reconstruction.photo_facts import ModelFacts, model_facts
 
 PARTS = (

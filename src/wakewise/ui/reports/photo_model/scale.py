@@ -9,7 +9,7 @@ import numpy as np
 
 from wakewise.ui.reports.page import fold, section, tile
 from wakewise.ui.reports.photo_model.rows import facts_list, table_row
-from wakewise.ui.reports.words import fixed, number, shown
+from wakewise.ui.reports.text import fixed, number, shown
 
 _HOW = (
     "<p>Lay two or more bars between coded targets into the scene (<code>--bar A,B,LENGTH</code>), give the places of "

@@ -15,7 +15,7 @@ from wakewise.core.arrays import Array
 from wakewise.core.geometry import quat_from_matrix
 from wakewise.ui.reports.scene3d import CAMERA_RGB, MAX_POINTS, lightened, unheard
 from wakewise.ui.reports.trial import Surface
-from wakewise.vision.pictures import read_picture
+from wakewise.vision.image_decoding import read_picture
 from wakewise.vision.reconstruction import read_cloud
 from wakewise.vision.reconstruction.photo_facts import ModelFacts, PhotoFact
 from wakewise.vision.texturing.textured import read_textured

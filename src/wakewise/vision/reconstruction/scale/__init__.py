@@ -2,7 +2,8 @@
 
 Start reading in `stage.py` (a sparse model in, the same model in metres out). `bars.py` is what a user says, `marks.py`
 finds targets in photographs, `places.py` puts them into the model, `fitting.py` weighs the bars and says where they
-disagree. `fixes.py` reads what GPS receivers and depth gauges tell of the cameras, `by_fixes.py` asks what it is worth.
+disagree. `position_fixes.py` reads what GPS receivers and depth gauges tell of the cameras, `scale_from_positions.py`
+asks what it is worth.
 """
 
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ from wakewise.core.lazy_imports import lazy_door
 
 if TYPE_CHECKING:
     from wakewise.vision.reconstruction.scale.bars import Bar, Bars, parse_bar, read_bars
-    from wakewise.vision.reconstruction.scale.fixes import Fixes, exif_fixes, read_fixes
+    from wakewise.vision.reconstruction.scale.position_fixes import Fixes, exif_fixes, read_fixes
 
 __all__ = ["Bar", "Bars", "Fixes", "exif_fixes", "parse_bar", "read_bars", "read_fixes"]
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wakewise.core.arrays import Array, freeze
-from wakewise.vision.reconstruction.views import View
+from wakewise.vision.reconstruction.registered_photos import View
 
 MOST_ERROR_PX = 3.0
 """Farther from where the others put it, a photograph shows something else: a misread target, or a moved one."""

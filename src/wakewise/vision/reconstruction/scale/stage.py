@@ -19,13 +19,13 @@ from wakewise.vision.evaluation import umeyama
 from wakewise.vision.reconstruction.calibration import Board
 from wakewise.vision.reconstruction.colmap import pycolmap
 from wakewise.vision.reconstruction.photos import PhotoStore
+from wakewise.vision.reconstruction.registered_photos import View, read_views
 from wakewise.vision.reconstruction.scale.bars import Bars
-from wakewise.vision.reconstruction.scale.by_fixes import figures, place_by_fixes, why_unused
 from wakewise.vision.reconstruction.scale.fitting import Measured, fit_scale
-from wakewise.vision.reconstruction.scale.fixes import Fixes
 from wakewise.vision.reconstruction.scale.marks import Sightings, find_board, find_marks
 from wakewise.vision.reconstruction.scale.places import Place, place
-from wakewise.vision.reconstruction.views import View, read_views
+from wakewise.vision.reconstruction.scale.position_fixes import Fixes
+from wakewise.vision.reconstruction.scale.scale_from_positions import figures, place_by_fixes, why_unused
 
 MOST_SIDE_PCT = 2.0
 """A printed square's side may differ from what was meant by this much, and three times what is unsure about it."""

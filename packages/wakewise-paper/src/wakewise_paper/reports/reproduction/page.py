@@ -11,13 +11,13 @@ from wakewise.core.arrays import Array
 from wakewise.core.files import write_text
 from wakewise.ui.reports.methods_compared import methods_compared, price, profiles, won
 from wakewise.ui.reports.page import fold, missing, plot, prose, section, whole_page
+from wakewise.ui.reports.text import NONE, duration, number, shown
 from wakewise.ui.reports.trial_pictures import worst_panels
-from wakewise.ui.reports.words import NONE, duration, number, shown
-from wakewise_paper.reports.reproduction import plots, words
+from wakewise_paper.reports.reproduction import plots, sentences
+from wakewise_paper.reproduction.acceptance import CIRCULAR, JUDGED, glances, tally
 from wakewise_paper.reproduction.flights import read_series
-from wakewise_paper.reproduction.judged import CIRCULAR, JUDGED, glances, tally
-from wakewise_paper.reproduction.quoted import UNKNOWN
-from wakewise_paper.reproduction.waters import water
+from wakewise_paper.reproduction.published_tables import UNKNOWN
+from wakewise_paper.reproduction.worlds import water
 
 PAGE = "reproduce.html"
 _TEMPORAL = ("unaware", "wake-aware")
@@ -60,7 +60,7 @@ def _head(tables: Mapping[str, Mapping[str, Any]]) -> str:
     trials, failed = (sum(table[key] or 0 for table in tables.values()) for key in ("made", "failed"))
     took = duration(sum(table["trial_s"] or 0.0 for table in tables.values()))
     title = (
-        f"{counts['met']} of {counts['quoted']} figures of the paper met{words.where(counts)}; "
+        f"{counts['met']} of {counts['quoted']} figures of the paper met{sentences.where(counts)}; "
         f"{counts['surely'] or 'none'} surely"
         if counts["quoted"]
         else "No figure of the paper is quoted for this"
@@ -114,7 +114,7 @@ def _table(table: Mapping[str, Any], store: Path) -> str:
         why = "; ".join(table["why"].values()) or "no trial of it gave a figure"
         return section(name, name.capitalize(), escape(table["title"]), missing(f"the table of {name}", why))
     lead = (
-        f"{escape(_upper(table['title']))}. {escape(_upper(words.met_of({name: rows})))}. "
+        f"{escape(_upper(table['title']))}. {escape(_upper(sentences.met_of({name: rows})))}. "
         f"{shown(table['made'])} {'trial' if table['made'] == 1 else 'trials'}, {shown(table['failed'])} failed; "
         "configuration "
         f"{table['config_hash']}."
@@ -193,12 +193,12 @@ def _matrix(rows: Sequence[Mapping[str, Any]]) -> str:
         first = next(iter(own.values()))
         cells = "".join(
             f'<td class="num" title="{escape(own[flow]["why"].get("ours", own[flow]["how"]), quote=True)}">'
-            f'<span class="{_mark(own[flow])}">{escape(words.value(own[flow]["ours"]))}</span></td>'
+            f'<span class="{_mark(own[flow])}">{escape(sentences.value(own[flow]["ours"]))}</span></td>'
             for flow in flows
         )
         body.append(
             f"<tr><td>{escape(method)}</td><td>{escape(title)}</td>"
-            f'<td class="num">{escape(words.quoted(first))}</td>{cells}'
+            f'<td class="num">{escape(sentences.quoted(first))}</td>{cells}'
             f'<td class="unit">{escape(first["unit"])}</td></tr>'
         )
     return (
@@ -216,7 +216,7 @@ def _mark(row: Mapping[str, Any]) -> str:
 
 
 def _row(row: Mapping[str, Any], several: bool) -> str:
-    said = row.get("our_order") or words.ours(row)
+    said = row.get("our_order") or sentences.ours(row)
     more = [row["how"], f"paper: {row['paper_says']}"]
     if row.get("p_holm") is not None:
         more.append(f"paired t-test p {_two(row['p_t'])}, Holm {_two(row['p_holm'])}")
@@ -231,15 +231,15 @@ def _row(row: Mapping[str, Any], several: bool) -> str:
     figures = (  # an order is words, which would widen every column of numbers
         f'<td colspan="4">{escape(said)}; paper: {escape(row["paper_says"])}</td>'
         if row["reading"] == "order"
-        else f'<td class="num" title="{escape(row["paper_says"], quote=True)}">{escape(words.quoted(row))}</td>'
-        f'<td class="num">{escape(said)}</td><td class="num">{escape(words.interval(row))}</td>'
+        else f'<td class="num" title="{escape(row["paper_says"], quote=True)}">{escape(sentences.quoted(row))}</td>'
+        f'<td class="num">{escape(said)}</td><td class="num">{escape(sentences.interval(row))}</td>'
         f'<td class="unit">{escape("" if row["reading"] == "less_pct" else row["unit"])}</td>'
     )
     return (
         f'<tr title="{title}"><td>{_unbroken(row["method"])}</td><td>{escape(row["figure"])}</td>'
         + (f"<td>{escape(row['target'] or '')}</td>" if several else "")
         + f'{figures}<td class="num">{shown(row["n"])}</td>'
-        f'<td><span class="{_mark(row)}">{escape(words.verdict(row))}</span></td></tr>'
+        f'<td><span class="{_mark(row)}">{escape(sentences.verdict(row))}</span></td></tr>'
     )
 
 
@@ -266,7 +266,7 @@ def _temporal(places: Sequence[Mapping[str, Any]], store: Path) -> str:
 
 
 def _limits(tables: Mapping[str, Mapping[str, Any]]) -> str:
-    could, could_not, unknown = words.reproduced(tables)
+    could, could_not, unknown = sentences.reproduced(tables)
 
     def listed(lines: Sequence[str]) -> str:
         return "<ul>" + "".join(f"<li>{prose(line.replace('**', ''))}</li>" for line in lines) + "</ul>"

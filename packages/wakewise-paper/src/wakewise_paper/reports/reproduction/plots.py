@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from wakewise.core.arrays import Array
 from wakewise.ui.reports.figures import NARROW_IN, WIDTH_IN
-from wakewise.ui.reports.ink import CORAL, INK, LINE, MUTED, SAND, SLATE, TEAL, VIOLET, dress, key, new_figure
 from wakewise.ui.reports.methods_compared import colour_of
+from wakewise.ui.reports.svg_style import CORAL, INK, LINE, MUTED, SAND, SLATE, TEAL, VIOLET, dress, key, new_figure
 
 Row = Mapping[str, Any]
 

@@ -17,19 +17,19 @@ from matplotlib.figure import Figure
 
 from wakewise.core.arrays import Array
 from wakewise.core.files import whole_file, write_text
-from wakewise.experiments.campaigns.glance import worst_trials
 from wakewise.experiments.campaigns.statistics import smallest_effect
-from wakewise.ui.reports.ink import CARD, CORAL, INK, LINE, MUTED, SAND, SLATE, TEAL, VIOLET
+from wakewise.experiments.campaigns.summary import worst_trials
 from wakewise.ui.reports.methods_compared import methods_compared, price, profiles, won
+from wakewise.ui.reports.svg_style import CARD, CORAL, INK, LINE, MUTED, SAND, SLATE, TEAL, VIOLET
+from wakewise.ui.reports.text import duration, number, shown
 from wakewise.ui.reports.trial_pictures import sheet
-from wakewise.ui.reports.words import duration, number, shown
-from wakewise_paper.reports.reproduction import plots, words
+from wakewise_paper.reports.reproduction import plots, sentences
+from wakewise_paper.reproduction.acceptance import CIRCULAR, JUDGED, glances
 from wakewise_paper.reproduction.comparison import COLUMNS, command_of
 from wakewise_paper.reproduction.comparison import tables as compared_tables
 from wakewise_paper.reproduction.flights import read_series
-from wakewise_paper.reproduction.judged import CIRCULAR, JUDGED, glances
-from wakewise_paper.reproduction.quoted import UNKNOWN
-from wakewise_paper.reproduction.waters import water
+from wakewise_paper.reproduction.published_tables import UNKNOWN
+from wakewise_paper.reproduction.worlds import water
 
 INDEX, REPRODUCED = "README.md", "reproduced.md"
 _LIGHT = {
@@ -84,7 +84,7 @@ def _write_trials(table: Mapping[str, Any], path: Path) -> None:
 
 
 def _index(tables: Mapping[str, Mapping[str, Any]], note: str) -> str:
-    met = words.met_of({name: table["rows"] for name, table in tables.items()})
+    met = sentences.met_of({name: table["rows"] for name, table in tables.items()})
     lines = [
         "# The paper's tables beside ours",
         "",
@@ -97,7 +97,7 @@ def _index(tables: Mapping[str, Mapping[str, Any]], note: str) -> str:
     for name, table in tables.items():
         seeds, config = _seeds(table["seeds"]), f"`{table['config_hash']}`" if table["made"] else ""
         met = (
-            words.met_of({name: table["rows"]})
+            sentences.met_of({name: table["rows"]})
             if table["rows"]
             else "; ".join(table["why"].values()) or "nothing was made"
         )
@@ -132,7 +132,7 @@ def _index(tables: Mapping[str, Mapping[str, Any]], note: str) -> str:
         "",
         "| | |",
         "|---|---|",
-        *(f"| {name} | {value} |" for name, value in words.machine().items()),
+        *(f"| {name} | {value} |" for name, value in sentences.machine().items()),
         f"| time of all trials | {duration(sum(table['trial_s'] or 0.0 for table in tables.values()))} |",
     ]
     return "\n".join(lines) + "\n"
@@ -158,7 +158,7 @@ def _page(table: Mapping[str, Any], store: Path, out: Path) -> str:
     if not rows:
         return "\n".join([*lines, f"Not made: {'; '.join(table['why'].values()) or 'no trial gave a figure'}.", ""])
     lines += [
-        f"{words.met_of({name: rows}).capitalize()}. {shown(table['made'])} "
+        f"{sentences.met_of({name: rows}).capitalize()}. {shown(table['made'])} "
         f"{'trial' if table['made'] == 1 else 'trials'}, {shown(table['failed'])} failed, "
         f"seeds {_seeds(table['seeds'])}, configuration `{table['config_hash']}`."
         + (f" Every trial: [{name}.csv]({name}.csv)." if any(place["figures"] for place in table["places"]) else ""),
@@ -256,14 +256,15 @@ def _table(rows: Any) -> list[str]:
         "|---|---|---|--:|--:|--:|--:|---|--:|--:|",
     ]
     for row in rows:
-        ours = row.get("our_order") or words.ours(row)
-        paper = row["paper_says"] if row["paper"] is None and row["asked"] is not None else words.quoted(row)
+        ours = row.get("our_order") or sentences.ours(row)
+        paper = row["paper_says"] if row["paper"] is None and row["asked"] is not None else sentences.quoted(row)
         paper = row["paper_says"] if row["reading"] == "order" else paper
         p = "" if row.get("p_holm") is None else f"{row['p_holm']:.2g}"
         d = "" if row.get("d_z") is None else number(row["d_z"])
-        mark = f"**{words.verdict(row)}**" if row["met"] else words.verdict(row)
+        mark = f"**{sentences.verdict(row)}**" if row["met"] else sentences.verdict(row)
         lines.append(
-            f"| {row['method']} | {row['figure']} | {row['target'] or ''} | {paper} | {ours} | {words.interval(row)} | "
+            f"| {row['method']} | {row['figure']} | {row['target'] or ''} | {paper} | {ours} | "
+            f"{sentences.interval(row)} | "
             f"{shown(row['n'])} | {mark} | {p} | {d} |"
         )
     return [*lines, ""]
@@ -277,9 +278,9 @@ def _matrix(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         own = {row["target"]: row for row in rows if (row["figure"], row["method"]) == (title, method)}
         first = next(iter(own.values()))
         unit = f", {first['unit']}" if first["unit"] else ""
-        told = [words.value(own[flow]["ours"]) for flow in flows]
+        told = [sentences.value(own[flow]["ours"]) for flow in flows]
         cells = [f"**{t}**" if own[flow]["met"] else t for flow, t in zip(flows, told, strict=True)]
-        lines.append(f"| {method} | {title}{unit} | {words.quoted(first)} | {' | '.join(cells)} |")
+        lines.append(f"| {method} | {title}{unit} | {sentences.quoted(first)} | {' | '.join(cells)} |")
     return [*lines, ""]
 
 
@@ -300,14 +301,14 @@ def _cells(rows: Sequence[Mapping[str, Any]]) -> list[str]:
                 cells = [found.get((world, name, key)) for key, *_ in COLUMNS]
                 if all(cell is None for cell in cells):
                     continue
-                told = " | ".join("–" if cell is None else words.value(cell["ours"]) for cell in cells)
+                told = " | ".join("–" if cell is None else sentences.value(cell["ours"]) for cell in cells)
                 lines.append(f"| {name} | {told} | `{command_of(name)}` |")
             lines.append("")
     return [*lines, "The paper's own cells are not quoted here; these are flown in their place.", ""]
 
 
 def _reproduced(tables: Mapping[str, Mapping[str, Any]]) -> str:
-    could, could_not, unknown = words.reproduced(tables)
+    could, could_not, unknown = sentences.reproduced(tables)
     lines = [
         "# What we could and could not reproduce, and why",
         "",
@@ -352,7 +353,7 @@ def _reasons(tables: Mapping[str, Mapping[str, Any]]) -> list[str]:
     if tables.get("station", {}).get("worlds"):
         said.append(
             "*station, energy*: least thrusts spend next to the least power that makes the same wrenches "
-            "(docs/decisions/0080), and shares that spare the water spend more."
+            "(docs/research-log/0080), and shares that spare the water spend more."
         )
     said += [
         f"*flow, {row['world']}*: PIV reads {number(1e3 * row['ours'])} mm/s where there is no wash at all, and sees "

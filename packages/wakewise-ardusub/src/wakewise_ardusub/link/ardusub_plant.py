@@ -1,0 +1,77 @@
+"""The vehicle in the sea as a `Plant`: thrusts go to the warden, what was measured meanwhile comes back.
+
+A step holds its thrusts by waiting until shortly before the flight's clock has come to the step's end: the estimator
+takes in what it returns meanwhile, so that the next thrusts are decided on time, by what is nearly as fresh as can be.
+Whether thrusts go out is the warden's to say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+from wakewise.core.arrays import Array
+from wakewise.core.interfaces import Measurement, Witness
+from wakewise_ardusub.link.output_gate import Warden
+
+EARLY = 0.1
+"""Share of a step by which measurements are handed over before its end: 10 ms at 10 Hz, where a filter takes 4."""
+
+
+class FlightClock(Protocol):
+    """When moments of a flight are by the computer's clock, which is also the warden's."""
+
+    def due_s(self, time_s: float) -> float:
+        """The computer's time at which `time_s` of the flight has come."""
+        ...
+
+
+@dataclass(kw_only=True, eq=False)
+class SeaPlant:
+    """The vehicle of a warden; implements `wakewise.core.interfaces.Plant`.
+
+    Parameters
+    ----------
+    warden : Warden
+    clock : FlightClock
+    wait : callable
+        Waits so many seconds, or less where there is nothing to wait for any more.
+    entry : callable
+        In which engagement the controller decided what it hands over; None: in none, and nothing is sent.
+    """
+
+    warden: Warden
+    clock: FlightClock
+    wait: Callable[[float], object]
+    entry: Callable[[], int | None]
+    _time_s: float = 0.0
+
+    def step(self, thrusts_N: Array, dt_s: float) -> tuple[Measurement, ...]:
+        """Send thrusts, shape (n,), if they may be, and return what was measured until they are nearly due again."""
+        entry = self.entry()
+        if entry is not None:
+            self.warden.command(thrusts_N, entry)
+        self._time_s += dt_s
+        left_s = self.clock.due_s(self._time_s) - EARLY * dt_s - self.warden.clock()
+        if left_s > 0.0:
+            self.wait(left_s)
+        begun_s = self.clock.due_s(0.0)
+        return tuple(replace(found, time_s=found.time_s - begun_s) for found in self.warden.measurements())
+
+
+@dataclass(kw_only=True, eq=False)
+class Sea:
+    """Where a real vehicle flies; implements `wakewise.core.interfaces.World`. It does not wait, and nobody knows its
+    truth.
+
+    `plant` is what makes the plant when a flight begins.
+    """
+
+    plant: Callable[[], SeaPlant]
+    name: str = "sea"
+    waits: bool = field(default=False, init=False)
+
+    def begin(self) -> tuple[SeaPlant, Witness | None]:
+        """The vehicle, and no witness."""
+        return self.plant(), None

@@ -1,0 +1,386 @@
+"""The one door through which thrusts leave: it judges every message, every tick of its watch and every thrust.
+
+Thrusts are sent only while engaged, by facts of that very moment, and only those that a controller decided in this
+engagement. When it ends, `RELEASES` messages tell the script to let go, which gives the pilot the sticks at once; were
+all of them lost, the script would let go `HOLD_MS` after the last thrusts. The watch also sends the last thrusts again,
+so that lost messages do no harm, for no longer than `Limits.thrusts_s`.
+
+Any thread may call it. It waits for nothing but its own lock, which is held for no longer than a message takes.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.core.interfaces import BodyState, Measurement
+from wakewise_ardusub.link import protocol
+from wakewise_ardusub.link.buttons import BUTTON_PARAMETERS, buttons_amiss
+from wakewise_ardusub.link.engagement_fsm import Engagement, Facts, Limits, faults
+from wakewise_ardusub.link.freshness_margins import Margins
+from wakewise_ardusub.link.journal_events import News
+from wakewise_ardusub.link.message_state import REMEMBERED_S, Known, Said, heard, tilt_of
+from wakewise_ardusub.link.motor_interface import Drive
+from wakewise_ardusub.link.requests import (
+    AGAIN_S,
+    MOST_PARAMETERS,
+    PARAMETERS_S,
+    interval_requests,
+    parameter_request,
+)
+from wakewise_ardusub.link.session_log import Journal
+from wakewise_ardusub.link.telemetry_adapter import Telemetry, measured
+
+Send = Callable[[str, Mapping[str, Any]], None]
+"""Sends a message: its name as pymavlink's encoders have it, and its fields."""
+
+
+TICK_S = 0.02
+"""Period of the watch."""
+RELEASES = 3
+"""How often letting go is said, a tick apart."""
+_KEPT = 4096
+_ONBOARD_CONTROLLER, _NO_AUTOPILOT, _ACTIVE = 18, 8, 4
+
+
+class Warden:
+    """Keeps what is known of the vehicle and lets thrusts through, or not.
+
+    Parameters
+    ----------
+    send : callable
+    drive : Drive
+    limits : Limits
+    journal : Journal or None
+    system : int
+        The vehicle's id.
+    session : int
+        Number that tells this program's heartbeats, and the times of its thrusts, from a rival's.
+    buttons : mapping
+        What buttons of the pilot's sticks mean: "engage", which also releases, and actions of
+        `wakewise.operation.teleop.input`. While the autopilot acts at one of them as well (`buttons.py`), nothing
+        engages.
+    listen_only : bool
+        Never engages, and sends no thrust whatever happens.
+    clock : callable
+        Seconds that never go back.
+    """
+
+    def __init__(
+        self,
+        *,
+        send: Send,
+        drive: Drive,
+        limits: Limits | None = None,
+        journal: Journal | None = None,
+        system: int = protocol.DEFAULT_SYSTEM,
+        session: int = 0,
+        buttons: Mapping[str, int] | None = None,
+        listen_only: bool = False,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.limits, self.journal, self.clock = limits or Limits(), journal, clock
+        self._send, self._drive, self._listen_only = send, drive, listen_only
+        self._buttons = dict(buttons or {})
+        self._needs = (*drive.needs, *(BUTTON_PARAMETERS if self._buttons else ()))
+        self._lock = threading.RLock()
+        self.known, self._telemetry, self.engagement = Known(system=system, session=session), Telemetry(), Engagement()
+        self.target_W_m: Array | None = None
+        self.figures: dict[str, float] = {}
+        self._estimate: BodyState | None = None
+        self._slots: Array | None = None
+        self._decided_s = self._sent_s = self._beat_s = self._figures_s = self._asked_s = -math.inf
+        self._asked_parameters_s = self._estimated_s = -math.inf
+        self._ticked_s, self._standstill_s, self._last_us = -math.inf, 0.0, 0
+        self._pressed: deque[str] = deque(maxlen=64)
+        self._measurements: deque[Measurement] = deque(maxlen=_KEPT)
+        self._news = News(journal, clock)
+        self._judged_for: Mapping[str, float] | None = None
+        self._amiss, self._engaged_with, self._engaged_mode = "", dict[str, float](), ""
+        self._releases_left, self.margins = 0, Margins()
+        self.thrusts_sent = self.releases_sent = self.unsent = 0
+
+    def begin(self) -> None:
+        """Start to listen."""
+        with self._lock:
+            self._told(self.engagement.begun(self.clock()))
+
+    def end(self, why: str) -> None:
+        """Still the thrusters, if they are driven, and let nothing out any more."""
+        with self._lock:
+            self._told(self.engagement.ended(self.clock(), why))
+
+    @property
+    def buttons_amiss(self) -> str | None:
+        """At which of its buttons the autopilot acts as well, in words, empty for none; None before that is known."""
+        parameters = self.known.parameters
+        if self._buttons and any(name not in parameters for name in BUTTON_PARAMETERS):
+            return None
+        return buttons_amiss(self._buttons, parameters)
+
+    @property
+    def entry(self) -> int | None:
+        """Number of the engagement that is on; None while none is."""
+        engagement = self.engagement
+        return engagement.entries if engagement.state == "engaged" else None
+
+    def facts(self) -> Facts:
+        """What is known now, as it is judged."""
+        with self._lock:
+            known, now_s, held = self.known, self.clock(), self._telemetry
+            version, _ = known.named_value(protocol.VERSION_NAME, now_s)
+            acts, acts_s = known.named_value(protocol.ENGAGED_NAME, now_s)
+            place, estimate = known.place_W_m, self._estimate
+            # Judged at every message: plain numbers are reckoned several times faster than arrays of three.
+            speeds = [math.hypot(*known.velocity_W_m_s)]
+            if estimate is not None:
+                speeds.append(math.hypot(*estimate.nu_B[:3].tolist()))
+            finite = [speed for speed in speeds if math.isfinite(speed)]
+            away = math.nan if place is None or self.target_W_m is None else math.dist(place, self.target_W_m)
+            engaged = self.engagement.state == "engaged"
+            since_s = self.engagement.since_s if engaged else now_s
+            return Facts(
+                now_s=now_s,
+                armed=known.armed,
+                mode=known.mode,
+                mode_name=known.mode_name,
+                mode_before=self._engaged_mode if engaged and self._engaged_mode != known.mode_name else "",
+                heartbeat_s=now_s - known.heartbeat_s,
+                telemetry_s=now_s - known.attitude_s,
+                pose_s=now_s - known.pose_s,
+                operator_s=math.inf if known.sticks is None else now_s - known.sticks.came_s,
+                script_s=acts_s,
+                script_version=round(version) if math.isfinite(version) else None,
+                acts=acts > 0.5 if math.isfinite(acts) else None,
+                acts_s=acts_s,
+                thrusts_s=now_s - max(self._decided_s, since_s),
+                loop_s=now_s - self._estimated_s,
+                engaged_s=now_s - since_s,
+                standstill_s=self._standstill_s,
+                duplicate=known.duplicate if now_s - known.duplicate_s < REMEMBERED_S else "",
+                takeover=known.takeover if now_s - known.takeover_s < REMEMBERED_S else "",
+                parameters=self._set_up(),
+                clock=held.jump if now_s - held.jump_s < REMEMBERED_S else "",
+                depth_m=known.depth_m,
+                distance_m=away,
+                tilt_rad=tilt_of(known),
+                speed_m_s=max(finite, default=math.nan),
+                battery_V=known.battery_V,
+            )
+
+    def _set_up(self) -> str:
+        """What is amiss about the autopilot's parameters, in words."""
+        parameters = self.known.parameters
+        if parameters is not self._judged_for:
+            missing = next((name for name in self._needs if name not in parameters), None)
+            words = f"parameters of the autopilot are not known yet: {missing}" if missing else ""
+            words = words or buttons_amiss(self._buttons, parameters) or self._drive.amiss(parameters)
+            self._judged_for, self._amiss = parameters, words
+        changed = [name for name, value in self._engaged_with.items() if parameters.get(name) != value]
+        return self._amiss or (f"{changed[0]} was changed" if changed else "")
+
+    def take(self, said: Said) -> None:
+        """A message came."""
+        with self._lock:
+            now_s, before = self.clock(), self.known
+            self.known = known = heard(before, said, now_s)
+            self._telemetry, found = measured(self._telemetry, said, now_s, known.system)
+            self._measurements.extend(found)
+            self._news.changed(before, known, self._telemetry.jump)
+            if known.sticks is not None and known.sticks is not before.sticks:
+                self._press(known.sticks.buttons & ~(0 if before.sticks is None else before.sticks.buttons))
+            self._judge()
+
+    def noise(self, count: int = 1) -> None:
+        """Bytes came that are no message."""
+        with self._lock:
+            self.known = self.known.noise(count)
+
+    def tick(self) -> None:
+        """Look at the clock: judge, send again, beat, report. To be called every `TICK_S`, by one thread."""
+        with self._lock:
+            now_s = self.clock()
+            gap_s = now_s - self._ticked_s if math.isfinite(self._ticked_s) else 0.0
+            self._ticked_s = now_s
+            if self._releases_left:
+                self._let_go(now_s)
+            # What is seen once must be judged once; after that it is over.
+            self._standstill_s = gap_s
+            self._judge()
+            self._standstill_s = 0.0
+            self.margins.looked(self.facts())
+            if self.engagement.state == "off":
+                return
+            if self.entry is not None and self._slots is not None and now_s - self._sent_s >= protocol.SEND_PERIOD_S:
+                self._out(self._slots, now_s)
+            if now_s - self._beat_s >= protocol.HEARTBEAT_PERIOD_S:
+                self._beat_s = now_s
+                self._post("heartbeat", self.heartbeat())
+            if self.figures and now_s - self._figures_s >= protocol.FIGURES_PERIOD_S:
+                self._figures_s = now_s
+                for name, value in self.figures.items():
+                    if math.isfinite(value):
+                        self._post("named_value_float", self._named(name, value, now_s))
+            self._ask_for_parameters(now_s)
+            facts = self.facts()
+            # An autopilot that streams as slowly as it does out of the box is asked for more, too.
+            slow = facts.telemetry_s > self.limits.telemetry_s or facts.pose_s > self.limits.pose_s
+            lacking = math.isinf(self._asked_s) or slow or now_s - self.known.servo_s > 1.0
+            if lacking and now_s - self._asked_s >= AGAIN_S and facts.heartbeat_s < self.limits.heartbeat_s:
+                self._asked_s = now_s
+                for name, fields in interval_requests(self.known.system):
+                    self._post(name, fields)
+
+    def _ask_for_parameters(self, now_s: float) -> None:
+        missing = [name for name in self._needs if name not in self.known.parameters]
+        if missing and now_s - self._asked_parameters_s >= PARAMETERS_S and math.isfinite(self.known.heartbeat_s):
+            self._asked_parameters_s = now_s
+            for name in missing[:MOST_PARAMETERS]:
+                self._post("param_request_read", parameter_request(self.known.system, name))
+
+    def command(self, thrusts_N: Array, entry: int) -> bool:
+        """Thrusts, shape (n,), that a controller decided in an engagement; whether they were sent."""
+        with self._lock:
+            now_s = self.clock()
+            if entry != self.entry or not np.isfinite(thrusts_N).all():
+                self._judge()
+                return False
+            slots = self._drive.slots(self.known.parameters, thrusts_N, self.known.battery_V)
+            self._decided_s = now_s
+            self._judge()
+            if entry != self.entry:
+                return False
+            self._slots = slots
+            self._out(slots, now_s)
+            return True
+
+    def estimated(self, estimate: BodyState) -> None:
+        """What the estimator says, once at each step of the control loop."""
+        with self._lock:
+            self._estimate, self._estimated_s = estimate, self.clock()
+
+    def press(self) -> str:
+        """The operator's one button: consent, or take the sticks; what came of it in words."""
+        with self._lock:
+            if self.entry is not None:
+                self._told(self.engagement.released(self.clock()))
+                return "released: the pilot has the sticks"
+            if self._listen_only:
+                return "listening only: never engages"
+            after = self.engagement.consented(self.facts(), self.limits)
+            self._told(after)
+            if after.state == "engaged":
+                return "engaged"
+            found = faults(self.facts(), self.limits, engaged=False)
+            words = "; ".join(fault.text for fault in found) or self.engagement.why
+            return f"not engaged: {words}"
+
+    def release(self, why: str) -> None:
+        """Take consent back, if it was given."""
+        with self._lock:
+            self._told(self.engagement.released(self.clock(), why))
+
+    def say(self, name: str, fields: Mapping[str, Any]) -> None:
+        """Send a message that drives nothing, such as a request to a camera, until it has ended."""
+        with self._lock:
+            if self.engagement.state != "off":
+                self._post(name, fields)
+
+    def pressed(self) -> tuple[str, ...]:
+        """Actions that the pilot's buttons asked for since the last call."""
+        with self._lock:
+            found = tuple(self._pressed)
+            self._pressed.clear()
+            return found
+
+    def measurements(self) -> tuple[Measurement, ...]:
+        """What was measured since the last call, oldest first; times on this object's clock."""
+        with self._lock:
+            found = tuple(self._measurements)
+            self._measurements.clear()
+            return found
+
+    def heartbeat(self) -> dict[str, int]:
+        """Fields of this program's heartbeat: an onboard controller, never a ground station."""
+        return {
+            "type": _ONBOARD_CONTROLLER,
+            "autopilot": _NO_AUTOPILOT,
+            "base_mode": 0,
+            "custom_mode": self.known.session,
+            "system_status": _ACTIVE,
+        }
+
+    def _judge(self) -> None:
+        if self.engagement.state != "off":
+            self._told(self.engagement.judged(self.facts(), self.limits))
+
+    def _told(self, after: Engagement) -> None:
+        """Take a move over: what ends an engagement stills the thrusters first and is written down then."""
+        before, self.engagement = self.engagement, after
+        if before.state == "engaged" and after.state != "engaged":
+            self._slots, self._releases_left, self._engaged_with = None, RELEASES, {}
+            self._let_go(self.clock())
+        elif after.state == "engaged" and before.state != "engaged":
+            self._slots, self._releases_left, self._decided_s = None, 0, self.clock()
+            self._engaged_mode = self.known.mode_name
+            self._engaged_with = {name: self.known.parameters[name] for name in self._needs}
+            self._pressed.clear()
+        for t in after.told:
+            self.margins.told(t)
+            self._write("state", before=t.before, after=t.after, reason=t.reason, kind=t.kind)
+
+    def _let_go(self, now_s: float) -> None:
+        self._thrusts(np.zeros(protocol.SLOTS), now_s, protocol.RELEASE_GROUP)
+        self._releases_left -= 1
+        self.releases_sent += 1
+
+    def _out(self, slots: Array, now_s: float) -> None:
+        self._thrusts(slots, now_s, protocol.THRUST_GROUP)
+        self._sent_s = now_s
+        self.thrusts_sent += 1
+
+    def _thrusts(self, slots: Array, now_s: float, group: int) -> None:
+        begun_us = self.known.session * protocol.SESSION_STEP_US
+        self._last_us = max(begun_us + round(1e6 * now_s), self._last_us + 1)
+        self.known = self.known.sent(self._last_us)
+        self._post(
+            "set_actuator_control_target",
+            {
+                "time_usec": self._last_us,
+                "group_mlx": group,
+                "target_system": self.known.system,
+                "target_component": protocol.AUTOPILOT_COMPONENT,
+                "controls": [float(value) for value in slots],
+            },
+        )
+
+    def _post(self, name: str, fields: Mapping[str, Any]) -> None:
+        try:
+            self._send(name, fields)
+        except OSError as fault:  # a cable pulled out must not end the watch
+            if not self.unsent:
+                self._write("not sent", words=str(fault.strerror or fault))
+            self.unsent += 1
+
+    def _named(self, name: str, value: float, now_s: float) -> dict[str, Any]:
+        return {"time_boot_ms": round(1e3 * now_s) % 2**32, "name": name.encode("ascii"), "value": value}
+
+    def _press(self, new: int) -> None:
+        """Buttons that went down."""
+        for what, number in self._buttons.items():
+            if new & 1 << number:
+                if what == "engage":
+                    said = self.press()
+                    self._write("button", button=number, said=said)
+                else:
+                    self._pressed.append(what)
+
+    def _write(self, event: str, **told: Any) -> None:
+        self._news.tell(event, **told)

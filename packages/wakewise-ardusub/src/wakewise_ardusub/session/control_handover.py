@@ -1,0 +1,131 @@
+"""Who flies now: the pilot or the controller, settled once a step, and what each part of the loop makes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.core.interfaces import BodyState, Command, Controller, Estimator, Goal, Measurement
+from wakewise.operation.teleop.assisted import AssistedPilot
+from wakewise.operation.teleop.input.controls import CENTRED, Controls
+from wakewise_ardusub.link.output_gate import Warden
+
+
+@dataclass(kw_only=True, eq=False)
+class Turn:
+    """In which engagement the present step is flown, None in none, and when in the flight that began."""
+
+    entry: int | None = None
+    began_s: float = 0.0
+
+
+@dataclass(kw_only=True, eq=False)
+class PilotsSticks:
+    """A `ControlSource`: the sticks that the pilot moves at the ground station, and the buttons that mean something."""
+
+    warden: Warden
+    stale_s: float = 0.3
+
+    def read(self, time_s: float) -> Controls | None:  # noqa: ARG002  (as they are now)
+        """The sticks as last heard; None where nobody was heard for a while."""
+        sticks, pressed = self.warden.known.sticks, self.warden.pressed()
+        if sticks is None or self.warden.clock() - sticks.came_s > self.stale_s:
+            return Controls(axes=CENTRED.axes, pressed=pressed) if pressed else None
+        return Controls(axes=sticks.axes, pressed=pressed)
+
+
+@dataclass(kw_only=True, eq=False)
+class BesidePilot:
+    """A `Pilot`: the assisted one while engaged, on its own clock; else the vehicle is wished to be where it is."""
+
+    inner: AssistedPilot
+    warden: Warden
+    turn: Turn
+    photographed: Callable[[], None]
+    _notes_told: int = 0
+
+    def goal(self, time_s: float, estimate: BodyState) -> Goal:
+        """What is wanted now; settles in which engagement this step is flown."""
+        self.warden.estimated(estimate)
+        entry, turn = self.warden.entry, self.turn
+        if entry is None:
+            turn.entry = None
+            return Goal(X_WB=estimate.X_WB, nu_B=estimate.nu_B)
+        if entry != turn.entry:
+            turn.entry, turn.began_s = entry, time_s
+        goal = self.inner.goal(time_s - turn.began_s, estimate)
+        for note in self.inner.notes():
+            if self.warden.journal is not None:
+                self.warden.journal.write("note", level=note.level, words=note.text)
+        return goal
+
+    def taken(self) -> tuple[str, ...]:
+        """Photographs and the end asked for since the last call."""
+        actions = self.inner.taken() if self.turn.entry is not None else self.warden.pressed()
+        found = tuple(what for what in actions if what in ("capture", "stop"))
+        for _ in range(found.count("capture")):
+            self.photographed()
+        return found
+
+    @property
+    def leg(self) -> str:
+        """What is flown now, as the record calls it."""
+        return self.inner.leg if self.turn.entry is not None else "the pilot flies"
+
+
+@dataclass(frozen=True, eq=False)
+class Engaged:
+    """State of a controller that rests while it is not engaged."""
+
+    entry: int | None
+    inner: Any
+
+
+@dataclass(kw_only=True, eq=False)
+class WhileEngaged:
+    """A `Controller` that begins afresh at each engagement and asks for nothing between them."""
+
+    inner: Controller[Any]
+    turn: Turn
+    thrusters: int
+
+    @property
+    def name(self) -> str:
+        """Name of the method."""
+        return self.inner.name
+
+    def init(self) -> Engaged:
+        """At rest."""
+        return Engaged(None, None)
+
+    def step(self, state: Engaged, dt_s: float, estimate: BodyState, goal: Goal) -> tuple[Engaged, Command]:
+        """The method's thrusts while engaged, else none."""
+        entry = self.turn.entry
+        if entry is None:
+            return Engaged(None, None), Command(thrusts_N=np.zeros(self.thrusters), wrench_B=np.zeros(6))
+        inner = state.inner if entry == state.entry else self.inner.init()
+        inner, command = self.inner.step(inner, dt_s, estimate, goal)
+        return Engaged(entry, inner), command
+
+
+@dataclass(kw_only=True, eq=False)
+class TheServos:
+    """An `Estimator` that is told what the servos do while the pilot flies."""
+
+    inner: Estimator[Any]
+    turn: Turn
+    flown_N: Callable[[], Array]
+
+    def init(self, start: BodyState) -> Any:
+        """State at the start."""
+        return self.inner.init(start)
+
+    def step(
+        self, state: Any, dt_s: float, measurements: tuple[Measurement, ...], thrusts_N: Array
+    ) -> tuple[Any, BodyState]:
+        """Advance under the thrusts that act."""
+        return self.inner.step(state, dt_s, measurements, self.flown_N() if self.turn.entry is None else thrusts_N)

@@ -1,0 +1,279 @@
+"""The companion's own watch beside the stand-in, in one process and in the rehearsal's time.
+
+What is flown is the shipped warden with its post, drive and limits; the controller is the plainest there can be,
+constant thrusts ten times a second. `FAULTS_ABOARD` is what may go wrong around it, and `suffer_aboard` says how long a
+script still drove an output then.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from wakewise.core.arrays import Array
+from wakewise.core.errors import WakewiseError
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import BodyState
+from wakewise.robot.vehicles import Vehicle
+from wakewise_ardusub.link.engagement_fsm import Limits
+from wakewise_ardusub.link.mavlink_codec import Post
+from wakewise_ardusub.link.message_state import attitude_of
+from wakewise_ardusub.link.motor_interface import VehicleDrive
+from wakewise_ardusub.link.output_gate import TICK_S, Warden
+from wakewise_ardusub.link.protocol import ALT_HOLD, COMPANION_COMPONENT, ENABLE_PARAMETER
+from wakewise_ardusub.link.session_log import Journal
+from wakewise_ardusub.sitl.inprocess_session import STATION_COMPONENT, Outcome, Rehearsal, Speaker, noise, outcome
+
+DECIDES_S = 0.1
+SESSION = 1
+SECOND_STATION = 254
+_OFFSET_S = 1000.0
+
+
+class Aboard:
+    """A warden on a rehearsal's links; implements `wakewise_ardusub.link.mavlink_codec.Carrier`.
+
+    Parameters
+    ----------
+    flight : Rehearsal
+    limits : Limits, optional
+    journal : Journal, optional
+    buttons : mapping, optional
+        As of `Warden`.
+    thrusts_N : ndarray, shape (n,), optional
+        What the plain controller asks for; 5 N of each thruster if not given.
+    """
+
+    def __init__(
+        self,
+        flight: Rehearsal,
+        *,
+        limits: Limits | None = None,
+        journal: Journal | None = None,
+        buttons: Mapping[str, int] | None = None,
+        thrusts_N: Array | None = None,
+    ) -> None:
+        self.flight = flight
+        self.thrusts_N = np.full(len(flight.vehicle.thrusters), 5.0) if thrusts_N is None else thrusts_N
+        self.drive = VehicleDrive(flight.vehicle)
+        self.withheld: set[str] = set()
+        """Names of messages that do not reach it."""
+        self.deaf = self.mute = self.stuck = False
+        """Faults: nothing reaches it, nothing of it reaches others, its program has stopped."""
+        self.decides = True
+        """Whether the plain controller decides."""
+        self._waiting: deque[bytes] = deque(maxlen=4096)
+        self._ticked_s = self._decided_s = -1.0
+        self._post = Post(self, flight.stand_in.system)
+        self.warden = Warden(
+            send=self._post.send,
+            drive=self.drive,
+            limits=limits,
+            journal=journal,
+            system=flight.stand_in.system,
+            session=SESSION,
+            buttons=buttons,
+            clock=self.clock,
+        )
+        self.warden.target_W_m = np.array([1.0, 0.0, 2.0])
+        flight.listeners["companion"] = self.hear
+        flight.turns.append(self.turn)
+        self.warden.begin()
+
+    def clock(self) -> float:
+        """The companion's clock, which began at another time than the autopilot's."""
+        return _OFFSET_S + self.flight.now_s
+
+    def receive(self, timeout_s: float) -> bytes:  # noqa: ARG002  (nothing is waited for)
+        """What came since."""
+        data = b"".join(self._waiting)
+        self._waiting.clear()
+        return data
+
+    def send(self, data: bytes) -> None:
+        """To everybody else."""
+        if not self.mute:
+            self.flight.carry(data, "companion")
+
+    def turn(self) -> None:
+        """What the program does in the time of a loop: listen, watch, decide."""
+        if self.stuck:
+            return
+        said, bad = self._post.receive(0.0)
+        if bad:
+            self.warden.noise(bad)
+        for message in said:
+            if message.name not in self.withheld:
+                self.warden.take(message)
+        now_s = self.flight.now_s
+        if now_s - self._ticked_s >= TICK_S - 1e-9:
+            self._ticked_s = now_s
+            self.warden.tick()
+        if self.decides and now_s - self._decided_s >= DECIDES_S - 1e-9:
+            self._decided_s = now_s
+            self._decide()
+
+    def engaged(self) -> Aboard:
+        """Armed, switched on and consented to, with all that this takes; acting for a second.
+
+        Raises
+        ------
+        WakewiseError
+            Saying what keeps the warden from it.
+        """
+        flight = self.flight
+        flight.run(0.5)
+        flight.set(ENABLE_PARAMETER, 1.0)
+        flight.arm(True)
+        for _ in range(60):
+            flight.run(0.1)
+            if self.warden.engagement.state == "ready":
+                break
+        answer = self.warden.press()
+        if answer != "engaged":
+            raise WakewiseError(answer)
+        flight.run(1.0)
+        return self
+
+    def flown_N(self) -> Array:
+        """Thrusts by the servos' pulses, shape (n,), as the companion knows them."""
+        known = self.warden.known
+        return self.drive.flown_N(known.parameters, known.servo_us, known.battery_V)
+
+    def hear(self, data: bytes) -> None:
+        """Bytes come; they are taken in at its next turn."""
+        if not self.deaf:
+            self._waiting.append(data)
+
+    def _decide(self) -> None:
+        known, warden = self.warden.known, self.warden
+        if known.place_W_m is None or not np.isfinite(known.attitude[0]):
+            return
+        warden.estimated(BodyState(X_WB=Pose(known.place_W_m, attitude_of(known))))
+        entry = warden.entry
+        if entry is not None:
+            warden.command(self.thrusts_N, entry)
+
+
+def _no_sticks(aboard: Aboard) -> None:
+    aboard.flight.sticks = None
+
+
+def _no_station(aboard: Aboard) -> None:
+    aboard.flight.sticks, aboard.flight.beats = None, False
+
+
+def _withheld(*names: str) -> Callable[[Aboard], None]:
+    def fault(aboard: Aboard) -> None:
+        aboard.withheld |= set(names)
+
+    return fault
+
+
+def _cut(aboard: Aboard) -> None:
+    aboard.deaf = aboard.mute = True
+
+
+def _deaf(aboard: Aboard) -> None:
+    aboard.deaf = True
+
+
+def _mute(aboard: Aboard) -> None:
+    aboard.mute = True
+
+
+def _stuck(aboard: Aboard) -> None:
+    aboard.stuck = True
+
+
+def _controller_stuck(aboard: Aboard) -> None:
+    aboard.decides = False
+
+
+def _disarm(aboard: Aboard) -> None:
+    aboard.flight.arm(False)
+
+
+def _mode(aboard: Aboard) -> None:
+    aboard.flight.set_mode(ALT_HOLD)
+
+
+def _switch_off(aboard: Aboard) -> None:
+    aboard.flight.set(ENABLE_PARAMETER, 0.0)
+
+
+def _second_station(aboard: Aboard) -> None:
+    other = Speaker(aboard.flight.carry, SECOND_STATION, STATION_COMPONENT, "second station")
+    other.say(mavlink.MAVLink_manual_control_message(aboard.flight.stand_in.system, 900, 0, 500, 0, 0))
+
+
+def _channel(aboard: Aboard) -> None:
+    aboard.flight.set("SERVO2_FUNCTION", 0.0)
+
+
+def _direction(aboard: Aboard) -> None:
+    aboard.flight.set("MOT_3_DIRECTION", -aboard.warden.known.parameters["MOT_3_DIRECTION"])
+
+
+def _second_companion(aboard: Aboard) -> None:
+    """One that sends for less than a second: after that the script takes a sender that is left alone for its own."""
+    rival = Speaker(aboard.flight.carry, aboard.flight.stand_in.system, COMPANION_COMPONENT, "rival")
+    until_s = aboard.flight.now_s + 0.9
+
+    def speak(flight: Rehearsal) -> None:
+        if flight.now_s < until_s:
+            flight.send_thrusts((0.3,) * 8, who=rival, ahead_s=60.0)
+
+    aboard.flight.each = speak
+
+
+def _noise(aboard: Aboard) -> None:
+    pieces = iter(noise(20_000, 5))
+    aboard.flight.each = lambda flight: flight.carry(next(pieces, b""), "noise")
+    aboard.flight.sticks = None
+
+
+def _operator(aboard: Aboard) -> None:
+    aboard.warden.press()
+
+
+def _end(aboard: Aboard) -> None:
+    aboard.warden.end("Ctrl-C")
+
+
+FAULTS_ABOARD: dict[str, Callable[[Aboard], None]] = {
+    "the operator takes the sticks": _operator,
+    "the session ends": _end,
+    "the sticks stop": _no_sticks,
+    "the ground station is lost": _no_station,
+    "no position": _withheld("LOCAL_POSITION_NED"),
+    "no attitude": _withheld("ATTITUDE"),
+    "nothing from the autopilot": _withheld(
+        "ATTITUDE", "LOCAL_POSITION_NED", "HEARTBEAT", "NAMED_VALUE_FLOAT", "VFR_HUD"
+    ),
+    "the companion hears nothing": _deaf,
+    "nobody hears the companion": _mute,
+    "the cable is cut": _cut,
+    "the companion's program dies": _stuck,
+    "the controller hangs": _controller_stuck,
+    "disarmed": _disarm,
+    "mode changed": _mode,
+    "switched off": _switch_off,
+    "a second ground station": _second_station,
+    "an output is given another function": _channel,
+    "a parameter changed": _direction,
+    "a second sender": _second_companion,
+    "noise, and the sticks stop": _noise,
+}
+"""What may happen around a companion that drives, and after which the outputs must be the autopilot's again."""
+
+
+def suffer_aboard(vehicle: Vehicle, fault: Callable[[Aboard], None], seconds: float = 1.5) -> Outcome:
+    """Drive as the companion does, let something go wrong, and look at the outputs."""
+    aboard = Aboard(Rehearsal(vehicle)).engaged()
+    began_s = aboard.flight.now_s
+    fault(aboard)
+    return outcome(aboard.flight.run(seconds), began_s)

@@ -1,0 +1,201 @@
+"""What the stand-in tells, and how often: the messages that ground stations, companions and logs live on.
+
+Each is built from the truth that physics told last: there is no noise, no estimator and no magnetometer here. Only the
+depth is the sensor's, which may have been calibrated under water (`StandIn.depth_m`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from wakewise.core.constants import GRAVITY_M_S2, TRIM_WATER_KG_M3
+from wakewise.core.geometry import euler_from_quat
+
+if TYPE_CHECKING:
+    from wakewise_ardusub.sitl.simulated_autopilot import StandIn
+
+SURFACE_HPA = 1013.25
+_EARTH_M = 6_378_137.0
+_VOLTAGE_V = 16.0
+_NO_CELL = 65535
+_OFFICIAL = 255
+
+RATES_HZ: dict[int, float] = {
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1.0,
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: 2.0,
+    mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: 1.0,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: 10.0,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 10.0,
+    mavlink.MAVLINK_MSG_ID_VFR_HUD: 10.0,
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 3.0,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 3.0,
+    mavlink.MAVLINK_MSG_ID_RAW_IMU: 2.0,
+    mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE: 2.0,
+    mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE2: 2.0,
+    mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: 2.0,
+    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
+}
+"""How often each is told before anybody asks for another rate: about as often as by ArduSub's stream parameters."""
+FASTEST_HZ = 200.0
+
+
+def heartbeat(board: StandIn) -> Any:
+    """Who it is, mode, armed or not."""
+    base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
+    base |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED if board.armed else 0
+    state = mavlink.MAV_STATE_ACTIVE if board.armed else mavlink.MAV_STATE_STANDBY
+    return mavlink.MAVLink_heartbeat_message(
+        mavlink.MAV_TYPE_SUBMARINE, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, base, board.mode, state, 3
+    )
+
+
+def autopilot_version(board: StandIn) -> Any:
+    """Release and what the protocol end can do."""
+    can = (
+        mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
+        | mavlink.MAV_PROTOCOL_CAPABILITY_FTP
+        | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+    )
+    major, minor, patch = board.firmware
+    release = major << 24 | minor << 16 | patch << 8 | _OFFICIAL
+    return mavlink.MAVLink_autopilot_version_message(can, release, 0, 0, 0, b"standin\0", bytes(8), bytes(8), 0, 0, 0)
+
+
+def parameter(board: StandIn, name: str) -> Any:
+    """One parameter and its place in the list."""
+    table = board.parameters
+    return mavlink.MAVLink_param_value_message(
+        name.encode("ascii", "replace"),
+        table.value(name, otherwise=math.nan),
+        mavlink.MAV_PARAM_TYPE_REAL32,
+        len(table),
+        table.index(name),
+    )
+
+
+def _attitude(board: StandIn) -> Any:
+    roll, pitch, yaw = euler_from_quat(board.motion.q_WB)
+    return mavlink.MAVLink_attitude_message(board.boot_ms, roll, pitch, yaw, *board.motion.omega_B_rad_s)
+
+
+def _attitude_quaternion(board: StandIn) -> Any:
+    motion = board.motion
+    return mavlink.MAVLink_attitude_quaternion_message(board.boot_ms, *motion.q_WB, *motion.omega_B_rad_s)
+
+
+def _local_position(board: StandIn) -> Any:
+    north, east, _ = board.motion.p_WB_m
+    return mavlink.MAVLink_local_position_ned_message(board.boot_ms, north, east, board.depth_m, *board.motion.v_W_m_s)
+
+
+def _global_position(board: StandIn) -> Any:
+    north, east, _ = board.motion.p_WB_m
+    latitude, longitude = board.home_deg
+    turn = math.degrees(1.0 / _EARTH_M)
+    heading = math.degrees(euler_from_quat(board.motion.q_WB)[2]) % 360.0
+    return mavlink.MAVLink_global_position_int_message(
+        board.boot_ms,
+        round(1e7 * (latitude + turn * north)),
+        round(1e7 * (longitude + turn * east / math.cos(math.radians(latitude)))),
+        round(-1e3 * board.depth_m),
+        round(-1e3 * board.depth_m),
+        *(int(np.clip(round(1e2 * v), -32767, 32767)) for v in board.motion.v_W_m_s),
+        round(1e2 * heading) % 36000,
+    )
+
+
+def _vfr_hud(board: StandIn) -> Any:
+    velocity = board.motion.v_W_m_s
+    heading = math.degrees(euler_from_quat(board.motion.q_WB)[2]) % 360.0
+    speed = float(np.hypot(velocity[0], velocity[1]))
+    return mavlink.MAVLink_vfr_hud_message(speed, speed, round(heading) % 360, 0, -board.depth_m, -float(velocity[2]))
+
+
+def _pressure_in_hull(board: StandIn) -> Any:
+    return mavlink.MAVLink_scaled_pressure_message(board.boot_ms, SURFACE_HPA, 0.0, 2500)
+
+
+def _pressure_of_water(board: StandIn) -> Any:
+    water_hPa = 1e-2 * TRIM_WATER_KG_M3 * GRAVITY_M_S2 * float(board.motion.p_WB_m[2])
+    return mavlink.MAVLink_scaled_pressure2_message(board.boot_ms, SURFACE_HPA + water_hPa, 0.0, 1500)
+
+
+def _servo_output(board: StandIn) -> Any:
+    pulses = board.pulses_us
+    micros = round(1e6 * board.now_s) & 0xFFFFFFFF
+    return mavlink.MAVLink_servo_output_raw_message(micros, 0, *pulses[:8], *pulses[8:16])
+
+
+def _raw_imu(board: StandIn) -> Any:
+    """Specific force in thousandths of g and rates in mrad/s, whole ones, as ArduPilot fills it."""
+    force = [round(1e3 * v / GRAVITY_M_S2) for v in board.motion.force_B_m_s2]
+    rates = [round(1e3 * v) for v in board.motion.omega_B_rad_s]
+    within = [max(-32767, min(32767, value)) for value in (*force, *rates)]
+    return mavlink.MAVLink_raw_imu_message(round(1e6 * board.now_s), *within, 0, 0, 0)
+
+
+def _sys_status(board: StandIn) -> Any:
+    millivolt = round(1e3 * board.parameters.value("SIM_BATT_VOLTAGE", otherwise=_VOLTAGE_V))
+    return mavlink.MAVLink_sys_status_message(0, 0, 0, 0, millivolt, -1, -1, 0, 0, 0, 0, 0, 0)
+
+
+def _battery(board: StandIn) -> Any:
+    millivolt = round(1e3 * board.parameters.value("SIM_BATT_VOLTAGE", otherwise=_VOLTAGE_V))
+    cells = [millivolt] + [_NO_CELL] * 9
+    return mavlink.MAVLink_battery_status_message(0, 0, 0, 32767, cells, -1, -1, -1, -1)
+
+
+def _system_time(board: StandIn) -> Any:
+    return mavlink.MAVLink_system_time_message(0, board.boot_ms)
+
+
+BUILDERS: dict[int, Callable[[StandIn], Any]] = {
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT: heartbeat,
+    mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version,
+    mavlink.MAVLINK_MSG_ID_RAW_IMU: _raw_imu,
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: _sys_status,
+    mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: _battery,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: _attitude,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: _attitude_quaternion,
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: _local_position,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: _global_position,
+    mavlink.MAVLINK_MSG_ID_VFR_HUD: _vfr_hud,
+    mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE: _pressure_in_hull,
+    mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE2: _pressure_of_water,
+    mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: _servo_output,
+    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: _system_time,
+}
+"""What can be told, by message id."""
+
+
+class Timetable:
+    """When each message is due."""
+
+    def __init__(self) -> None:
+        self._every_s = {message: 1.0 / rate for message, rate in RATES_HZ.items()}
+        self._next_s = dict.fromkeys(self._every_s, 0.0)
+
+    def ask(self, message: int, every_us: float) -> bool:
+        """Set how often: microseconds between two, -1 for never, 0 for what it was at first; False where unknown."""
+        if message not in BUILDERS or not math.isfinite(every_us):
+            return False
+        if every_us < 0.0:
+            self._every_s.pop(message, None)
+        else:
+            usual = RATES_HZ.get(message, 1.0)
+            self._every_s[message] = max(1e-6 * every_us, 1.0 / FASTEST_HZ) if every_us else 1.0 / usual
+        return True
+
+    def due(self, now_s: float) -> list[int]:
+        """Messages whose time has come; one that fell behind is told once."""
+        due = []
+        for message, every_s in self._every_s.items():
+            if now_s >= self._next_s.get(message, 0.0) - 1e-9:
+                due.append(message)
+                self._next_s[message] = max(self._next_s.get(message, 0.0) + every_s, now_s)
+        return due

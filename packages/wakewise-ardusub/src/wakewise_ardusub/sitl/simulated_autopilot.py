@@ -1,0 +1,370 @@
+"""The stand-in itself: bytes and motion in, pulses and bytes out, a loop at a time; time is what physics says.
+
+Nothing here waits, sleeps or reads a clock, so a minute of flight takes as long as its arithmetic.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from wakewise.core.constants import GRAVITY_M_S2
+from wakewise.core.errors import InputError
+from wakewise_ardusub.link.protocol import (
+    ALT_HOLD,
+    AUTOPILOT_COMPONENT,
+    DEFAULT_SYSTEM,
+    MANUAL,
+    MIDDLE_US,
+)
+from wakewise_ardusub.physics.datagrams import Motion
+from wakewise_ardusub.sitl.failsafes import Action, ground_station, pilot_input
+from wakewise_ardusub.sitl.files import Files
+from wakewise_ardusub.sitl.joystick import Joystick, can_disarm
+from wakewise_ardusub.sitl.mavlink_in import hear
+from wakewise_ardusub.sitl.mavlink_out import BUILDERS, Timetable, parameter
+from wakewise_ardusub.sitl.modes import MODES, Loops, fly
+from wakewise_ardusub.sitl.motor_tests import MotorTest
+from wakewise_ardusub.sitl.motors import directions_of, factors_of, motor_pulses_us
+from wakewise_ardusub.sitl.own_parameters import own_parameters
+from wakewise_ardusub.sitl.parameters import ParameterTable
+from wakewise_ardusub.sitl.scripting import Script
+from wakewise_ardusub.sitl.servos import OUTPUTS, Servos, find_channel
+from wakewise_ardusub.sitl.sticks import Demands
+
+FIRMWARE = (4, 5, 3)
+"""Release that it says it is: the one that BlueOS 1.4 brings."""
+HOME_DEG = (33.810313, -118.393867)
+"""Latitude and longitude of the origin: where ArduPilot's simulated submarine starts."""
+LOOPS_HZ = (50.0, 1000.0)
+_LISTED_PER_LOOP = 10
+_MOST_WAITING = 4000
+TEXT_LETTERS = 50
+_MOST_TEXT_ID = 65535
+_CRITICAL, _ERROR, _WARNING, _INFO = 2, 3, 4, 6
+_AT_REST = Motion(
+    time_s=0.0,
+    omega_B_rad_s=np.zeros(3),
+    force_B_m_s2=np.array([0.0, 0.0, -GRAVITY_M_S2]),
+    p_WB_m=np.zeros(3),
+    q_WB=np.array([1.0, 0.0, 0.0, 0.0]),
+    v_W_m_s=np.zeros(3),
+)
+
+log = logging.getLogger(__name__)
+
+
+class StandIn:
+    """An autopilot of an eight- or six-motor submarine.
+
+    Parameters
+    ----------
+    values : mapping, optional
+        Parameters in place of the stand-in's own, and more of them.
+    loop_hz : float
+        Loops a second; as often as `step` is called, by the time of the motions.
+    firmware : tuple of three int
+        Release that it says it is.
+    scripts : mapping, optional
+        Lua scripts on its card, text by name.
+    home_deg : tuple of two floats
+        Latitude and longitude of physics' origin.
+    zero_depth_m : float or None
+        Where the depth sensor was calibrated; None does that at each start, wherever it is, as ArduSub does. Either
+        way whatever is shallower later on is its new zero.
+
+    Raises
+    ------
+    InputError
+        If it is to have more or fewer loops than `LOOPS_HZ`.
+    MissingExtra
+        If there is a script and no Lua.
+    """
+
+    armed: bool
+    mode: int
+    timetable: Timetable
+    joystick: Joystick
+    motor_test: MotorTest
+    _loops: Loops
+    _demands: Demands
+    _servos: Servos
+    _scripts: list[Script]
+    _to_list: deque[str]
+    _station_s: float | None
+    _sticks_s: float | None
+    _told: dict[str, Action]
+    _zeroed: bool
+
+    def __init__(
+        self,
+        values: Mapping[str, float] | None = None,
+        *,
+        loop_hz: float = 400.0,
+        firmware: tuple[int, int, int] = FIRMWARE,
+        scripts: Mapping[str, str] | None = None,
+        home_deg: tuple[float, float] = HOME_DEG,
+        zero_depth_m: float | None = 0.0,
+    ) -> None:
+        if not LOOPS_HZ[0] <= loop_hz <= LOOPS_HZ[1]:
+            raise InputError(f"stand-in: {loop_hz:g} loops a second, {LOOPS_HZ[0]:g} to {LOOPS_HZ[1]:g} are allowed")
+        self.loop_hz, self.firmware, self.home_deg = loop_hz, firmware, home_deg
+        self._calibrated_m, self.zero_depth_m = zero_depth_m, 0.0
+        self.parameters = ParameterTable(own_parameters() | dict(values or {}))
+        self.files = Files()
+        for name, text in (scripts or {}).items():
+            self.files.put(f"/APM/scripts/{name}", text.encode("latin-1", "replace"))
+        self._mav = mavlink.MAVLink(None, srcSystem=self.system, srcComponent=self.component)
+        self._ears: dict[str, Any] = {}
+        self._out: list[bytes] = []
+        self.bad_data = 0
+        """Stretches of bytes that were no packet."""
+        self.pulses_us: tuple[int, ...] = (0,) * OUTPUTS
+        """What the outputs carry now."""
+        self.motion = _AT_REST
+        """What physics said last."""
+        self.texts: deque[str] = deque(maxlen=200)
+        """What was last said in words."""
+        self._began_s = 0.0
+        self._text_id = 0
+        self.reboot()
+
+    # What it is.
+
+    @property
+    def system(self) -> int:
+        """Its system id."""
+        return int(self.parameters.value("MAV_SYSID", "SYSID_THISMAV", otherwise=DEFAULT_SYSTEM)) & 0xFF
+
+    @property
+    def component(self) -> int:
+        """Its component id."""
+        return AUTOPILOT_COMPONENT
+
+    @property
+    def ground_station(self) -> int:
+        """System id of the ground station that may steer and whose silence counts."""
+        return int(self.parameters.value("MAV_GCS_SYSID", "SYSID_MYGCS", otherwise=255.0))
+
+    @property
+    def now_s(self) -> float:
+        """Time since its start."""
+        return self.motion.time_s - self._began_s
+
+    @property
+    def boot_ms(self) -> int:
+        """The same in whole milliseconds."""
+        return round(1e3 * self.now_s) & 0xFFFFFFFF
+
+    @property
+    def depth_m(self) -> float:
+        """What its depth sensor makes of where it is."""
+        return float(self.motion.p_WB_m[2]) - self.zero_depth_m
+
+    @property
+    def overridden(self) -> bool:
+        """Whether a script drives an output now."""
+        return any(self._servos.overridden)
+
+    # In and out.
+
+    def hear(self, data: bytes, link: str = "") -> None:
+        """Take bytes that came on a link, whatever they are; each link has its own place in a packet."""
+        ears = self._ears.get(link)
+        if ears is None:
+            ears = self._ears[link] = mavlink.MAVLink(None)
+            ears.robust_parsing = True
+        try:
+            found = ears.parse_buffer(data) or []
+        except mavlink.MAVError:  # a packet that its own length does not fit
+            self.bad_data += 1
+            return
+        for message in found:
+            if message.get_type() == "BAD_DATA":
+                self.bad_data += 1
+            elif message.get_msgId() >= 0:
+                hear(self, message)
+
+    def send(self, message: Any) -> None:
+        """Put a message among what goes out."""
+        if len(self._out) < _MOST_WAITING:
+            self._out.append(bytes(message.pack(self._mav)))
+            self._mav.seq = (self._mav.seq + 1) & 0xFF
+
+    def take_out(self) -> list[bytes]:
+        """What it has said since this was last asked: a packet each."""
+        out, self._out = self._out, []
+        return out
+
+    def step(self, motion: Motion) -> tuple[int, ...]:
+        """One loop: the pulses of its outputs, 16 of them, after physics told how the vehicle moves."""
+        dt_s = max(motion.time_s - self.motion.time_s, 0.0)
+        self.motion = motion
+        self._calibrate(float(motion.p_WB_m[2]))
+        self._watch()
+        for script in self._scripts:
+            script.step()
+        self._loops, demands = fly(self.mode, self._loops, self._demands, motion, self.parameters, dt_s or 1e-3)
+        motors: list[int] | None = None
+        if self.motor_test.over(self.now_s):
+            self.say(_INFO, "Motor test timed out!")
+            self.disarm("motor test")
+        if self.armed and self.motor_test.pulses_us is not None:
+            motors = self.motor_test.pulses_us
+        elif self.armed:
+            factors = factors_of(self.parameters)
+            motors = motor_pulses_us(demands, factors, directions_of(self.parameters, len(factors)))
+        else:
+            self._loops = Loops()
+        self.pulses_us = self._servos.step(motors, self.parameters)
+        for message in self.timetable.due(self.now_s):
+            self.send(BUILDERS[message](self))
+        for _ in range(min(_LISTED_PER_LOOP, len(self._to_list))):
+            self.send(parameter(self, self._to_list.popleft()))
+        return self.pulses_us
+
+    def _calibrate(self, depth_m: float) -> None:
+        """Take the depth at the start for 0, and any less for it later on: less than no depth cannot be."""
+        if self._zeroed and depth_m >= self.zero_depth_m:
+            return
+        fixed = not self._zeroed and self._calibrated_m is not None
+        self.zero_depth_m = self._calibrated_m if fixed and self._calibrated_m is not None else depth_m
+        self._zeroed = True
+
+    # What messages and failsafes do.
+
+    def reboot(self) -> None:
+        """Start anew: disarmed, in MANUAL, nobody heard; parameters and files stay."""
+        self._began_s = self.motion.time_s
+        self.armed, self.mode = False, int(MANUAL)
+        self._loops, self._demands = Loops(), Demands()
+        self._servos = Servos(self.loop_hz)
+        self.motor_test = MotorTest(len(factors_of(self.parameters)))
+        self.timetable, self.joystick = Timetable(), Joystick()
+        self._zeroed = False
+        self._station_s = None
+        self._sticks_s = None
+        self._to_list = deque()
+        self._told = {}
+        self._mav.srcSystem = self.system
+        self.start_scripts()
+
+    def start_scripts(self) -> None:
+        """Stop all scripts and start those on the card, if scripting is on."""
+        self.parameters.forget_tables()
+        self._scripts = []
+        if self.parameters.value("SCR_ENABLE", otherwise=0.0) == 1.0:
+            self._scripts = [Script(text, name, self) for name, text in self.files.scripts().items()]
+
+    @property
+    def script_faults(self) -> list[str]:
+        """Why scripts were stopped."""
+        return [script.fault for script in self._scripts if script.fault is not None]
+
+    def to_scripts(self, raw: str, message: int) -> None:
+        """Give scripts a message that they may have asked for."""
+        for script in self._scripts:
+            script.hear(raw, message, self.boot_ms)
+
+    def arm(self) -> bool:
+        """Arm the motors; False in a mode that is not flown, or where no button of the sticks disarms."""
+        if self.mode not in MODES:
+            return False
+        if not can_disarm(self.parameters):
+            self.say(_CRITICAL, "Arm: Must assign a disarm or arm_toggle button")
+            return False
+        if not self.armed:
+            self.armed, self._loops = True, Loops()
+            # Sticks and heartbeats from before count from now: a pilot has as long as ever to begin.
+            self._sticks_s = self.now_s
+            self.say(_INFO, "Arming motors")
+        return True
+
+    def disarm(self, why: str) -> bool:
+        """Disarm them."""
+        if self.armed:
+            self.armed, self._demands = False, Demands()
+            self.say(_INFO, f"Disarming motors ({why})")
+        return True
+
+    def set_mode(self, mode: int) -> bool:
+        """Change the mode; False for one that the stand-in does not fly."""
+        if mode not in MODES:
+            self.say(_WARNING, f"Mode change failed: no mode {mode} here")
+            return False
+        if mode != self.mode:
+            self.mode, self._loops = mode, self._loops.entered(mode)
+        return True
+
+    def set_parameter(self, name: str, value: float) -> bool:
+        """Set a parameter as PARAM_SET does."""
+        return self.parameters.set(name, value)
+
+    def list_parameters(self) -> None:
+        """Begin to tell all parameters, some in each loop."""
+        self._to_list = deque(self.parameters)
+
+    def heard_station(self) -> None:
+        """A heartbeat of the ground station."""
+        self._station_s = self.now_s
+
+    def take_sticks(self, demands: Demands) -> None:
+        """Sticks of the pilot; they steer once armed."""
+        self._sticks_s = self.now_s
+        self._demands = demands
+
+    def _watch(self) -> None:
+        """Look after ground station and pilot while armed; a fault is told once, until it is another or over."""
+        station = ground_station(self.parameters, self._station_s, self.now_s) if self.armed else "none"
+        pilot = pilot_input(self.parameters, self._sticks_s, self.now_s) if self.armed else "none"
+        if pilot != "none":
+            self._demands = Demands()
+        faults = {"Lost ground station": station, "Lost manual control": pilot}
+        for who, action in faults.items():
+            if action not in ("none", self._told.get(who)):
+                self.say(_ERROR, f"{who}: {action}")
+            if action == "disarm":
+                self.disarm(who)
+            elif action in ("hold depth", "surface") and self.mode != ALT_HOLD:
+                self.set_mode(ALT_HOLD)
+        self._told = faults
+
+    # What scripts see; see `scripting.Board`.
+
+    def find_channel(self, function: int) -> int | None:
+        """First output, numbered from 0, with a function."""
+        return find_channel(self.parameters, function)
+
+    def output_us(self, function: int) -> int | None:
+        """Pulse on that output now."""
+        channel = self.find_channel(function)
+        return None if channel is None else self.pulses_us[channel]
+
+    def override(self, channel: int, pulse_us: int, timeout_ms: int) -> None:
+        """Put a pulse on an output for so long."""
+        self._servos.override(channel, pulse_us, timeout_ms)
+
+    def say(self, severity: int, words: str) -> None:
+        """STATUSTEXT; longer words go in several, of 50 letters each and numbered."""
+        self.texts.append(words)
+        log.info("%s", words)
+        self._text_id = self._text_id % _MOST_TEXT_ID + 1
+        data = words.encode("ascii", "replace")
+        parts = [data[i : i + TEXT_LETTERS] for i in range(0, len(data), TEXT_LETTERS)] or [b""]
+        number = self._text_id if len(parts) > 1 else 0
+        for k, part in enumerate(parts[:255]):
+            self.send(mavlink.MAVLink_statustext_message(severity, part, number, k))
+
+    def say_float(self, name: str, value: float) -> None:
+        """NAMED_VALUE_FLOAT."""
+        self.send(mavlink.MAVLink_named_value_float_message(self.boot_ms, name[:10].encode("ascii", "replace"), value))
+
+
+def thrusting(pulses_us: tuple[int, ...], channels: tuple[int, ...], within_us: int = 0) -> bool:
+    """Whether an output of these channels, numbered from 1, is off the middle by more than so much; 0 is no signal."""
+    return any(p != 0 and abs(p - MIDDLE_US) > within_us for p in (pulses_us[c - 1] for c in channels))

@@ -1,0 +1,44 @@
+"""What a pilot looks at who loses it every ten seconds: how near the limits are, and what tripped."""
+
+from __future__ import annotations
+
+import pytest
+
+from bottle import Bottle
+from wakewise_ardusub.link.engagement_fsm import Facts, Limits
+from wakewise_ardusub.link.freshness_margins import Margins
+
+
+def test_ages_are_those_of_the_last_minute() -> None:
+    """Of a hundred looks the one that is far off is left out; what is over its limit is marked."""
+    margins = Margins()
+    assert margins.words(Limits()) == ""
+    margins.looked(Facts(now_s=0.0))
+    assert margins.words(Limits()) == ""
+    for k in range(1000):
+        margins.looked(Facts(now_s=0.02 * k, pose_s=0.25 if k % 50 == 0 else 0.05, operator_s=0.04, telemetry_s=0.02))
+    assert margins.p99_s() == pytest.approx({"pose": 0.25, "sticks": 0.04, "attitude": 0.02})
+    assert margins.words(Limits()) == "p99 ms pose 250!, sticks 40, attitude 20 of 200"
+
+
+def test_each_trip_is_counted_by_its_kind() -> None:
+    """Engaged or ready, a fault is one trip; taking the sticks back and what keeps it from being ready are none."""
+    bottle = Bottle()
+    assert bottle.engage() == "engaged"
+    bottle.warden.press()
+    bottle.run(0.5)
+    assert not bottle.warden.margins.trips
+    bottle.silent.add("pose")
+    bottle.run(1.0)
+    assert bottle.warden.margins.trips == {"pose": 1}
+    bottle.silent.clear()
+    bottle.run(1.5)
+    assert bottle.warden.press() == "engaged"
+    bottle.run(0.5)
+    bottle.silent.update({"pose", "sticks"})
+    bottle.run(1.0)
+    bottle.silent.clear()
+    bottle.run(3.0)
+    assert bottle.warden.margins.trips.total() == 2
+    words = bottle.warden.margins.words(bottle.warden.limits)
+    assert "trips 2 (pose 2)" in words or "trips 2 (pose 1, operator 1)" in words

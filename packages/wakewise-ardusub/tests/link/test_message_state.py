@@ -1,0 +1,174 @@
+"""What is known after messages: of whom, what, and what not."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega
+
+from wakewise_ardusub.link.message_state import Known, Said, heard, stick_axes, tilt_of
+
+STICKS = {"target": 1, "x": 0, "y": 0, "z": 500, "r": 0, "buttons": 0}
+
+
+def after(*said: Said, known: Known | None = None) -> Known:
+    """What is known after messages, a second apart."""
+    known = known or Known(session=7)
+    for k, one in enumerate(said):
+        known = heard(known, one, 100.0 + k)
+    return known
+
+
+def beat(system: int = 1, component: int = 1, **fields: int) -> Said:
+    """A heartbeat, of an armed ArduSub in MANUAL unless told otherwise."""
+    return Said(
+        system, component, "HEARTBEAT", {"type": 12, "autopilot": 3, "base_mode": 129, "custom_mode": 19, **fields}
+    )
+
+
+def test_only_the_autopilots_heartbeat_is_the_vehicles_state():
+    """A gimbal of this vehicle and another vehicle say nothing of whether this one is armed."""
+    known = after(beat(base_mode=1), beat(component=154), beat(system=2))
+    assert known.armed is False
+    assert known.heartbeat_s == 100.0
+    assert known.components == {154}
+
+
+def test_the_mode_has_ardusubs_name():
+    """19 is MANUAL, and one without a name keeps its number."""
+    assert after(beat()).mode_name == "MANUAL"
+    assert after(beat(custom_mode=77)).mode_name == "mode 77"
+    assert Known().mode_name == ""
+
+
+@pytest.mark.parametrize(
+    ("fields", "axes"),
+    [
+        ({"x": 1000}, (1, 0, 0, 0, 0)),
+        ({"y": -1000}, (0, -1, 0, 0, 0)),
+        ({"z": 0}, (0, 0, 1, 0, 0)),
+        ({"z": 1000}, (0, 0, -1, 0, 0)),
+        ({"r": 1000}, (0, 0, 0, 1, 0)),
+        ({"s": 1000, "enabled_extensions": 1}, (0, 0, 0, 0, 1)),
+        ({"s": 1000, "enabled_extensions": 2}, (0, 0, 0, 0, 0)),
+        ({"x": 32767, "z": 32767}, (0, 0, 0, 0, 0)),
+        ({"x": 40}, (0, 0, 0, 0, 0)),
+    ],
+)
+def test_sticks_as_ardusub_has_them(fields, axes):
+    """Forward, right, down, turn, tilt; the throttle goes from 0 (down) by 500 to 1000 (up)."""
+    assert stick_axes({**STICKS, **fields}) == pytest.approx(np.array(axes, dtype=float))
+
+
+def test_sticks_beyond_full_are_nonsense():
+    """A stick at 1500 of 1000 is counted and moves nothing."""
+    known = after(Said(255, 190, "MANUAL_CONTROL", {**STICKS, "x": 1500}))
+    assert known.sticks is None
+    assert (known.garbage, known.odd) == (1, ("MANUAL_CONTROL",))
+
+
+def test_sticks_for_another_vehicle_are_not_ours():
+    """They count by their target, whoever moves them."""
+    assert after(Said(255, 190, "MANUAL_CONTROL", {**STICKS, "target": 2})).sticks is None
+
+
+def test_two_ground_stations_at_once_are_a_takeover():
+    """Sticks of two systems within a second; a station that comes back after a while is none."""
+    one, two = (Said(system, 190, "MANUAL_CONTROL", STICKS) for system in (255, 254))
+    known = heard(heard(Known(), one, 0.0), two, 0.5)
+    assert known.takeover == "sticks from two ground stations, 255 and 254"
+    assert heard(heard(Known(), one, 0.0), two, 1.5).takeover == ""
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        (Said(255, 190, "SET_MODE", {"target_system": 1, "custom_mode": 2}), "system 255 set the mode"),
+        (Said(255, 190, "COMMAND_LONG", {"target_system": 1, "command": 400}), "system 255 armed or disarmed"),
+        (Said(255, 190, "COMMAND_LONG", {"target_system": 1, "command": 300}), "system 255 started a mission"),
+        (Said(255, 190, "COMMAND_LONG", {"target_system": 1, "command": 511}), ""),
+        (Said(255, 190, "COMMAND_LONG", {"target_system": 2, "command": 400}), ""),
+        (
+            Said(255, 0, "RC_CHANNELS_OVERRIDE", {"target_system": 1, **{f"chan{i}_raw": 65535 for i in range(1, 9)}}),
+            "",
+        ),
+        (
+            Said(255, 0, "RC_CHANNELS_OVERRIDE", {"target_system": 1, **{f"chan{i}_raw": 1600 for i in range(1, 9)}}),
+            "system 255 overrides the pilot's channels",
+        ),
+    ],
+)
+def test_what_counts_as_taking_over(said, words):
+    """Orders to this vehicle by which somebody takes it into their own hands."""
+    assert after(said).takeover == words
+
+
+def test_a_rival_is_told_from_its_own_echo():
+    """Thrusts of a time that was not sent, and a heartbeat with another session's number, are somebody else's."""
+    thrusts = Said(1, 191, "SET_ACTUATOR_CONTROL_TARGET", {"time_usec": 5})
+    assert after(thrusts).duplicate
+    assert not after(thrusts, known=Known(session=7).sent(5)).duplicate
+    assert after(beat(component=191, custom_mode=8)).duplicate
+    assert not after(beat(component=191, custom_mode=7)).duplicate
+
+
+def test_ground_stations_are_known_by_their_heartbeats():
+    """One of type 6 is a ground station, whatever its id."""
+    known = after(beat(system=240, component=190, type=6, autopilot=8))
+    assert dict(known.ground) == {240: 100.0}
+
+
+def test_a_sensors_own_pose_is_preferred():
+    """While a camera's pose comes, the autopilot's estimate, which is made of it, does not stand for it."""
+    camera = Said(1, 197, "VISION_POSITION_ESTIMATE", {"x": 1.0, "y": 2.0, "z": 3.0})
+    own = Said(1, 1, "LOCAL_POSITION_NED", {"x": 9.0, "y": 9.0, "z": 9.0, "vx": 0.0, "vy": 0.0, "vz": 0.0})
+    known = heard(heard(Known(), camera, 0.0), own, 0.5)
+    assert known.place_W_m == pytest.approx([1.0, 2.0, 3.0])
+    assert heard(known, own, 1.5).place_W_m == pytest.approx([9.0, 9.0, 9.0])
+
+
+def test_depth_is_positive_down():
+    """VFR_HUD says an altitude."""
+    assert after(Said(1, 1, "VFR_HUD", {"alt": -3.5})).depth_m == 3.5
+
+
+def test_tilt_is_the_angle_of_the_body_from_upright():
+    """By roll and pitch together; of an attitude that nobody said it is not a number."""
+    said = Said(
+        1, 1, "ATTITUDE", {"roll": 0.3, "pitch": 0.4, "yaw": 1.0, "rollspeed": 0, "pitchspeed": 0, "yawspeed": 0}
+    )
+    assert tilt_of(after(said)) == pytest.approx(math.acos(math.cos(0.3) * math.cos(0.4)))
+    assert math.isnan(tilt_of(Known()))
+
+
+def test_fields_of_a_real_message():
+    """A message that pymavlink packed and read gives what was put in; fields of unwanted ones are not looked at."""
+    mav = ardupilotmega.MAVLink(None, srcSystem=1, srcComponent=1)
+    reader = ardupilotmega.MAVLink(None)
+    packed = mav.param_value_encode(b"MOT_1_DIRECTION", -1.0, 9, 900, 3).pack(mav)
+    packed += mav.named_value_float_encode(1, b"WKW_ENG", 1.0).pack(mav) + mav.system_time_encode(1, 1).pack(mav)
+    known, unwanted = Known(), None
+    for message in reader.parse_buffer(packed):
+        unwanted = Said.of(message)
+        known = heard(known, unwanted, 3.0)
+    assert dict(known.parameters) == {"MOT_1_DIRECTION": -1.0}
+    assert known.named_value("WKW_ENG", 3.5) == (1.0, 0.5)
+    assert unwanted is not None
+    assert unwanted.fields == {}
+
+
+@given(data=st.binary(max_size=400))
+@settings(max_examples=200, deadline=None)
+def test_any_bytes_leave_what_is_known_sound(data):
+    """Whatever pymavlink makes of noise, nothing is raised and numbers that are kept are numbers."""
+    reader = ardupilotmega.MAVLink(None)
+    reader.robust_parsing = True
+    known = Known()
+    for message in reader.parse_buffer(data) or []:
+        if message.get_type() != "BAD_DATA":
+            known = heard(known, Said.of(message), 1.0)
+    assert known.place_W_m is None or np.isfinite(known.place_W_m).all()

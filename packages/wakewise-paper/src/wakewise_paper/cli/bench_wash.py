@@ -1,0 +1,150 @@
+"""Shows what `wakewise bench gentle` found: the headline, a table for each scenario, the levers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import typer
+
+from wakewise.ui.cli.console import print_table, shown
+
+_COLUMNS = (
+    ("target_speed_mean_m_s", "mm/s", 1e3),
+    ("target_speed_p95_m_s", "p95", 1e3),
+    ("exposure_speed_mean_m_s", "exposing", 1e3),
+    ("exceedance_1cm_s_pct", "%>1cm/s", 1.0),
+    ("bed_shear_p95_Pa", "bed Pa", 1.0),
+    ("ray_optical_depth", "rays/1000", 1e3),
+    ("sway_rms_mm", "sway mm", 1.0),
+    ("position_rmse_mm", "body mm", 1.0),
+    ("camera_rmse_mm", "cam. mm", 1.0),
+    ("energy_kJ", "kJ", 1.0),
+    ("solve_ms_p99", "ms", 1.0),
+)
+"""What people are shown of each method; the rest is in the JSON."""
+
+_BARS = (
+    ("reduction_vs_dp_pct", "less wash than dp, %", ">= 80"),
+    ("reduction_vs_unaware_pct", "less than unaware, %", ">= 80"),
+    ("worst_world_pct", "less than dp in the worst scenario, %", ">= 50"),
+    ("reduction_vs_bow_rule_pct", "less than the bow rule, %", ">= 20"),
+    ("position_ok", "camera where dp has it", "yes"),
+    ("energy_ratio", "energy over dp's", "<= 1.3"),
+    ("silt_rays_reduction_pct", "less silt on the rays, %", ">= 60"),
+    ("sway_reduction_pct", "less sway at the shutter, %", ">= 60"),
+    ("wrong_current_keeps_pct", "kept with a wrong current, %", ">= 67"),
+)
+_CALM = (
+    ("wash_ratio", "wash over dp's", "<= 1"),
+    ("silt_ratio", "silt on the rays over dp's", "<= 1.05"),
+    ("energy_ratio", "energy over dp's", "<= 1.05"),
+)
+
+
+def show_gentle(result: dict[str, Any]) -> None:
+    """The headline first, then a table per scenario with a row per method, then levers and the paper's world."""
+    from rich.table import Table
+
+    _show_headline(result["headline"])
+    for name, scenario in result["scenarios"].items():
+        seeds = max((row["flights"] for row in scenario["methods"].values()), default=0)
+        table = Table(title=f"{name}: {scenario['title']}; {seeds} seeds", title_justify="left")
+        table.add_column("method", no_wrap=True)
+        for _, title, _ in _COLUMNS:
+            table.add_column(title, justify="right")
+        for title in ("less than dp", "worst"):
+            table.add_column(title, justify="right")
+        for method, row in scenario["methods"].items():
+            cells = [shown(None if row[key] is None else scale * row[key]) for key, _, scale in _COLUMNS]
+            worst = row.get("worst_seed_vs_dp_pct")
+            less = reduction(row.get("reduction_vs_dp_pct"), row.get("reduction_vs_dp_interval_pct"))
+            table.add_row(method, *cells, less, reduction(worst))
+        print_table(table)
+    levers = sorted({lever for scenario in result["scenarios"].values() for lever in scenario["levers"]})
+    if levers:
+        _show_levers(result["scenarios"], levers)
+    if result["bound"]:
+        _show_bound(result["bound"])
+    for flow, figures in result["flows"].items():
+        less = ", ".join(
+            f"{reduction(*(figures[f'reduction_vs_{rival}_{what}pct'] for what in ('', 'interval_')))} than {rival}"
+            for rival in ("dp", "unaware")
+        )
+        typer.echo(f"{flow} (circular: the planner's own model is the water): wake-aware moves less by {less}")
+    typer.echo(
+        f"{result['flown']} flights flown, {result['flights'] - result['flown'] - result['failed']} known, "
+        f"{result['failed']} failed"
+    )
+    for failure in result["failures"]:
+        typer.echo(f"failed: {failure['flow']}, {failure['name']}, seed {failure['seed']}: {failure['reason']}")
+
+
+def _show_headline(headline: dict[str, Any]) -> None:
+    """What was chosen beforehand, and its bars."""
+    from rich.table import Table
+
+    beside = headline["beside"]
+    table = Table(title="headline: flights in which dp leaves more than 10 mm/s, less than 5", title_justify="left")
+    for title in ("", "figure", "wake-aware", "95 %", *beside, "bar"):
+        table.add_column(title, justify="left" if title in ("", "figure") else "right")
+    for part, bars in (("trouble", _BARS), ("calm", _CALM)):
+        own = headline[part]
+        for place, (key, words, bar) in enumerate(bars):
+            ends = own.get(key.removesuffix("_pct") + ("_interval_pct" if key.endswith("_pct") else "_interval"))
+            interval = "" if ends is None else f"{shown(ends[0])} to {shown(ends[1])}"
+            others = [shown(beside[name][part].get(key)) for name in beside]
+            label = f"{part}, {own['flights']} flights" if place == 0 else ""
+            table.add_row(label, words, shown(own.get(key)), interval, *others, bar)
+    print_table(table)
+    most = headline["everywhere"]
+    for name, words in (("wash", "wash"), ("silt_rays", "silt on the rays"), ("sway", "sway")):
+        if most[f"{name}_most_ratio"] is not None:
+            typer.echo(
+                f"worst anywhere: {words} {shown(most[f'{name}_most_ratio'])} times dp's, {most[f'{name}_most_where']}"
+            )
+
+
+def _show_levers(scenarios: dict[str, Any], levers: list[str]) -> None:
+    """What each lever is worth, scenario by scenario: left out, alone."""
+    from rich.table import Table
+
+    table = Table(title="levers: slower by, all others on / alone", title_justify="left")
+    table.add_column("scenario")
+    for lever in levers:
+        table.add_column(lever, justify="right", no_wrap=True)
+    for name, scenario in scenarios.items():
+        cells = [scenario["levers"].get(lever, {}) for lever in levers]
+        table.add_row(name, *(f"{reduction(c.get('left_out_pct'))} / {reduction(c.get('alone_pct'))}" for c in cells))
+    print_table(table)
+
+
+def _show_bound(bound: dict[str, Any]) -> None:
+    """The most that sharing thrusts out could gain: less wash than `dp` as flown, energy over the least thrusts'."""
+    from rich.table import Table
+
+    from wakewise_paper.wash_reduction.energy_optimum import ENERGIES
+
+    table = Table(title="the most that sharing thrusts out could gain: less than dp as flown", title_justify="left")
+    table.add_column("flight", no_wrap=True)
+    for title in ("dp mm/s", *(f"{name} x energy" for name in ENERGIES), "rule", "belief", "belief, any"):
+        table.add_column(title, justify="right")
+    rows = {**bound["flights"], **({} if bound["trouble"] is None else {"all in trouble": bound["trouble"]})}
+    for flight, row in rows.items():
+        speed = row.get("dp_m_s")
+        most = [
+            f"{reduction(row[f'attained_{name}_less_pct'])} to {reduction(row[f'bound_{name}_less_pct'])}"
+            for name in ENERGIES
+        ]
+        named = [
+            f"{reduction(row[f'{name}_less_pct'])}, {shown(row[f'{name}_energy'])}"
+            for name in ("rule", "belief", "belief_any")
+        ]
+        table.add_row(flight, shown(None if speed is None else 1e3 * speed), *most, *named)
+    print_table(table)
+
+
+def reduction(value: float | None, interval: tuple[float, float] | None = None) -> str:
+    """A share in percent, with its interval."""
+    if value is None:
+        return "—"
+    return f"{value:.0f} %" if interval is None else f"{value:.0f} % ({interval[0]:.0f} to {interval[1]:.0f})"

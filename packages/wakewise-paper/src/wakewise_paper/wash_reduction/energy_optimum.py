@@ -1,0 +1,354 @@
+"""The most that sharing thrusts out could gain in a flight, by the tank's own water: no controller's belief is in it.
+
+A flight of `dp` is taken as it was, its true way and the wrench that its thrusters made, and its water is made anew
+with other thrusts of the same wrench (`wakewise.simulation.tank.prescribed_motion`): each of some 80 sharings
+(`sharings.py`), the bow rule's, and what the belief of `wake-aware` would have flown, with its bound on power and
+without. Then one who knows all of these waters chooses a sharing for each `STRETCH_S` of the flight within a bound on
+energy (`choosing.py`).
+
+Two numbers hold the answer between them. *bound*: the stretches' own waters put together, each as if its sharing had
+been flown before, too, and chosen by the very gusts it is judged by: more than can be had. *attained*: the choice, led
+in water with other gusts, after single stretches were tried anew: what knowing all does gain. What neither sees: other
+motions (leaning a body, trim, a mission's own choices), and sharings that change within a stretch other than with the
+wrench; these could pass it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import polars as pl
+
+from wakewise.allocation import Layout, PowerLaw, least_thrusts
+from wakewise.control.bow_rule import bow_layout
+from wakewise.control.levers import with_bed_points
+from wakewise.control.loop import vehicle_layout
+from wakewise.control.spare import watching
+from wakewise.control.thrift import power_law
+from wakewise.control.watch import EVERY_S, JUMP_EVERY_S, Watch
+from wakewise.core.arrays import Array, IntArray
+from wakewise.core.errors import InputError
+from wakewise.core.interfaces import BodyState, Witness
+from wakewise.operation import Parts, fly
+from wakewise.operation.loop import Step
+from wakewise.robot.vehicles import Vehicle
+from wakewise.scene.missions import SETTLING
+from wakewise.simulation.tank.prescribed_motion import LedTank, Way
+from wakewise.simulation.tank.tank import tank_ambient, tank_points
+from wakewise.simulation.tank.world import TankWorld
+from wakewise.wake import bed_of
+from wakewise_paper.wash_reduction.allocations import sharings, split
+from wakewise_paper.wash_reduction.energy_bound import chosen, sum_of
+from wakewise_paper.wash_reduction.flight import Trial, parts_of
+
+ENERGIES: dict[str, float] = {"1.05": 1.05, "1.15": 1.15, "1.3": 1.3, "1.5": 1.5, "1.7": 1.7, "any": np.inf}
+"""Bounds on energy over that of the least thrusts, by what they are called."""
+STRETCH_S = 5.0
+"""About as long as a jet needs to the target."""
+LOOK_STEPS = 5
+"""Steps of the water, 0.05 s each, between two looks at the target."""
+LAGS_S = (0.0, 2.5, 5.0)
+"""How long after a stretch its water is looked for: a choice is made by each, the best is kept."""
+SMOOTH_S = 1.0
+"""Wrenches are means over so long: what is shared out is what motion needs, not its noise."""
+TRIED = 4
+"""Sharings that each stretch is tried anew with, the least wash first."""
+SEARCHED = ("1.3", "any")
+"""Bounds on energy for which stretches are tried anew; the others' choices stay as they were made."""
+FRESH_GUSTS = (1, 2)
+"""Seeds of the gusts in which a choice is judged, for the mean of them; it is made by those of seed 0."""
+
+Led = Callable[[IntArray], tuple[float, float]]
+"""`picks -> mean speed in m/s, energy`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoundTrial:
+    """One flight whose sharings are judged; hashable, so that it can be handed to a worker.
+
+    `duration_s` is as in `Trial`.
+    """
+
+    scenario: str
+    seed: int
+    duration_s: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Flown:
+    """A flight of `dp` as its water needs it, at the water's own steps.
+
+    `least_N`, shape (k, n), are the least true thrusts of its wrench without noise; `wrench_B`, shape (k, 6), what the
+    controller asked for; `estimates` what the estimator said, each `EVERY_S`; `judged_s` when settling had ended.
+    """
+
+    parts: Parts
+    vehicle: Vehicle
+    layout: Layout
+    led: LedTank
+    least_N: Array
+    wrench_B: Array
+    estimates: list[BodyState]
+    judged_s: float
+    wash_m_s: float
+    power_W: float
+
+
+def fly_bound(trial: BoundTrial) -> dict[str, float | None]:
+    """What sharings give in one flight.
+
+    Keys, speeds being means at the target in m/s, energies over that of the least thrusts: `dp_m_s` as flown;
+    `least_m_s` the same led without the noise of its wrench; for each of `ENERGIES`
+    `bound_1.3_m_s`, `bound_1.3_energy`, `attained_1.3_m_s`, `attained_1.3_energy`; `rule_m_s`, `rule_energy`, None
+    where the rule does not fit; `belief_*` and `belief_any_*` what `wake-aware` believes best on the way of `dp`, with
+    its bound on power and without; `sharings`, how many there were; `dp_power_W`, `least_power_W`, `cpu_s`.
+    """
+    began = time.process_time()
+    flown = fly_dp(trial)
+    grid, named = candidates(flown)
+    judge = Judge.of(flown, grid)
+    found: dict[str, float | None] = {
+        "dp_m_s": flown.wash_m_s,
+        "dp_power_W": flown.power_W,
+        "least_m_s": judge.judged(judge.throughout(0))[0],
+        "least_power_W": float(judge.power_W[0].mean()),
+        "sharings": float(len(grid)),
+    }
+    for name in ("rule", "belief", "belief_any"):
+        number = named.get(name)
+        told = (None, None) if number is None else judge.judged(judge.throughout(number))
+        found[f"{name}_m_s"], found[f"{name}_energy"] = told
+    found |= attained(judge)
+    found["cpu_s"] = time.process_time() - began
+    return found
+
+
+def fly_dp(trial: BoundTrial) -> Flown:
+    """Fly `dp` and keep what its water needs.
+
+    Raises
+    ------
+    InputError
+        If the scenario is not flown in the tank.
+    """
+    parts = parts_of(Trial(scenario=trial.scenario, method="dp", seed=trial.seed))
+    world = parts.world
+    if not isinstance(world, TankWorld):
+        raise InputError(f"bound: {trial.scenario} is not flown in the tank")
+    every, estimates = round(EVERY_S * parts.scenario.control.rate_hz), []
+    seen: list[int] = []
+
+    def heard(step: Step, witness: Witness | None) -> None:  # noqa: ARG001
+        if len(seen) % every == 0:
+            estimates.append(step.estimate)
+        seen.append(1)
+
+    steps = fly(parts, checked=False, water_every_s=0.25, duration_s=trial.duration_s, watch=heard).steps
+    times = steps["time_s"].to_numpy()
+    state = [steps.select(f"true_{name}" for name in names).to_numpy() for names in _STATE]
+    way = Way(times_s=times, p_WB_m=state[0], q_WB=state[1], nu_B=state[2])
+    led = LedTank(
+        vehicle=world.vehicle,
+        target=world.target,
+        settings=world.settings,
+        ambient=tank_ambient(world.settings, world.draw()),
+        way=way,
+        points_W_m=tank_points(world.target, world.draw()),
+    )
+    layout = vehicle_layout(world.vehicle)
+    thrusts = steps.select(f"thrust_{i + 1}_N" for i in range(layout.B.shape[1])).to_numpy()
+    asked = steps.select(_WRENCH).to_numpy()
+    rows = round(SMOOTH_S * parts.scenario.control.rate_hz) | 1
+    least, _ = split(layout, _at(led.times_s, times, smoothed(thrusts, rows)))
+    judged = steps.filter(pl.col("leg") != SETTLING)
+    return Flown(
+        parts=parts,
+        vehicle=world.vehicle,
+        layout=layout,
+        led=led,
+        least_N=least,
+        wrench_B=_at(led.times_s, times, smoothed(asked, rows)),
+        estimates=estimates,
+        judged_s=float(judged["time_s"][0]),
+        wash_m_s=float(judged["target_speed_mean_m_s"].to_numpy().mean()),
+        power_W=float(judged["power_W"].to_numpy().mean()),
+    )
+
+
+def candidates(flown: Flown) -> tuple[Array, dict[str, int]]:
+    """Thrusts of all sharings of a flight, shape (j, k, n), the least first, and the numbers of those with a name."""
+    rows, named = list(sharings(flown.layout, flown.least_N)), {}
+    try:
+        rule = bow_layout(flown.vehicle)
+    except InputError:
+        rule = None
+    if rule is not None:
+        named["rule"] = len(rows)
+        rows.append(np.array([least_thrusts(rule, wrench).thrusts_N for wrench in flown.least_N @ rule.B.T]))
+    parts = flown.parts
+    region = with_bed_points(parts.region, parts.control.levers, bed_of(parts.wake))
+    watch = watching(parts.vehicle, region, parts.wake, parts.control)
+    for name, one in (("belief", watch), ("belief_any", replace(watch, sharer=replace(watch.sharer, law=None)))):
+        named[name] = len(rows)
+        rows.append(flown.least_N + believed(one, flown))
+    return np.array(rows), named
+
+
+def believed(watch: Watch, flown: Flown) -> Array:
+    """Spare thrusts that a belief chooses on the flight's way, as they are given, shape (k, n).
+
+    Shares are sought as often as in flight, from the same estimates, for the wrench without its noise.
+    """
+    times, n = flown.led.times_s, flown.least_N.shape[1]
+    thrusts, given, jumps = np.zeros(n), [], round(JUMP_EVERY_S / EVERY_S)
+    asked_s: Array = np.arange(len(flown.estimates), dtype=np.float64) * EVERY_S
+    asked = _at(asked_s, times, flown.wrench_B)
+    for k, (estimate, wrench) in enumerate(zip(flown.estimates, asked, strict=True)):
+        shared = watch.share_out(wrench, estimate, thrusts)
+        if shared is not None:
+            thrusts = shared[0].thrusts_N
+            if k % jumps == 0:
+                anew = watch.jump(wrench, estimate, thrusts, shared[1])
+                thrusts = thrusts if anew is None else anew[0].thrusts_N
+        given.append(flown.vehicle.thrust_gains * thrusts)
+    return split(flown.layout, _at(times, asked_s, np.array(given)))[1]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Judge:
+    """What each sharing of a flight does to its water, look by look, and what it costs.
+
+    `sharings_N` has shape (j, k, n); `speeds_m_s` and `power_W`, shape (j, l), are those of the looks that count,
+    at `looks_s`, shape (l,); `stretch`, shape (l,), says which stretch each look is in, `steps_stretch`, shape (k,),
+    the same of the water's steps (those of settling are in the first).
+    """
+
+    led: LedTank
+    sharings_N: Array
+    speeds_m_s: Array
+    power_W: Array
+    settling_speeds: int
+    looks_s: Array
+    steps_stretch: IntArray
+    stretch: IntArray
+
+    @classmethod
+    def of(cls, flown: Flown, grid: Array) -> Judge:
+        """Lead the flight with each sharing."""
+        led, times = flown.led, flown.led.times_s
+        looks = times[LOOK_STEPS::LOOK_STEPS]
+        first = int(np.searchsorted(looks, flown.judged_s - 1e-9))
+        count = max(1, round((looks[-1] - flown.judged_s) / STRETCH_S))
+        ends = np.linspace(flown.judged_s, looks[-1] + 1e-9, count + 1)[1:-1]
+        law: PowerLaw = power_law(flown.vehicle)
+        return cls(
+            led=led,
+            sharings_N=grid,
+            speeds_m_s=np.array([led.wash_m_s(thrusts, LOOK_STEPS, 0)[first:] for thrusts in grid]),
+            power_W=law.power_W(grid)[:, LOOK_STEPS::LOOK_STEPS][:, first:],
+            settling_speeds=first,
+            looks_s=looks[first:],
+            steps_stretch=np.searchsorted(ends, times, side="right"),
+            stretch=np.searchsorted(ends, looks[first:], side="right"),
+        )
+
+    def wash_m_s(self, number: int) -> float:
+        """Mean speed of one sharing throughout."""
+        return float(self.speeds_m_s[number].mean())
+
+    def energy(self, number: int) -> float:
+        """Energy of one sharing throughout over that of the least thrusts."""
+        return float(self.power_W[number].mean() / self.power_W[0].mean())
+
+    def by_stretch(self, lag_s: float = 0.0) -> tuple[Array, Array]:
+        """What each sharing adds to the flight's means in each stretch, wash in m/s and energy, shape (b, j) each.
+
+        The water is looked at `lag_s` later; where the flight has ended by then, at its end.
+        """
+        b, looks = int(self.stretch.max()) + 1, len(self.looks_s)
+        later = np.minimum(np.searchsorted(self.looks_s, self.looks_s + lag_s - 1e-9), looks - 1)
+        member = (self.stretch[None, :] == np.arange(b)[:, None]).astype(np.float64) / looks
+        return member @ self.speeds_m_s[:, later].T, member @ self.power_W.T / float(self.power_W[0].mean())
+
+    def throughout(self, number: int) -> IntArray:
+        """The choice of one sharing in all stretches, shape (b,)."""
+        return np.full(int(self.stretch.max()) + 1, number)
+
+    def judged(self, picks: IntArray) -> tuple[float, float]:
+        """As `led_by`, the mean over gusts that had no part in any choice."""
+        found = [self.led_by(picks, gusts) for gusts in FRESH_GUSTS]
+        return float(np.mean([wash for wash, _ in found])), found[0][1]
+
+    def led_by(self, picks: IntArray, gusts: int) -> tuple[float, float]:
+        """Mean speed and energy of a flight with these sharings, one for each stretch."""
+        thrusts = self.sharings_N[picks[self.steps_stretch], np.arange(len(self.steps_stretch))]
+        wash = self.led.wash_m_s(thrusts, LOOK_STEPS, gusts)[self.settling_speeds :]
+        return float(wash.mean()), sum_of(self.by_stretch()[1], picks)
+
+
+def attained(judge: Judge) -> dict[str, float | None]:
+    """What the bounds on energy allow: `bound_*` by putting stretches together, `attained_*` by leading the choice."""
+    found: dict[str, float | None] = {}
+    waters = {lag: judge.by_stretch(lag) for lag in LAGS_S}
+    tried: dict[tuple[int, ...], tuple[float, float]] = {}
+
+    def led(picks: IntArray) -> tuple[float, float]:
+        key = tuple(picks.tolist())
+        if key not in tried:
+            tried[key] = judge.led_by(picks, 0)
+        return tried[key]
+
+    for name, most in ENERGIES.items():
+        choices = {lag: chosen(wash, energy, most) for lag, (wash, energy) in waters.items()}
+        lag = min(choices, key=lambda lag: sum_of(waters[lag][0], choices[lag]))
+        found[f"bound_{name}_m_s"], found[f"bound_{name}_energy"] = (sum_of(v, choices[lag]) for v in waters[lag])
+        starts = [*choices.values(), _throughout(judge, most)]
+        best = min(starts, key=lambda picks: led(picks)[0])
+        if name in SEARCHED:
+            _tried_anew(judge, best, most, led)
+    for name, most in ENERGIES.items():
+        within = [(wash, key) for key, (wash, energy) in tried.items() if energy <= most + 1e-9]
+        picks = np.array(min(within)[1], dtype=np.int64)
+        found[f"attained_{name}_m_s"], found[f"attained_{name}_energy"] = judge.judged(picks)
+    return found
+
+
+def _throughout(judge: Judge, most: float) -> IntArray:
+    """The best sharing that is flown throughout within a bound on energy."""
+    own = [number for number in range(len(judge.sharings_N)) if judge.energy(number) <= most + 1e-9]
+    best = min(own, key=judge.wash_m_s)
+    return judge.throughout(best)
+
+
+def _tried_anew(judge: Judge, picks: IntArray, most: float, led: Led) -> None:
+    """Try other sharings in single stretches, from the first to the last, and go on from what is better."""
+    wash, energy = judge.by_stretch(LAGS_S[1])
+    for b in range(len(picks)):
+        for other in np.argsort(wash[b])[:TRIED]:
+            anew = picks.copy()
+            anew[b] = other
+            if sum_of(energy, anew) <= most + 1e-9 and led(anew)[0] < led(picks)[0]:
+                picks = anew
+
+
+def smoothed(values: Array, rows: int) -> Array:
+    """Means over an odd number of rows about each, shape (k, m); at the ends the first and the last go on."""
+    half = rows // 2
+    ahead = np.cumsum(np.pad(values, ((half + 1, half), (0, 0)), mode="edge"), axis=0)
+    return np.asarray((ahead[rows:] - ahead[:-rows]) / rows)
+
+
+def _at(times_s: Array, known_s: Array, values: Array) -> Array:
+    """Values, shape (k, m), at other times."""
+    return np.stack([np.interp(times_s, known_s, column) for column in values.T], axis=1)
+
+
+_STATE = (
+    ("x_m", "y_m", "z_m"),
+    ("qw", "qx", "qy", "qz"),
+    ("u_m_s", "v_m_s", "w_m_s", "p_rad_s", "q_rad_s", "r_rad_s"),
+)
+_WRENCH = ("wrench_X_N", "wrench_Y_N", "wrench_Z_N", "wrench_K_Nm", "wrench_M_Nm", "wrench_N_Nm")

@@ -1,0 +1,373 @@
+"""Kernels that look for the thrusts of least cost among all that make the same wrench.
+
+The cost of thrusts T is f(T) = w_D s' G s + w_u |T|^2 + w_p |T - T_previous|^2 with s_i = sqrt|T_i| in the slot of the
+jet that thruster i then sends out (G is 2n x 2n: jets of T > 0 first, jets of T < 0 after).
+
+Along a line T = base + t direction, between two sign changes of any thrust, f falls into three parts:
+
+- a parabola: |T_i| is linear there, and the two square terms are squares;
+- concave: geometric means sqrt(T_i T_j) with G_ij > 0 (the geometric mean of two positive linear functions is concave);
+- convex: the same with G_ij < 0.
+
+On an interval the concave part lies above its chord and the convex part above its end tangents, so the least value of
+parabola + chord + tangents is a lower bound on f. `line_minimum` splits intervals until no bound lies below the best
+value found: the minimum is global, and the gap is proven, not hoped for.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.core.jit.njit import assign, njit
+
+TOLERANCE = 1e-7
+"""Relative gap at which a line search stops: far below what a thruster can reproduce."""
+
+_DEPTH = 64
+_EVALUATIONS = 2000
+_STEEP = 1e300
+
+
+@njit(apart=True)
+def cost(G: Array, thrusts: Array, previous: Array, weights: Array) -> float:
+    """f(T) in the units of the weights; `weights` is (w_D, w_u, w_p)."""
+    n = thrusts.size
+    total = 0.0
+    for i in range(n):
+        slot_i = i if thrusts[i] > 0.0 else i + n
+        size_i = abs(thrusts[i])
+        total += weights[0] * G[slot_i, slot_i] * size_i
+        for j in range(i):
+            slot_j = j if thrusts[j] > 0.0 else j + n
+            total += 2.0 * weights[0] * G[slot_i, slot_j] * np.sqrt(size_i * abs(thrusts[j]))
+        total += weights[1] * thrusts[i] ** 2 + weights[2] * (thrusts[i] - previous[i]) ** 2
+    return total
+
+
+@njit
+def box_range(base: Array, direction: Array, lower: Array, upper: Array) -> tuple[float, float]:
+    """Interval of t that keeps base + t direction within the limits; empty (low > high) if there is none."""
+    low, high = -np.inf, np.inf
+    for i in range(base.size):
+        slope = direction[i]
+        if abs(slope) < 1e-12:
+            continue
+        first, second = (lower[i] - base[i]) / slope, (upper[i] - base[i]) / slope
+        low = max(low, min(first, second))
+        high = min(high, max(first, second))
+    return low, high
+
+
+@njit
+def _curved(t: float, a: Array, b: Array, cross: Array, single: Array, root: Array) -> tuple[float, float, float]:
+    """Concave value, convex value and slope of the convex part at t, for |T_i| = a_i + b_i t."""
+    m = a.size
+    concave = 0.0
+    convex = 0.0
+    slope = 0.0
+    for i in range(m):
+        x = a[i] + b[i] * t
+        root[i] = np.sqrt(x) if x > 1e-14 else 0.0
+    for i in range(m):
+        if single[i] > 0.0:
+            concave += single[i] * root[i]
+        elif single[i] < 0.0:
+            convex += single[i] * root[i]
+            slope = slope + single[i] * b[i] / (2.0 * root[i]) if root[i] > 1e-6 else _STEEP
+        for j in range(i):
+            c = cross[i, j]
+            if c > 0.0:
+                concave += c * root[i] * root[j]
+            elif c < 0.0:
+                convex += c * root[i] * root[j]
+                if root[i] > 1e-6 and root[j] > 1e-6:
+                    slope += 0.5 * c * (b[i] * root[j] / root[i] + b[j] * root[i] / root[j])
+                else:
+                    slope = _STEEP
+    return concave, convex, slope
+
+
+@njit
+def _floor(low: float, high: float, a: Array, b: Array, cross: Array, single: Array) -> float:
+    """Crude lower bound of the convex part on [low, high]: every root at its largest."""
+    m = a.size
+    root = np.empty(m)
+    total = 0.0
+    for i in range(m):
+        root[i] = np.sqrt(max(a[i] + b[i] * low, a[i] + b[i] * high, 0.0))
+        total += min(single[i], 0.0) * root[i]
+        for j in range(i):
+            total += min(cross[i, j], 0.0) * root[i] * root[j]
+    return total
+
+
+@njit
+def _lowest(linear: float, square: float, low: float, high: float) -> tuple[float, float]:
+    """Where linear t + square t^2 (square >= 0) is least on [low, high], and that value."""
+    straight = low if linear > 0.0 else high
+    t = min(max(-linear / (2.0 * square), low), high) if square > 0.0 else straight
+    return t, linear * t + square * t * t
+
+
+@njit
+def _bound(
+    a: float, left: Array, b: float, right: Array, constant: float, linear: float, square: float
+) -> tuple[float, float]:
+    """Lower bound of f on [a, b] and where it is reached; `left`, `right` hold (concave, convex, convex slope)."""
+    chord = (right[0] - left[0]) / (b - a)
+    offset = constant + left[0] - chord * a
+    slope = linear + chord
+    left_ok, right_ok = abs(left[2]) < _STEEP, abs(right[2]) < _STEEP
+    if not left_ok and not right_ok:
+        return 0.5 * (a + b), -np.inf
+    meet = 0.5 * (a + b)
+    if left_ok and right_ok and right[2] - left[2] > 1e-14 * (abs(left[2]) + abs(right[2])):
+        meet = (left[1] - left[2] * a - right[1] + right[2] * b) / (right[2] - left[2])
+        meet = min(max(meet, a), b)
+    elif left_ok != right_ok:
+        meet = b if left_ok else a
+    t_best, best = a, np.inf
+    if left_ok and meet > a:
+        t, value = _lowest(slope + left[2], square, a, meet)
+        t_best, best = t, value + offset + left[1] - left[2] * a
+    if right_ok and meet < b:
+        t, value = _lowest(slope + right[2], square, meet, b)
+        value += offset + right[1] - right[2] * b
+        if value < best:
+            t_best, best = t, value
+    return t_best, best
+
+
+@njit(apart=True)
+def line_minimum(
+    G: Array,
+    base: Array,
+    direction: Array,
+    counted: Array,
+    low: float,
+    high: float,
+    previous: Array,
+    weights: Array,
+    incumbent: float,
+) -> tuple[float, float, float]:
+    """Global minimum of f(base + t direction) over t in [low, high].
+
+    Parameters
+    ----------
+    G : ndarray, shape (2 n, 2 n)
+    base, direction, previous : ndarray, shape (n,)
+    counted : ndarray of bool, shape (n,)
+        Which of the thrusters that do not move along the line enter f through their cross terms; terms that hold no
+        moving thruster are constant and left out.
+    weights : ndarray, shape (3,)
+        (w_D, w_u, w_p).
+    incumbent : float
+        A value of f to beat (infinite if none); t is NaN when the line has nothing lower.
+
+    Returns
+    -------
+    t, value, gap : float
+        `value` (without the constant terms) exceeds the true minimum of the line by at most `gap`.
+    """
+    n = base.size
+    moving, m = np.empty(n, np.int64), 0
+    for i in range(n):
+        if abs(direction[i]) >= 1e-12:
+            moving[m] = i
+            m += 1
+    slots = np.empty(m, np.int64)
+    a, b, single, root = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
+    cross = np.empty((m, m))
+    breaks = np.empty(m + 2)
+    breaks[0] = low
+    count = 1
+    for i in range(n):
+        if abs(direction[i]) < 1e-12:
+            continue
+        t = -base[i] / direction[i]
+        if low < t < high:
+            breaks[count] = t
+            count += 1
+    breaks[count] = high
+    count += 1
+    for i in range(2, count):  # in order; a few, so that no sorting of NumPy's need be compiled
+        t, j = breaks[i], i
+        while j > 0 and breaks[j - 1] > t:
+            breaks[j] = breaks[j - 1]
+            j -= 1
+        breaks[j] = t
+    square = 0.0
+    square_linear = 0.0
+    square_constant = 0.0
+    for i in range(n):
+        if abs(direction[i]) < 1e-12:
+            continue
+        square += (weights[1] + weights[2]) * direction[i] ** 2
+        square_linear += 2.0 * direction[i] * ((weights[1] + weights[2]) * base[i] - weights[2] * previous[i])
+        square_constant += weights[1] * base[i] ** 2 + weights[2] * (base[i] - previous[i]) ** 2
+    t_best, best = np.nan, incumbent
+    gap = 0.0
+    ends = np.empty((_DEPTH, 2))
+    lefts, rights = np.empty((_DEPTH, 3)), np.empty((_DEPTH, 3))
+    targets, bounds = np.empty(_DEPTH), np.empty(_DEPTH)
+    node = np.empty(3)
+    evaluations = 0
+    for piece in range(count - 1):
+        start, stop = breaks[piece], breaks[piece + 1]
+        if stop - start < 1e-12 and count > 2:
+            continue
+        middle = 0.5 * (start + stop)
+        constant, linear = square_constant, square_linear
+        for k in range(m):
+            i = moving[k]
+            sign = 1.0 if base[i] + middle * direction[i] > 0.0 else -1.0
+            slots[k] = i if sign > 0.0 else i + n
+            a[k], b[k] = sign * base[i], sign * direction[i]
+            constant += weights[0] * G[slots[k], slots[k]] * a[k]
+            linear += weights[0] * G[slots[k], slots[k]] * b[k]
+            single[k] = 0.0
+            for j in range(k):
+                cross[k, j] = 2.0 * weights[0] * G[slots[k], slots[j]]
+        for i in range(n):
+            if counted[i] and abs(direction[i]) < 1e-12 and base[i] != 0.0:
+                other = i if base[i] > 0.0 else i + n
+                strength = 2.0 * weights[0] * np.sqrt(abs(base[i]))
+                for k in range(m):
+                    single[k] += strength * G[slots[k], other]
+        ends[0, 0], ends[0, 1] = start, stop
+        for side in range(2):
+            t = ends[0, side]
+            node[0], node[1], node[2] = _curved(t, a, b, cross, single, root)
+            value = constant + linear * t + square * t * t + node[0] + node[1]
+            if value < best:
+                t_best, best = t, value
+            if side == 0:
+                assign(lefts[0], node)
+            else:
+                assign(rights[0], node)
+        if stop - start < 1e-12:
+            continue
+        targets[0], bounds[0] = _bound(start, lefts[0], stop, rights[0], constant, linear, square)
+        top = 1
+        while top > 0:
+            top -= 1
+            tolerance = TOLERANCE * max(abs(best), 1e-30) if best < np.inf else 0.0
+            if bounds[top] >= best - tolerance:
+                continue
+            low_t, high_t = ends[top, 0], ends[top, 1]
+            width = high_t - low_t
+            evaluations += 1
+            if top + 2 > _DEPTH or evaluations > _EVALUATIONS or width < 1e-13 * (1.0 + abs(low_t)):
+                floor = _floor(low_t, high_t, a, b, cross, single)
+                floor += constant + _lowest(linear, square, low_t, high_t)[1] + min(lefts[top, 0], rights[top, 0])
+                gap = max(gap, best - max(bounds[top], floor))
+                continue
+            t = min(max(targets[top], low_t + 0.1 * width), high_t - 0.1 * width)
+            node[0], node[1], node[2] = _curved(t, a, b, cross, single, root)
+            value = constant + linear * t + square * t * t + node[0] + node[1]
+            if value < best:
+                t_best, best = t, value
+            assign(rights[top + 1], rights[top])
+            ends[top + 1, 0], ends[top + 1, 1] = t, high_t
+            assign(lefts[top + 1], node)
+            assign(rights[top], node)
+            ends[top, 1] = t
+            for child in range(top, top + 2):
+                targets[child], bounds[child] = _bound(
+                    ends[child, 0], lefts[child], ends[child, 1], rights[child], constant, linear, square
+                )
+            if bounds[top] < bounds[top + 1]:
+                for side in range(2):
+                    ends[top, side], ends[top + 1, side] = ends[top + 1, side], ends[top, side]
+                for part in range(3):
+                    lefts[top, part], lefts[top + 1, part] = lefts[top + 1, part], lefts[top, part]
+                    rights[top, part], rights[top + 1, part] = rights[top + 1, part], rights[top, part]
+                targets[top], targets[top + 1] = targets[top + 1], targets[top]
+                bounds[top], bounds[top + 1] = bounds[top + 1], bounds[top]
+            top += 2
+    return t_best, best, max(gap, TOLERANCE * abs(best))
+
+
+@njit(apart=True)
+def coupling(G: Array, lines: Array) -> float:
+    """Largest |G_ij| between thrusters of different lines, relative to the largest |G|; `lines` has shape (k, n)."""
+    k, n = lines.shape
+    owner = np.full(n, -1)
+    for g in range(k):
+        for i in range(n):
+            if abs(lines[g, i]) >= 1e-12:
+                owner[i] = g
+    largest, between = 0.0, 0.0
+    for i in range(2 * n):
+        for j in range(i + 1):
+            size = abs(G[i, j])
+            largest = max(largest, size)
+            first, second = owner[i % n], owner[j % n]
+            if first >= 0 and second >= 0 and first != second:
+                between = max(between, size)
+    return between / largest if largest > 0.0 else 0.0
+
+
+@njit(apart=True)
+def disjoint_search(
+    G: Array, start: Array, lines: Array, lower: Array, upper: Array, previous: Array, weights: Array
+) -> tuple[Array, float]:
+    """Exact minimum when the null space is spanned by `lines`, shape (k, n), that share no thruster and no coupling.
+
+    Returns the thrusts, shape (n,), and the proven gap (absolute, in the units of f).
+    """
+    thrusts = start.copy()
+    gap = 0.0
+    counted = np.ones(start.size, np.bool_)
+    for g in range(lines.shape[0]):
+        for i in range(start.size):
+            if abs(lines[g, i]) >= 1e-12:
+                counted[i] = False
+    for g in range(lines.shape[0]):
+        low, high = box_range(thrusts, lines[g], lower, upper)
+        if low > high:
+            continue
+        t, _, part = line_minimum(G, thrusts, lines[g], counted, low, high, previous, weights, np.inf)
+        if np.isfinite(t):
+            thrusts += t * lines[g]
+            gap += part
+    return np.minimum(np.maximum(thrusts, lower), upper), gap
+
+
+@njit
+def split_allocation(
+    G: Array,
+    inverse: Array,
+    wrench: Array,
+    lines: Array,
+    lower: Array,
+    upper: Array,
+    previous: Array,
+    weights: Array,
+    coupling_limit: float,
+) -> tuple[bool, Array, float]:
+    """Least thrusts and `disjoint_search` in one call: what a control step needs, wherever no limit is in the way.
+
+    Returns whether it applies (the wrench can be made within limits, and the lines are not coupled), the thrusts and
+    the proven gap. `inverse` has shape (n, 6).
+    """
+    n = lower.size
+    start = np.zeros(n)
+    for i in range(n):
+        for axis in range(6):
+            start[i] += inverse[i, axis] * wrench[axis]
+    moves = np.zeros(n, np.bool_)
+    for g in range(lines.shape[0]):
+        low, high = box_range(start, lines[g], lower, upper)
+        if low > high:
+            return False, start, 0.0
+        for i in range(n):
+            moves[i] = moves[i] or abs(lines[g, i]) >= 1e-12
+    for i in range(n):
+        if not moves[i] and not lower[i] <= start[i] <= upper[i]:
+            return False, start, 0.0
+    if lines.shape[0] > 1 and coupling(G, lines) > coupling_limit:
+        return False, start, 0.0
+    thrusts, gap = disjoint_search(G, start, lines, lower, upper, previous, weights)
+    return True, thrusts, gap

@@ -1,0 +1,169 @@
+"""How sticks, desk and assists move a piloted goal: one pure step for the attitude, one for the place.
+
+Released sticks brake: the commanded velocity falls to rest, and where it comes to rest, ahead, is what is held. A
+velocity is kept in the frame of the sticks, which turns with the vehicle or along the sphere, so that a stick that is
+held goes on along a circle.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from wakewise.control.intent import FULL_M_S, FULL_RAD_S, HIGHEST_RAD, moved_on, shaped, slewed
+from wakewise.core.arrays import Array
+from wakewise.core.interfaces import BodyState
+from wakewise.operation.teleop.assist_modes import elevation_rad, level_frame, sphere_frame, watching
+from wakewise.operation.teleop.collision_limiter import KeepOff
+from wakewise.operation.teleop.motion import STEEPEST_RAD, Attitude, Motion, followed, tilted, tilting, turning
+from wakewise.operation.teleop.operator_state import DeskState
+from wakewise.scene.missions import CameraAim
+
+FASTER_M_S2, BRAKING_M_S2 = 0.15, 0.2
+"""How fast a commanded velocity grows and falls on average; from 0.3 m/s to rest it takes 1.5 s and 0.23 m."""
+JERK_M_S3 = 0.8
+"""Fastest change of its acceleration: 0 to 0.2 m/s2 in a quarter of a second. That is what a vehicle answers in (lag of
+a thruster 0.1 s, age of a plan up to 0.1 s, delay of an estimate 0.08 s), and no more than a person's own delay."""
+EVEN_M_S = 0.3
+"""Speed at which a change that begins and ends gently takes as long as one of steady acceleration would."""
+PULL_M_S = 0.5
+"""Fastest that the leash pulls the commanded place towards a vehicle that is held up or far off."""
+
+
+def _peak(mean_m_s2: float) -> float:
+    """Largest acceleration of a change by `EVEN_M_S` that takes v / mean in all: v / a + a / jerk of time."""
+    takes_s = EVEN_M_S / mean_m_s2
+    return 0.5 * JERK_M_S3 * (takes_s - math.sqrt(takes_s**2 - 4.0 * EVEN_M_S / JERK_M_S3))
+
+
+FASTER_PEAK_M_S2, BRAKING_PEAK_M_S2 = _peak(FASTER_M_S2), _peak(BRAKING_M_S2)
+"""0.17 and 0.25 m/s2."""
+RANGE_PER_S, RANGE_M_S = 1.0, 0.05
+"""How an orbit keeps its range: speed per distance, and at most."""
+SLOW_M_S = 0.01
+"""Speed towards the centre below which a range is kept."""
+HARDEST_M_S2 = 0.6
+"""Largest change of a commanded velocity, whatever bends its way: 0.4 m/s on a circle of a quarter of a metre."""
+TILT_RAD_S = math.radians(40.0)
+"""What the tilt stick asks for at gain 1."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sphere:
+    """The frame of the sticks, shape (3, 3), as it was a step ago, and the orbit's radius where one is kept.
+
+    `frame` is None where nobody steered before, and `orbits` tells whether it is that of an orbit. `change_m_s2`, shape
+    (3,), is how fast the velocity changes in that frame. `blocked_by` is what is in the way, None if nothing.
+    """
+
+    frame: Array | None = None
+    change_m_s2: Array = field(default_factory=lambda: np.zeros(3))
+    orbits: bool = False
+    range_m: float | None = None
+    blocked_by: str | None = None
+
+
+def turned(motion: Motion, state: DeskState, axes: Array, target_W_m: Array, aim: CameraAim, dt_s: float) -> Motion:
+    """The motion with attitude and tilt a step on: by the sticks where they are held, else by the assist, else level.
+
+    Parameters
+    ----------
+    motion : Motion
+    state : DeskState
+    axes : ndarray, shape (5,)
+        See `wakewise.operation.teleop.input.CONTROL_AXES`.
+    target_W_m : ndarray, shape (3,)
+    aim : CameraAim
+    dt_s : float
+    """
+    turn, rise, place = float(axes[3]), float(axes[4]), motion.place_W_m
+    yaw = float(motion.angles_rad[2])
+    wished = Attitude(angles_rad=np.array([0.0, 0.0, yaw]), rates_rad_s=np.zeros(3), tilt_rad=motion.tilt_rad)
+    if state.watch_target:
+        wished = watching(place, motion.velocity_W_m_s, yaw, target_W_m, aim, dt_s)
+    new = followed(motion, 0, wished, dt_s)
+    by_hand = turn != 0.0 or not state.watch_target
+    new = turning(new, 2, turn * FULL_RAD_S * state.share, dt_s) if by_hand else followed(new, 2, wished, dt_s)
+    if rise == 0.0 and state.watch_target:
+        return tilted(followed(new, 1, wished, dt_s), wished, dt_s, aim)
+    rate = rise * TILT_RAD_S * state.gain
+    if aim.joint is not None:
+        level = replace(wished, angles_rad=np.zeros(3), rates_rad_s=np.zeros(3))
+        return tilting(followed(new, 1, level, dt_s), rate, dt_s, aim)
+    pitch = float(motion.angles_rad[1])
+    return turning(new, 1, 0.0 if abs(pitch) >= STEEPEST_RAD and rate * pitch > 0.0 else rate, dt_s)
+
+
+def steered(
+    motion: Motion,
+    sphere: Sphere,
+    state: DeskState,
+    axes: Array,
+    target_W_m: Array,
+    aim: CameraAim,
+    estimate: BodyState,
+    dt_s: float,
+    keep_off: KeepOff | None = None,
+) -> tuple[Motion, Sphere]:
+    """The motion with velocity and place a step on, and what the sticks go by at the next.
+
+    On an orbit it is the camera that keeps to the sphere, and the place of the body follows from its turn.
+    """
+    eye, swing = motion.camera(aim)
+    frame = sphere_frame(eye, target_W_m) if state.orbit else level_frame(float(motion.angles_rad[2]))
+    if sphere.frame is None or state.orbit != sphere.orbits:
+        sphere = Sphere(frame=frame, orbits=state.orbit)
+    swing = swing if state.orbit else np.zeros(3)
+    wish = FULL_M_S * state.share * np.asarray(axes[:3])
+    if state.orbit and elevation_rad(eye, target_W_m) > HIGHEST_RAD:
+        wish[2] = max(wish[2], 0.0)
+    before = frame if sphere.frame is None else sphere.frame
+    now = before.T @ (motion.velocity_W_m_s + swing)
+    range_m = None
+    if state.orbit:
+        wish[0], range_m = _at_range(wish[0], now[0], sphere.range_m, float(np.linalg.norm(eye - target_W_m)))
+    answer, change = answered(now, sphere.change_m_s2, wish, dt_s)
+    velocity = frame @ answer - swing
+    blocked_by = None
+    if keep_off is not None:
+        free = velocity
+        velocity, _ = keep_off.allowed(motion.X_WB, velocity, motion.omega_B_rad_s)
+        if not np.array_equal(velocity, free):
+            change = np.zeros(3)  # what stops it now is not the sticks' doing, and is not to go on after it
+        if wish.any():  # what is asked for, not what is left of it by now, is what something is in the way of
+            _, blocked_by = keep_off.allowed(motion.X_WB, frame @ wish - swing, motion.omega_B_rad_s)
+    # Near the zenith the frame turns faster than a velocity may.
+    velocity = slewed(motion.velocity_W_m_s, velocity, dt_s, HARDEST_M_S2)
+    place = led(motion.place_W_m, 0.5 * (motion.velocity_W_m_s + velocity), estimate, dt_s)
+    moved = replace(motion, place_W_m=place, velocity_W_m_s=velocity)
+    return moved, Sphere(frame=frame, change_m_s2=change, orbits=state.orbit, range_m=range_m, blocked_by=blocked_by)
+
+
+def answered(now_m_s: Array, change_m_s2: Array, wish_m_s: Array, dt_s: float) -> tuple[Array, Array]:
+    """What sticks lead a commanded velocity to, and how fast that changes, a step on; shape (3,) each, in their frame.
+
+    A change that comes as fast as a hand moves no vehicle can make, and what it misses it makes up for with thrust.
+    """
+    slower = np.linalg.norm(wish_m_s) < np.linalg.norm(now_m_s)
+    return shaped(now_m_s, change_m_s2, wish_m_s, dt_s, BRAKING_PEAK_M_S2 if slower else FASTER_PEAK_M_S2, JERK_M_S3)
+
+
+def _at_range(wish: float, now: float, kept_m: float | None, range_m: float) -> tuple[float, float | None]:
+    """Wished speed towards the centre and the radius that is kept: the stick's, and none, while it is held."""
+    if wish != 0.0 or (kept_m is None and abs(now) > SLOW_M_S):
+        return wish, None
+    kept_m = range_m if kept_m is None else kept_m
+    return min(max(RANGE_PER_S * (range_m - kept_m), -RANGE_M_S), RANGE_M_S), kept_m
+
+
+def led(place_W_m: Array, velocity_W_m_s: Array, estimate: BodyState, dt_s: float) -> Array:
+    """A place moved on, shape (3,), on its leash while it moves; at rest it is held wherever the vehicle is carried."""
+    known = bool(np.isfinite(estimate.X_WB.p_m).all())
+    if not velocity_W_m_s.any() or not known:
+        return np.asarray(place_W_m + dt_s * velocity_W_m_s)
+    new = moved_on(place_W_m, velocity_W_m_s, estimate, dt_s)
+    step = new - place_W_m
+    size, most = float(np.linalg.norm(step)), (PULL_M_S + float(np.linalg.norm(velocity_W_m_s))) * dt_s
+    return np.asarray(new if size <= most else place_W_m + step * (most / size))

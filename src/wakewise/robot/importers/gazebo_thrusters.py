@@ -1,0 +1,246 @@
+"""Thrusters as Gazebo's plugins describe them: gz-sim, UUV Simulator (Plankton, DAVE), ArduPilot's channels."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from wakewise.robot.importers.gazebo_thruster_models import (
+    number_in,
+    on_joint,
+    plugin_thrusters,
+    short,
+    where_on,
+    words,
+)
+from wakewise.robot.importers.parsed_vehicle import QUESTION, Found, FoundThruster
+from wakewise.robot.importers.robot_description import THRUSTER_NAME, Bodies, Joint, moving_parts
+from wakewise.robot.importers.xml import Element, PlacedError, numbers
+
+NAME_RULE = "inferred from names: positive thrust pushes along the axis of each joint that is called a thruster"
+
+_DRIVES = re.compile(r"thrust|propel|propuls|rotor|motor", re.IGNORECASE)
+_READ = frozenset(
+    {
+        *("joint_name", "thrust_coefficient", "propeller_diameter", "use_angvel_cmd", "max_thrust_cmd"),
+        *("min_thrust_cmd", "linkName", "jointName", "thrusterID", "dynamics", "thrustMax", "thrustMin", "conversion"),
+        *("clampMax", "clampMin", "gain", "thrust_efficiency", "link", "joint", "propeller_direction", "link_name"),
+        *("turning_direction", "thruster", "pos_force", "neg_force", "origin"),
+    }
+)
+"""What is read of the plugins above; their hands, coefficients and topics change no direction."""
+_PROPELLER = re.compile(r"prop|rotor|blade", re.IGNORECASE)
+_NUMBERED = re.compile(r"\d+")
+_HAND_M = 0.15
+
+
+def read_thrusters(bodies: Bodies, found: Found) -> None:
+    """Fill in the thrusters from plugins; where there are none, from joints that are called thrusters.
+
+    Raises
+    ------
+    InputError
+        If a plugin names a joint or link that is not there, or an axis has no length.
+    """
+    rules: list[str] = []
+    order: list[float] = []
+    known: list[Element] = []
+    unknown: list[Element] = []
+    for plugin in bodies.plugins:
+        if not _drives(plugin):
+            continue
+        read = plugin_thrusters(plugin, bodies, found)
+        (unknown if read is None else known).append(plugin)
+        for thruster, rule, identity in read or ():
+            found.thrusters.append(thruster)
+            rules.append(rule)
+            order.append(identity)
+    _drop_repeats(found, order)
+    for plugin in unknown:
+        inner = len(plugin.all("thruster"))
+        found.notes.append(
+            f"{QUESTION}not read: plugin {_title(plugin)}, of a form that is not known"
+            + (f", with {inner} thrusters in it" if inner else "")
+            + f" ({plugin.place.file.name}:{plugin.place.line})"
+        )
+    if found.thrusters:
+        found.thrusters = [t for _, t in sorted(zip(order, found.thrusters, strict=True), key=lambda pair: pair[0])]
+        found.thrust_rule = "; ".join(dict.fromkeys(rules))
+        found.derived["thruster_layout"] = f"{found.kind} {found.file.name}: thruster plugins and their joints"
+        _question_undriven(bodies, found)
+        turning = {short(name) for name in moving_parts(bodies)}
+        carried = {short(joint.child): short(joint.parent) for joint in bodies.joints.values()}
+        question_steered([t.name for t in found.thrusters if carried.get(t.name) in turning], found)
+    elif not _freefloating(bodies, found):
+        _by_name(bodies, unknown, found)
+    tags = dict.fromkeys(child.tag for plugin in known for child in plugin.children if child.tag not in _READ)
+    if tags:
+        found.notes.append(f"not read of the thruster plugins: {', '.join(tags)[:400]}")
+    _ardupilot(bodies, found)
+
+
+def _drives(plugin: Element) -> bool:
+    """Whether a plugin seems to push: by its name, or by thrusters inside it; a manager allocates only."""
+    if "manager" in words(plugin) or "freefloating" in words(plugin):
+        return False
+    return _DRIVES.search(words(plugin)) is not None or plugin.first("thruster") is not None
+
+
+def _title(plugin: Element) -> str:
+    return (plugin.attributes.get("name") or plugin.attributes.get("filename") or "without a name")[:80]
+
+
+def _question_undriven(bodies: Bodies, found: Found) -> None:
+    """Say which turning joints are called thrusters and are driven by no plugin."""
+    driven = [t.p_m for t in found.thrusters]
+    idle = [
+        j.name
+        for j in bodies.joints.values()
+        if j.kind in {"continuous", "revolute"}
+        and THRUSTER_NAME.search(short(j.child) + " " + short(j.name))
+        and not any(float(np.linalg.norm(where_on(j, bodies) - p)) < _HAND_M for p in driven)
+    ]
+    if idle:
+        found.notes.append(
+            f"{QUESTION}{len(found.thrusters)} thrusters have a plugin, but {len(idle)} further joints are called "
+            f"thrusters: {', '.join(short(name) for name in idle[:12])}"
+        )
+
+
+def question_steered(names: list[str], found: Found) -> None:
+    """Say which thrusters sit beyond a joint that moves: they are read as they point with the joint at zero."""
+    if names:
+        found.notes.append(
+            f"{QUESTION}thrusters on joints that move, as servos turn them: {', '.join(names[:12])}; "
+            f"they are held where the joints are at zero"
+        )
+
+
+def _drop_repeats(found: Found, order: list[float]) -> None:
+    """Count a thruster once that two plugins drive, as files for two simulators do."""
+    seen: list[FoundThruster] = []
+    for index in reversed(range(len(found.thrusters))):
+        thruster = found.thrusters[index]
+        same = [t for t in found.thrusters[:index] if t.name == thruster.name and np.array_equal(t.p_m, thruster.p_m)]
+        if same:
+            seen.append(found.thrusters.pop(index))
+            order.pop(index)
+    if seen:
+        found.notes.append(
+            f"{QUESTION}two plugins drive {', '.join(sorted(t.name for t in seen)[:12])}; counted once, by the first"
+        )
+
+
+def _by_name(bodies: Bodies, unknown: list[Element], found: Found) -> None:
+    joints = [j for j in bodies.joints.values() if THRUSTER_NAME.search(short(j.child) + " " + short(j.name))]
+    turning = [j for j in joints if j.axis is not None and j.kind in {"continuous", "revolute"}]
+    fixed = [j for j in joints if j.kind == "fixed"]
+    turning, fixed = _one_each(turning, bodies, found), _one_each(fixed, bodies, found) if not turning else []
+    for joint in turning or fixed:
+        found.thrusters.append(on_joint(joint, bodies))
+    if turning:
+        found.thrust_rule = NAME_RULE
+    elif fixed:
+        found.thrust_rule = (
+            "inferred from names: positive thrust pushes along +x of each fixed link that is called a thruster"
+        )
+    if found.thrusters:
+        found.guessed = "links were taken for thrusters by their names"
+        why = "the file's thruster plugin is not read" if unknown else "no thruster plugin in the file"
+        found.notes.append(f"{QUESTION}{why}: {found.guessed}, and which way they push is a guess")
+        found.thrusters.sort(key=lambda t: [int(n) for n in _NUMBERED.findall(t.name)])
+        found.derived["thruster_layout"] = f"{found.kind} {found.file.name}: joints with thruster names"
+
+
+def _one_each(joints: list[Joint], bodies: Bodies, found: Found) -> list[Joint]:
+    """One joint per thruster: a propeller counts, the hull that carries it does not.
+
+    Raises
+    ------
+    InputError
+        If two joints of one number lie within one another and neither is called a propeller.
+    """
+    above = {j.child: j.parent for j in bodies.joints.values()}
+    carriers: set[str] = set()
+    for joint in joints:
+        here, steps = joint.parent, 0
+        while here and steps < len(above) + 1:
+            carriers.add(here)
+            here, steps = above.get(here, ""), steps + 1
+    kept = [j for j in joints if j.child not in carriers]
+    dropped = [j for j in joints if j.child in carriers]
+    for joint in list(kept):
+        twins = [k for k in kept if k is not joint and _alike(joint, k)]
+        if not twins or _PROPELLER.search(short(joint.child)):
+            continue
+        if any(_PROPELLER.search(short(k.child)) for k in twins):
+            kept.remove(joint)
+            dropped.append(joint)
+        elif any(np.allclose(joint.X_BJ.p_m, k.X_BJ.p_m, atol=1e-6) for k in twins):
+            raise PlacedError(
+                f"{joint.place}: joints {joint.name} and {twins[0].name} are one thruster at one place, or two: "
+                f"which is meant cannot be told"
+            )
+    if dropped:
+        found.notes.append(
+            f"{len(dropped)} hulls of thrusters are not counted beside their propellers: "
+            f"{', '.join(short(j.child) for j in dropped[:12])}"
+        )
+    return kept
+
+
+def _alike(one: Joint, other: Joint) -> bool:
+    """Whether two joints may be parts of one thruster: of one number, and within a hand of one another."""
+    numbered = [_NUMBERED.findall(short(j.child)) for j in (one, other)]
+    return numbered[0] == numbered[1] and float(np.linalg.norm(one.X_BJ.p_m - other.X_BJ.p_m)) < _HAND_M
+
+
+def _freefloating(bodies: Bodies, found: Found) -> bool:
+    """Freefloating Gazebo states a wrench per thruster, that is, a column of the matrix, and sometimes no place."""
+    thrusters = [t for p in bodies.plugins if "freefloating" in words(p) for t in p.all("thruster")]
+    if not thrusters:
+        return False
+    maps = [t.first("map") for t in thrusters]
+    columns = [numbers(m.text, m.place, "map of a thruster", 6) for m in maps if m is not None]
+    if len(columns) == len(thrusters):
+        found.matrix = np.stack(columns, axis=1)
+        found.notes.append(
+            f"allocation matrix: {len(columns)} columns of Freefloating Gazebo's plugin; it places no thrusters"
+        )
+    else:
+        found.notes.append(
+            f"{len(thrusters) - len(columns)} of {len(thrusters)} thrusters of Freefloating Gazebo's plugin turn on "
+            f"joints and have no fixed axis: none of them is read"
+        )
+    return True
+
+
+def _ardupilot(bodies: Bodies, found: Found) -> None:
+    """Thrust commands of ArduPilot's plugin: `multiplier * (u + offset)` newton for u from 0 to 1."""
+    reversed_names, limited = [], 0
+    for plugin in bodies.plugins:
+        if "ardupilot" not in words(plugin):
+            continue
+        for control in plugin.all("control"):
+            joint = bodies.joint(control.value("jointName") or "")
+            if joint is None or "thrust" not in (control.value("cmd_topic") or ""):
+                continue
+            multiplier, offset = number_in(control, "multiplier"), number_in(control, "offset")
+            thruster = next((t for t in found.thrusters if t.name == short(joint.child)), None)
+            if thruster is None or multiplier is None:
+                continue
+            ends = sorted(multiplier * (u + (offset or 0.0)) for u in (0.0, 1.0))
+            if thruster.max_forward_N is None and ends[1] >= 0.0 >= ends[0]:
+                thruster.max_forward_N, thruster.max_reverse_N = ends[1], -ends[0]
+                limited += 1
+            if multiplier < 0.0:
+                reversed_names.append(thruster.name)
+    if limited:
+        found.notes.append(f"thrust limits of {limited} thrusters: the range that ArduPilot's plugin commands")
+        found.derived["thruster_limits"] = f"{found.kind} {found.file.name}: ArduPilot plugin, multiplier and offset"
+    if reversed_names:
+        found.notes.append(
+            f"ArduPilot's plugin turns the command round for {', '.join(reversed_names)}; "
+            f"axes here are for positive thrust, not for positive command"
+        )

@@ -1,0 +1,226 @@
+"""What a vehicle's thrusters must be, whatever file they are from: few enough, of unit force, as many as it says."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.robot.importers.names import contradictions, lying
+from wakewise.robot.importers.parsed_vehicle import QUESTION, Found
+from wakewise.robot.importers.safe_yaml_nodes import Item
+from wakewise.robot.importers.xml import Place, PlacedError
+from wakewise.robot.importers.yaml_parameters import Entries
+from wakewise.robot.vehicles.check import directions
+from wakewise.robot.vehicles.draft import MAX_THRUSTERS, VehicleDraft
+
+UNIT_SLACK = 0.02
+"""How far a force column may be from length 1: entries of two digits, such as 0.7 for cos 45 deg, pass."""
+
+_ROUNDING = 0.02
+MAX_ARM_M = 10.0
+"""Longest arm of a thruster about the body's origin that is believed."""
+_COUNT = re.compile(r"^((num|number|n|no|count)_?(of_)?thrusters?|thrusters?_(count|num|number))$", re.IGNORECASE)
+_LIST = re.compile(
+    r"^thrusters?(_(names?|ids?|joints?|links?|frames?|topics?|pins?|channels?|labels?|list))?$", re.IGNORECASE
+)
+_LAYOUT_KEY = re.compile(r"frame|layout|config|mixer|type|dofs?$|degrees_of_freedom|actuation", re.IGNORECASE)
+_DOF_WORDS = re.compile(r"(?<![0-9.])([3-6])[ _-]?dofs?(?![a-z])", re.IGNORECASE)
+_FULL_WORDS = re.compile(r"(fully|over)[ _-]?actuated|holonomic", re.IGNORECASE)
+_MANY = 6
+_DOF_KEY = re.compile(r"^(dofs?|num_dofs?|degrees_of_freedom)$", re.IGNORECASE)
+
+
+def question_inertia(found: Found) -> None:
+    """Question principal moments of inertia of which one exceeds the sum of the others, as no body's does."""
+    if found.inertia_kg_m2 is None:
+        return
+    low, middle, high = np.linalg.eigvalsh(0.5 * (found.inertia_kg_m2 + found.inertia_kg_m2.T))
+    if high > (low + middle) * (1.0 + _ROUNDING):
+        found.notes.append(
+            f"{QUESTION}inertia: the principal moments {low:.4g}, {middle:.4g} and {high:.4g} kg m2 are no body's: "
+            f"the largest must not exceed the sum of the others"
+        )
+
+
+def is_unit(length: Any) -> Any:
+    """Whether lengths are 1 within `UNIT_SLACK`."""
+    return np.abs(np.asarray(length) - 1.0) <= UNIT_SLACK
+
+
+def require_count(n: int, where: str = "") -> None:
+    """Refuse more thrusters than any vehicle has.
+
+    Raises
+    ------
+    InputError
+        Naming the cap.
+    """
+    if n > MAX_THRUSTERS:
+        raise PlacedError(f"{where}{n} thrusters, at most {MAX_THRUSTERS} are read")
+
+
+def require_force_columns(matrix: Array, what: str) -> None:
+    """Refuse a matrix, shape (6, n), that would be flown with and is no wrench per newton of each thruster.
+
+    Raises
+    ------
+    InputError
+        If it has no columns or too many, a force column is not of length 1, or a moment has an arm beyond `MAX_ARM_M`.
+    """
+    if matrix.shape[1] == 0:
+        raise PlacedError(f"{what} has no columns, must have one per thruster")
+    require_count(matrix.shape[1], f"{what}: ")
+    lengths = np.linalg.norm(matrix[:3], axis=0)
+    odd = np.flatnonzero(~is_unit(lengths))
+    if odd.size:
+        i = int(odd[0])
+        raise PlacedError(
+            f"{what}: the force of column {i + 1} has length {lengths[i]:.4g}, must be 1 (a column is the wrench that "
+            f"one newton of a thruster makes)"
+        )
+    arms_m = np.linalg.norm(matrix[3:], axis=0) / lengths
+    i = int(np.argmax(arms_m))
+    if not arms_m[i] <= MAX_ARM_M:
+        raise PlacedError(
+            f"{what}: the moment of column {i + 1} is {arms_m[i]:.4g} N m per newton, an arm of more than "
+            f"{MAX_ARM_M:g} m; are these metres?"
+        )
+
+
+def require_same_count(entries: Entries, found: Found) -> None:
+    """Hold the number of thrusters against the file's own lists and counts of them.
+
+    Raises
+    ------
+    InputError
+        If they disagree.
+    """
+    columns = None if found.matrix is None else int(found.matrix.shape[1])
+    n = len(found.thrusters) or columns
+    if not n:
+        return
+    if columns is not None and n != columns:
+        raise PlacedError(f"{found.file}: {found.matrix_name} has {columns} columns, but the file places {n} thrusters")
+    for path, item in entries:
+        said = _said_count(path, item)
+        item.seen = item.seen or said is not None
+        if said is not None and said != n:
+            what = f"{found.matrix_name} has" if not found.thrusters else "the file places"
+            raise PlacedError(f"{item.place}: {path[-1]} says {said} thrusters, but {what} {n}")
+
+
+def _said_count(path: tuple[str, ...], item: Item) -> int | None:
+    key = path[-1]
+    inside = len(path) > 1 and re.fullmatch(r"thrusters?", path[-2], re.IGNORECASE)
+    if isinstance(item.value, str):
+        plain = key.lower() == "thrusters" or (inside and key.lower() in {"num", "count", "number"})
+        if (_COUNT.match(key) or plain) and re.fullmatch(r"\d{1,6}", item.value.strip()):
+            return int(item.value)
+        return None
+    listed = item.items()
+    if listed and _LIST.match(key) and all(isinstance(member.value, str) for member in listed):
+        return len(listed)
+    return None
+
+
+def claims_in(entries: Entries) -> list[tuple[int, str, Place, bool]]:
+    """Axes that a YAML file's own words say its thrusters make: how many, the words, where, and whether they bind."""
+    said: list[tuple[int, str, Place, bool]] = []
+    for path, item in entries:
+        if not isinstance(item.value, str):
+            continue
+        key = path[-1]
+        inside = len(path) > 1 and _DOF_KEY.match(path[-2])
+        if (_DOF_KEY.match(key) or (inside and key.lower() in {"num", "count"})) and item.value.strip() in set(
+            "123456"
+        ):
+            item.seen = True
+            said.append((int(item.value), f"{'.'.join(path[-2:])}: {item.value}", item.place, True))
+        elif _LAYOUT_KEY.search(key):
+            axes = claimed(item.value)
+            if axes:
+                item.seen = True
+                said.append((axes, f"{key}: {item.value[:60]}", item.place, True))
+    return said
+
+
+def claimed(words: str) -> int:
+    """Axes that words such as `vectored_6dof` or `fully actuated` claim; 0 if none."""
+    match = _DOF_WORDS.search(words)
+    return int(match[1]) if match else 6 if _FULL_WORDS.search(words) else 0
+
+
+def question_rank(found: Found, matrix: Array, name: str) -> list[str]:
+    """Hold the rank of an allocation matrix, shape (6, n), against what the file's own words claim.
+
+    Returns
+    -------
+    list of str
+        Notes that question it.
+
+    Raises
+    ------
+    InputError
+        If the layout claims more axes than it has thrusters, so that it cannot be right.
+    """
+    notes: list[str] = []
+    rank = directions(matrix).rank
+    claims = list(found.claims)
+    for word in dict.fromkeys((name, found.file.stem)):
+        axes = claimed(word)
+        if axes:
+            claims.append((axes, f"the name {word[:60]}", Place(found.file, 1), False))
+    for axes, words, place, binds in claims:
+        if axes > matrix.shape[1] and binds:
+            raise PlacedError(
+                f"{place}: {words} claims {axes} axes, but {matrix.shape[1]} thrusters make at most that many"
+            )
+        if rank < axes:
+            notes.append(f"{QUESTION}{words} claims {axes} axes, but the thrusters make only {rank} (rank {rank})")
+    return notes
+
+
+def question_names(found: Found, draft: VehicleDraft, *, told: bool) -> list[str]:
+    """Hold places and axes against the thrusters' own names, and a guess of axes against what any vehicle can do.
+
+    Parameters
+    ----------
+    found : Found
+    draft : VehicleDraft
+        In FRD.
+    told : bool
+        Whether the user said along which axis thrusters push.
+
+    Returns
+    -------
+    list of str
+        Notes that question the places.
+
+    Raises
+    ------
+    InputError
+        If nothing but a guess says which way thrusters push, and the vehicle it makes is none.
+    """
+    if not draft.thrusters:
+        return []
+    places = np.array([t.p_BT_m for t in draft.thrusters])
+    axes = np.array([t.axis_B for t in draft.thrusters])
+    names = [t.name for t in draft.thrusters]
+    against = lying(names, axes)
+    n, rank = len(axes), directions(draft.allocation_matrix).rank
+    if found.guessed and not told:
+        if n >= 3 and bool((np.abs(axes[:, 2]) > 0.99).all()):
+            against.append(f"all {n} push up or down")
+        elif n >= _MANY and rank <= n // 2:
+            against.append(f"{n} of them make only {rank} axes (rank {rank})")
+        if against:
+            rule = found.thrust_rule.removeprefix("inferred from names: ")
+            raise PlacedError(
+                f"{found.file}: {found.guessed}, {rule}, and that is wrong: {against[0]}; "
+                f"say how they push with --thrust-direction (+x, -x, +y, -y, +z or -z)"
+            )
+    against += contradictions(names, places, axes)
+    return [f"{QUESTION}{words}: the frame, the places or the names are wrong" for words in against]

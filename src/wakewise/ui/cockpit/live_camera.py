@@ -1,0 +1,272 @@
+"""The live picture: what the camera sees now, small, by the renderer of the photographs, in a process of its own.
+
+Of a photograph's chain it has scene, light, water, silt, exposure and noise; left out are motion blur, flakes, and how
+a soft target bends. One ray a pixel. Rendering takes the interpreter's lock for longer than a control step may wait, so
+it is done in another process, which yields to the loop where both want a core.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections import deque
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import IO, TYPE_CHECKING, Any
+
+from wakewise.core.errors import StageError
+from wakewise.core.geometry import Pose
+from wakewise.core.interfaces import ScalarGrid
+
+if TYPE_CHECKING:
+    from wakewise.operation import Scenario
+    from wakewise.scene.targets import Target
+    from wakewise.vision.imaging import ImagingSettings
+
+WIDTHS_PX = (480, 400, 320, 256)
+"""Widths a picture may have, widest first: where the cores are busy, pictures get smaller rather than rarer."""
+DRAWN_WITHIN_S = 0.07
+"""What a picture may take by the clock, so that ten a second are left when it has to be sent and shown, too."""
+_SMOOTHED = 0.3
+QUALITY = 75
+NICER = 5
+"""How much the process yields to others (nice), once its scene is ready."""
+_METERED = 8
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class View:
+    """Where the camera truly is, and the silt before it; None leaves that as it was. `width_px`: of the picture."""
+
+    X_WC: Pose
+    silt: ScalarGrid | None = None
+    width_px: int | None = None
+
+
+class Width:
+    """How wide the next picture may be, by how long the last ones took.
+
+    The time of a picture goes with its pixels, thus with the square of its width: one step narrower where the mean of
+    late is above `within_s`, one step wider only where that width would keep it with a fifth to spare.
+    """
+
+    def __init__(self, widths_px: tuple[int, ...] = WIDTHS_PX, within_s: float = DRAWN_WITHIN_S) -> None:
+        self._widths_px, self._within_s = widths_px, within_s
+        self._at = 0
+        self._mean_s: float | None = None
+
+    @property
+    def px(self) -> int:
+        """Of the next picture."""
+        return self._widths_px[self._at]
+
+    def took(self, took_s: float) -> None:
+        """Learn how long the last picture took by the clock."""
+        before_s = self._mean_s
+        mean_s = took_s if before_s is None else before_s + _SMOOTHED * (took_s - before_s)
+        self._mean_s = mean_s
+        if mean_s > self._within_s:
+            self._step(1)
+        elif self._at > 0 and 1.2 * mean_s * self._growth(-1) < self._within_s:
+            self._step(-1)
+
+    def _growth(self, by: int) -> float:
+        """Pixels of a width `by` steps on, over this one's."""
+        return (self._widths_px[self._at + by] / self.px) ** 2
+
+    def _step(self, by: int) -> None:
+        if 0 <= self._at + by < len(self._widths_px) and self._mean_s is not None:
+            self._mean_s *= self._growth(by)
+            self._at += by
+
+
+class LiveCamera:
+    """Draws views on request, one at a time.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Its target, camera, light and water.
+    target : Target, optional
+        In place of the scenario's own.
+    widths_px : tuple of int
+        Of its pictures, widest first; the height follows from the scenario's.
+    """
+
+    def __init__(
+        self, scenario: Scenario, target: Target | None = None, widths_px: tuple[int, ...] = WIDTHS_PX
+    ) -> None:
+        self._begin = (scenario, target, widths_px[0])
+        self._width = Width(widths_px)
+        self._process: subprocess.Popen[bytes] | None = None
+        self._answers: queue.Queue[bytes | None] = queue.Queue()
+        self._waited_for, self._last = 0, b""
+        self._lock = threading.Lock()
+
+    def start(self) -> None:
+        """Start the process, which takes a few seconds to light its scene."""
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "wakewise.ui.cockpit.live_camera"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=os.environ
+            | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path), "NUMBA_NUM_THREADS": "1"},
+        )
+        threading.Thread(target=self._listen, args=(self._process.stdout,), name="pictures", daemon=True).start()
+        self._send(pickle.dumps(self._begin))
+        self._waited_for = 1  # its word that the scene is ready
+
+    def draw(self, view: View, timeout_s: float = 2.0) -> bytes | None:
+        """Draw a view as a JPEG; None while the scene is not ready, or where a picture does not come in time.
+
+        Raises
+        ------
+        StageError
+            If the process has ended.
+        """
+        with self._lock:
+            if self._process is None:
+                return None
+            if not self._caught_up(0.0 if self._waited_for else timeout_s):
+                return None
+            began_s = time.monotonic()
+            self._send(pickle.dumps(replace(view, width_px=self._width.px)))
+            self._waited_for += 1
+            in_time = self._caught_up(timeout_s)
+            self._width.took(time.monotonic() - began_s)
+            return self._last if in_time else None
+
+    def close(self) -> None:
+        """End the process."""
+        process, self._process = self._process, None
+        if process is not None:
+            process.kill()
+            process.wait()
+            for pipe in (process.stdin, process.stdout):
+                if pipe is not None:
+                    with suppress(OSError):
+                        pipe.close()
+
+    def _caught_up(self, timeout_s: float) -> bool:
+        """Whether all that was asked for has been answered, within a time."""
+        while self._waited_for:
+            try:
+                answer = self._answers.get(timeout=timeout_s) if timeout_s else self._answers.get_nowait()
+            except queue.Empty:
+                return False
+            if answer is None:
+                raise StageError("live picture: the process that draws it has ended")
+            self._last, self._waited_for = answer, self._waited_for - 1
+        return True
+
+    def _send(self, message: bytes) -> None:
+        assert self._process is not None
+        assert self._process.stdin is not None
+        with suppress(OSError):  # then it has ended, which the answers tell
+            _write(self._process.stdin, message)
+
+    def _listen(self, pipe: IO[bytes]) -> None:
+        with suppress(OSError, ValueError):
+            while (answer := _read(pipe)) is not None:
+                self._answers.put(answer)
+        self._answers.put(None)
+
+
+def _write(pipe: IO[bytes], message: bytes) -> None:
+    pipe.write(len(message).to_bytes(8, "little") + message)
+    pipe.flush()
+
+
+def _read(pipe: IO[bytes]) -> bytes | None:
+    """The next message; None at the end."""
+    head = pipe.read(8)
+    if len(head) < 8:
+        return None
+    size = int.from_bytes(head, "little")
+    message = pipe.read(size)
+    return message if len(message) == size else None
+
+
+class Easel:
+    """Draws small pictures of one scene, one after the other."""
+
+    def __init__(self, scenario: Scenario, target: Target | None, width_px: int) -> None:
+        import numpy as np
+
+        from wakewise.vision.imaging import SiltOptics
+
+        parts = scenario.parts() if target is None else scenario.parts().replace(target=target)
+        self._given, self._width_px, self._scene = parts.scenario.imaging, width_px, parts.scene
+        silt = parts.scenario.tank.silt
+        self._grains = SiltOptics(diameter_m=silt.grain_m, density_kg_m3=silt.grain_density_kg_m3)
+        self._silt: ScalarGrid | None = None
+        self._seen: deque[float] = deque(maxlen=_METERED)
+        self._rng = np.random.default_rng(parts.scenario.seed)
+        self._first = View(X_WC=parts.start.X_WB @ parts.vehicle.X_BC)
+
+    def warm(self) -> None:
+        """Draw a picture for nobody: the first one reads kernels, which takes as long as dozens of others."""
+        self.draw(self._first)
+        self._seen.clear()
+
+    def settings(self, width_px: int) -> ImagingSettings:
+        """Settings of a picture of this width."""
+        height = max(16, round(width_px * self._given.height / self._given.width))
+        return self._given.model_copy(update={"width": width_px, "height": height})
+
+    def draw(self, view: View) -> Any:
+        """The picture, RGB, shape (h, w, 3), uint8."""
+        from wakewise.vision.imaging.auto_exposure import brightness, divided, settled
+        from wakewise.vision.imaging.optics import haze_between, through_water
+        from wakewise.vision.imaging.photograph import white_balance
+        from wakewise.vision.imaging.renderer import render
+        from wakewise.vision.imaging.sensor import expose
+        from wakewise.vision.imaging.settings import ELECTRONS_PER_S, READ_NOISE_E
+
+        if view.silt is not None:
+            self._silt = view.silt if view.silt.largest > 0.0 else None
+        settings, X_WC = self.settings(view.width_px or self._width_px), view.X_WC
+        camera = settings.camera()
+        lights, water, balance = settings.lights(), settings.water(), white_balance(settings)
+        gain, amplification = settings.gain, 1.0
+        if settings.auto_exposure:
+            self._seen.append(brightness(self._scene, X_WC, self._silt, settings, self._grains, balance))
+            chosen = divided(settled(self._seen), settings)
+            gain, amplification = chosen.gain, chosen.amplification
+        seen = render(self._scene, camera, X_WC, lights, 1)
+        haze = haze_between(camera, X_WC, water, self._grains, self._silt, lights)
+        radiance, _ = through_water(seen, camera, haze, water, lights.from_above, self._grains)
+        well_e = ELECTRONS_PER_S * settings.exposure_s / amplification
+        return expose(radiance, gain * balance, well_e, READ_NOISE_E, self._rng)
+
+
+def serve(pipe: IO[bytes], answers: IO[bytes]) -> None:
+    """Draw what is asked for until nobody asks any more: the other process."""
+    import cv2
+
+    first = _read(pipe)
+    if first is None:
+        return
+    easel = Easel(*pickle.loads(first))
+    easel.warm()
+    _write(answers, b"ready")
+    with suppress(OSError):
+        os.nice(NICER)
+    while (message := _read(pipe)) is not None:
+        image = easel.draw(pickle.loads(message))
+        _write(answers, cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes())
+
+
+if __name__ == "__main__":
+    with suppress(ValueError):
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started this ends it
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # whatever else is printed is no answer
+    serve(sys.stdin.buffer, answers)

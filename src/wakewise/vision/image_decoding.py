@@ -1,0 +1,73 @@
+"""Pictures are decoded here alone, after their size has been read from their header."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from wakewise.core.size_limits import check_picture
+
+COLOUR = cv2.IMREAD_COLOR
+AS_STORED = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+"""Colour, not turned as EXIF says."""
+
+
+class _Quiet:
+    """OpenCV's decoders say nothing of their own while any thread is in here."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._inside = 0
+        self._level = 0
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._inside == 0:
+                self._level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+            self._inside += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._inside -= 1
+            if self._inside == 0:
+                cv2.utils.logging.setLogLevel(self._level)
+
+
+_quiet_decoders = _Quiet()
+
+
+def decode_picture(data: bytes, name: str, flags: int = COLOUR) -> NDArray[Any] | None:
+    """A picture of bytes as OpenCV has it, blue first, rows down; None for what is none.
+
+    Raises
+    ------
+    InputError
+        If it has more pixels than are allowed; `name` says which it is.
+    """
+    if not check_picture(data, name):
+        return None
+    try:
+        with _quiet_decoders:
+            return cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+    except cv2.error:
+        return None
+
+
+def read_picture(path: Path, flags: int = COLOUR) -> NDArray[Any] | None:
+    """A picture of a file, as `decode_picture`; None where there is no file that can be read, too.
+
+    Raises
+    ------
+    InputError
+        If it has more pixels than are allowed.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError:
+        return None
+    return decode_picture(data, str(path), flags)

@@ -1,0 +1,141 @@
+"""Area, volume and rugosity of a model, and how well they repeat: measured anew on each half of the photographs.
+
+Each half is reconstructed by itself, from its photographs on, and brought into the whole model's frame by its cameras.
+So what repeats is shape; an error of the scale is in all three alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from wakewise.core.arrays import Array, IntArray
+from wakewise.core.errors import InputError, StageError
+from wakewise.core.files import write_json
+from wakewise.vision.reconstruction.clouds import read_cloud
+from wakewise.vision.reconstruction.ground_plane import Level, level_of
+from wakewise.vision.reconstruction.registered_photos import camera_centres
+
+FIGURES = ("area", "plan_area", "rugosity", "volume")
+CELL_SPACINGS = 4.0
+LEAST_PHOTOS = 12
+"""Fewer, and their halves are too few for a model."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Extent:
+    """Area of the surface and of what it covers of its plane, their ratio, and volume above the plane.
+
+    The ratio is the surface index of A. L. Dahl, Ecology 54(2), 1973, doi 10.2307/1934335, which divers call rugosity.
+    """
+
+    area: float
+    plan_area: float
+    rugosity: float
+    volume: float
+
+
+def surface_of(path: Path) -> tuple[Array, IntArray]:
+    """Vertices and faces of a mesh on disk.
+
+    Raises
+    ------
+    StageError
+        If it holds no triangles.
+    """
+    mesh = trimesh.load(path, process=False) if path.is_file() else None
+    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+        raise StageError(f"{path}: holds no triangles to measure")
+    return np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
+
+
+def cells_of(vertices: Array, faces: IntArray, level: Level, cell: float) -> set[tuple[int, int]]:
+    """Cells of the plane that middles of triangles lie over."""
+    place = np.floor(level.told(vertices[faces].mean(axis=1))[:, :2] / cell).astype(np.int64)
+    return {(int(i), int(j)) for i, j in np.unique(place, axis=0)}
+
+
+def extent_over(vertices: Array, faces: IntArray, level: Level, cell: float, wanted: set[tuple[int, int]]) -> Extent:
+    """Extent of the part of a surface over these cells.
+
+    Volume is the flux of (0, 0, height) through what looks up or down of it: what lies above the plane less what lies
+    below it, as for a hill on a field.
+    """
+    corners = level.told(vertices)[faces]
+    place = np.floor(corners.mean(axis=1)[:, :2] / cell).astype(np.int64)
+    kept = np.array([(int(i), int(j)) in wanted for i, j in place], dtype=np.bool_)
+    corners = corners[kept]
+    normal = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = float(np.linalg.norm(normal, axis=1).sum())
+    plan = len(wanted) * cell**2
+    volume = float((corners[:, :, 2].mean(axis=1) * normal[:, 2]).sum())
+    return Extent(area=area, plan_area=plan, rugosity=area / plan, volume=volume)
+
+
+def measure_halves(
+    model: Path,
+    names: list[str],
+    make: Callable[[list[str], Path, Mapping[str, Array]], None],
+    *,
+    metric: bool,
+) -> dict[str, Any]:
+    """Measure a model and two made of half its photographs each; extent.json in its folder.
+
+    Parameters
+    ----------
+    names : list of str
+        Photographs with a place, in order; every other one is of a half.
+    make : callable
+        Makes a model of these photographs in a folder, in the frame of these camera places (m or units).
+    metric : bool
+        Whether the model's unit is the metre.
+
+    Returns
+    -------
+    dict
+        For each of area, plan_area, rugosity and volume: whole, halves, repeat_pct (difference of the halves over their
+        mean); unit, shared_pct (of the whole's plan that both halves have too, over which all is measured).
+
+    Raises
+    ------
+    InputError
+        If there are too few photographs.
+    StageError
+        If a half gives no model, or the halves share nothing.
+    """
+    if len(names) < LEAST_PHOTOS:
+        raise InputError(f"halves: {len(names)} photos have a place, two models need at least {LEAST_PHOTOS} together")
+    centres = camera_centres(model / "sparse")
+    surfaces = [surface_of(model / "mesh.ply")]
+    for k in (0, 1):
+        folder = model / "halves" / "ab"[k]
+        make(names[k::2], folder, {name: centres[name] for name in names[k::2]})
+        surfaces.append(surface_of(folder / "mesh.ply"))
+    cloud = read_cloud(model / "dense.ply").points_m
+    level = level_of(cloud, np.array(list(centres.values())))
+    plan = level.told(cloud)[:, :2]
+    extent = np.subtract(*np.quantile(plan, (0.99, 0.01), axis=0))  # strays aside
+    cell = CELL_SPACINGS * float(np.sqrt(extent.prod() / len(plan)))
+    covered = [cells_of(*surface, level, cell) for surface in surfaces]
+    shared = covered[0] & covered[1] & covered[2]
+    if not shared:
+        raise StageError("halves: the two models share no part of the subject")
+    extents = [extent_over(*surface, level, cell, shared) for surface in surfaces]
+    out: dict[str, Any] = {
+        "unit": "m" if metric else "model units",
+        "shared_pct": 100.0 * len(shared) / len(covered[0]),
+        "plane_origin": level.origin.tolist(),
+        "plane_up": level.axes[2].tolist(),
+    }
+    for figure in FIGURES:
+        whole, *halves = (float(getattr(extent, figure)) for extent in extents)
+        mean = 0.5 * (halves[0] + halves[1])
+        off = abs(halves[0] - halves[1])
+        out[figure] = {"whole": whole, "halves": halves, "repeat_pct": 100.0 * off / abs(mean) if mean else None}
+    write_json(model / "extent.json", out)
+    return out

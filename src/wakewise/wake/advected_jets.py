@@ -1,0 +1,300 @@
+"""Jets in water that moves: the current bends them, stops them, brings them back, and spreads them where it is unsure.
+
+What a thruster sends out goes on along its own direction e through the water, and the water takes it along:
+
+    dX/dt = chi U e + c,    ds/dt = chi U
+
+with X the place of a cross-section that left t ago, s its way through the water, c the current, U the greatest speed in
+excess of the current, and chi U the mean speed with which momentum travels: momentum flux over mass flux of the
+profile, 1 at the disk and 1/2 for a Gaussian. A jet that blows steadily fills the curve X(t), the plume. In still water
+s is the distance from the disk and U the jet's own centreline speed U_0(s), which is what fixes everything else.
+
+- *Momentum.* What crosses a section in excess of the current is the jet's thrust at every t, in the direction e:
+  U |chi U e + c| q^2 = chi U_0(s)^2, q the width over that of the same jet in still water (the integral method: J. H.
+  W. Lee and V. H. Chu, Turbulent Jets and Plumes, Kluwer 2003).
+- *Width.* A jet along its own path widens by the same share of s in moving water as in still (Chu, Lee and Chu, J.
+  Hydraul. Eng. 125 (1999) 1060); what is bent over widens twice as fast, as a line puff does (0.34 against 0.17 for
+  profiles made square, Lee and Chu 2003). Between the two by the angle of the path against e: cos + 2 sin.
+- *Against the current* the front stops and is taken back past the thruster, as the law of momentum has it. There is one
+  root at every section if the current's opposing part counts by at most sqrt(8) / 3 in the speed of the section, and it
+  counts so; fronts then stop at 2.2 to 2.3 D U_j / |c|, where 2.4 to 2.8 are published (Koenig and Fiedler, Exp. Fluids
+  10 (1991) 212; Yoda and Fiedler, Exp. Fluids 21 (1996) 427).
+- *Across the current* the path is within 30 % of z / rD = 2.05 (x / rD)^.28, r = U_j / |c| (B. D. Pratte and W. D.
+  Baines, J. Hydraul. Div. ASCE 93 (1967) 53), for x from rD to 5 rD and r from 5 on.
+- *Unsure.* A current known to sigma_c puts the section sigma_c t elsewhere. What counts is the mean square of the
+  speed, and that of a Gaussian whose place is normal is a wider and lower one: width^2 grows by (2 sigma_c t)^2, the
+  root mean square of the greatest speed falls as one over the width.
+
+Speeds are per square root of newton at a thrust that is guessed, so that D stays the quadratic form that the exact
+allocators minimise. A point that several parts of a plume pass has the fastest. Left out: walls but for the bed (see
+`floor_carried`), the pair of vortices of a bent jet, and a current that changes on the way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from wakewise.core.arrays import Array, freeze
+from wakewise.core.jit.njit import njit
+from wakewise.wake.kernels import ROUND_JET, as_tuple, own_constants, section_of, speed_and_slope
+
+FOLLOWED_S = 40.0
+"""How long a section is followed. Bent over, its speed falls as t^(-2/3) and its width grows as t^(1/3), so what a
+point sees of it falls to a hundredth of what it had after one second."""
+SECTIONS = 40
+"""Sections of a curve, at times as the squares of whole numbers: the first after .025 s, a centimetre; the last 2 s
+apart, when a plume is half a metre wide."""
+OPPOSED = float(np.sqrt(8.0) / 3.0)
+"""Share of an opposing current that counts in a section's speed: with more there are three roots."""
+PUFF = 2.0
+"""How much faster what is bent over widens, per way through the water."""
+LEAST_GUESS_N = 0.02
+"""Thrust below which no jet is guessed: it would be a guess about noise."""
+GUESS_SHARE = 0.5
+"""A thruster at rest is guessed to push with this share of the mean: half of what it would if all pushed alike."""
+_TINY = 1e-12
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Flow:
+    """The water that jets are sent into, and how hard they are sent.
+
+    Parameters
+    ----------
+    current_W_m_s : ndarray, shape (3,)
+    unsure_m_s : float
+        Standard deviation of each component of the current.
+    thrusts_N : ndarray, shape (m,)
+        Guess of the thrusts, see `guessed`.
+    """
+
+    current_W_m_s: Array
+    unsure_m_s: float
+    thrusts_N: Array
+
+    def __post_init__(self) -> None:
+        freeze(self, current_W_m_s=(3,), thrusts_N=(None,))
+
+    @property
+    def guessed(self) -> Array:
+        """Size of both thrusts of each thruster, shape (2 m,), in N: as they are, but none far below the mean."""
+        return cast(Array, guesses(self.thrusts_N))
+
+
+@njit
+def guesses(thrusts: Array) -> Array:
+    """`Flow.guessed` of thrusts, shape (m,)."""
+    m = thrusts.size
+    mean = 0.0
+    for i in range(m):
+        mean += abs(thrusts[i]) / m
+    least, sizes = max(GUESS_SHARE * mean, LEAST_GUESS_N), np.empty(2 * m)
+    for i in range(m):
+        sizes[i], sizes[m + i] = max(thrusts[i], least), max(-thrusts[i], least)
+    return sizes
+
+
+@njit
+def excess_speed(strength, chi, along, current2, near):  # type: ignore[no-untyped-def]
+    """U of U |chi U e + c| = strength, `along` = c . e with what opposes already lessened, `current2` = c . c.
+
+    The search begins at `near`.
+    """
+    low, high = 0.0, np.sqrt(strength / chi) + 2.0 * np.sqrt(current2) / chi
+    U = min(near, high)
+    for _ in range(60):
+        own = chi * U
+        over = U * U * (own * own + 2.0 * own * along + current2) - strength * strength
+        if over < 0.0:
+            low = U
+        else:
+            high = U
+        # Halley's step, halving where it leaves the bracket. It leaves the cube of the error that it takes away.
+        slope = U * (4.0 * own * own + 6.0 * own * along + 2.0 * current2)
+        bend = 12.0 * own * (own + along) + 2.0 * current2
+        after = U - 2.0 * over * slope / (2.0 * slope * slope - over * bend)
+        if not low < after < high:
+            after = 0.5 * (low + high)
+        if abs(after - U) <= 1e-9 * U:
+            return after
+        U = after
+    return U
+
+
+@njit
+def _rates(kind, numbers, own, s, grown, root, e, current, along, current2, near, v):  # type: ignore[no-untyped-def]
+    """(ds/dt, d grown/dt, U, U_0, width in still water) at one section, and dX/dt into `v`; `grown` / s widens it."""
+    unit, chi, width = section_of(kind, numbers, own, s)
+    still = unit * root
+    wider = max(grown / s, 1.0)
+    U = excess_speed(chi * still * still / (wider * wider), chi, along, current2, near)
+    size2, forward = 0.0, 0.0
+    for x in range(3):
+        v[x] = chi * U * e[x] + current[x]
+        size2 += v[x] * v[x]
+        forward += v[x] * e[x]
+    cosine = min(max(forward / np.sqrt(size2), 0.0), 1.0) if size2 > 0.0 else 1.0
+    rate = chi * U
+    return rate, rate * (cosine + PUFF * np.sqrt(1.0 - cosine * cosine)), U, still, width
+
+
+@njit(apart=True)
+def follow(kind, parameters, own, origin, e, thrust, current, unsure, curve):  # type: ignore[no-untyped-def]
+    """Sections of one plume into `curve`, (SECTIONS + 1, 7): X, t, s, speed over still water's at s, and width so.
+
+    Parameters
+    ----------
+    kind, parameters, own
+        The jet's law and its disk's constants (`kernels.own_constants`), shape (6,).
+    origin, e, current : ndarray, shape (3,)
+    thrust, unsure : float
+        In N, more than 0; in m/s.
+    """
+    numbers = as_tuple(parameters)
+    root = np.sqrt(thrust)
+    along, current2 = 0.0, 0.0
+    for x in range(3):
+        along += current[x] * e[x]
+        current2 += current[x] * current[x]
+    if along < 0.0:
+        along *= OPPOSED
+    # A cone has no speed at its tip.
+    s = 1e-6 if kind == ROUND_JET else 0.05
+    grown, t = s, 0.0
+    X, v = origin.copy(), np.empty(3)
+    ds, dg, U, still, width = _rates(kind, numbers, own, s, grown, root, e, current, along, current2, 1e3, v)
+    curve[0, :3] = X
+    curve[0, 3], curve[0, 4], curve[0, 5], curve[0, 6] = 0.0, 0.0, 1.0, 1.0
+    for x in range(3):
+        X[x] += s * e[x]
+    for k in range(1, SECTIONS + 1):
+        then = FOLLOWED_S * (k / SECTIONS) ** 2
+        dt = then - t
+        # The midpoint rule; the rates at a section's end are those at the next one's beginning.
+        half_s, half_grown = s + 0.5 * dt * ds, grown + 0.5 * dt * dg
+        ds, dg, U, _, _ = _rates(kind, numbers, own, half_s, half_grown, root, e, current, along, current2, U, v)
+        for x in range(3):
+            X[x] += dt * v[x]
+        s, grown, t = s + dt * ds, grown + dt * dg, then
+        ds, dg, U, still, width = _rates(kind, numbers, own, s, grown, root, e, current, along, current2, U, v)
+        wider = max(grown / s, 1.0)
+        blurred = np.sqrt(1.0 + (2.0 * unsure * t / (wider * width)) ** 2)
+        curve[k, :3] = X
+        curve[k, 3], curve[k, 4], curve[k, 5], curve[k, 6] = t, s, U / (still * blurred), wider * blurred
+
+
+@njit
+def fill_plume(points, ball, kind, parameters, own, curve, end, room, hits, speed):  # type: ignore[no-untyped-def]
+    """Raise `speed`, shape (n,), to the plume's speed per square root of newton at points, shape (3, n), in a ball.
+
+    `end`, shape (2,): how far along itself the jet is whole, and what share of it goes on from there. `room`, shape
+    (2, n), and `hits`, shape (n + 1,), are room to work in.
+    """
+    numbers = as_tuple(parameters)
+    count, n = SECTIONS, points.shape[1]
+    d, length = np.zeros((count, 3)), np.empty(count)
+    for k in range(count):
+        total = 0.0
+        for x in range(3):
+            d[k, x] = curve[k + 1, x] - curve[k, x]
+            total += d[k, x] * d[k, x]
+        length[k] = np.sqrt(total)
+        for x in range(3):
+            d[k, x] /= length[k] + _TINY
+    for k in range(count):
+        a, b, whole = curve[k], curve[k + 1], length[k]
+        s, wide = b[4], max(a[6], b[6])
+        reach2 = (own[3] + own[4] * s + (own[5] - 1.0) * s * s) * wide * wide
+        # Most of a plume is far from all of the points.
+        px, py, pz = a[0] - ball[0], a[1] - ball[1], a[2] - ball[2]
+        if px * px + py * py + pz * pz > (ball[3] + whole + np.sqrt(reach2)) ** 2:
+            continue
+        # And most points are far from what is left of it: a pass without branches, in vector instructions, finds those.
+        ax, ay, az, dx, dy, dz = a[0], a[1], a[2], d[k, 0], d[k, 1], d[k, 2]
+        for j in range(n):
+            px, py, pz = points[0, j] - ax, points[1, j] - ay, points[2, j] - az
+            on = px * dx + py * dy + pz * dz
+            nearest = min(on, whole)
+            room[0, j] = on
+            room[1, j] = px * px + py * py + pz * pz - nearest * (2.0 * on - nearest)
+        reached = 0
+        for j in range(n):
+            hits[reached] = j
+            reached += (room[0, j] > 0.0) & (room[1, j] <= reach2)
+        for h in range(reached):
+            j = hits[h]
+            on, share = room[0, j], 1.0
+            if on > whole:
+                if k + 1 == count:
+                    continue
+                # Between this section's end and the next one's beginning, outside of the bend.
+                px, py, pz = points[0, j] - b[0], points[1, j] - b[1], points[2, j] - b[2]
+                if px * d[k + 1, 0] + py * d[k + 1, 1] + pz * d[k + 1, 2] > 0.0:
+                    continue
+            else:
+                share = on / whole
+            r2 = max(room[1, j], 0.0)
+            along = a[4] + share * (b[4] - a[4])
+            stretch = a[6] + share * (b[6] - a[6])
+            if r2 > (own[3] + own[4] * along + (own[5] - 1.0) * along * along) * stretch * stretch:
+                continue
+            f, _, _ = speed_and_slope(
+                kind, numbers, own[0], own[1], own[2], along, along * along + r2 / (stretch * stretch)
+            )
+            left = end[1] if along > end[0] else 1.0
+            speed[j] = max(speed[j], left * f * (a[5] + share * (b[5] - a[5])))
+
+
+@njit
+def plume_speeds(points, origins, directions, areas, kind, parameters, thrusts, current, unsure, ends):  # type: ignore[no-untyped-def]
+    """Speed per square root of newton of m jets at n points, shape (m, n), and their curves, (m, SECTIONS + 1, 7).
+
+    Jets leave along `directions`, shape (m, 3), and move the water in excess of the current along them, too. `ends`,
+    shape (m, 2), as for `fill_plume`.
+    """
+    m, n = origins.shape[0], points.shape[0]
+    own = own_constants(kind, parameters, areas)
+    speeds, curves = np.zeros((m, n)), np.empty((m, SECTIONS + 1, 7))
+    across, ball = np.empty((3, n)), np.zeros(4)
+    for x in range(3):
+        for j in range(n):
+            across[x, j] = points[j, x]
+            ball[x] += points[j, x] / n
+    for j in range(n):
+        r2 = 0.0
+        for x in range(3):
+            r2 += (points[j, x] - ball[x]) ** 2
+        ball[3] = max(ball[3], np.sqrt(r2))
+    room, hits = np.empty((2, n)), np.empty(n + 1, np.int64)
+    for i in range(m):
+        follow(kind, parameters, own[i], origins[i], directions[i], thrusts[i], current, unsure, curves[i])
+        fill_plume(across, ball, kind, parameters, own[i], curves[i], ends[i], room, hits, speeds[i])
+    return speeds, curves
+
+
+def plumes(
+    points_W_m: Array,
+    origins_W_m: Array,
+    directions_W: Array,
+    areas_m2: Array,
+    law: tuple[int, Array],
+    thrusts_N: Array,
+    flow: Flow,
+    ends: Array,
+) -> tuple[Array, Array]:
+    """`plume_speeds` of jets of a law, of these sizes, in a flow."""
+    found = plume_speeds(
+        points_W_m,
+        np.ascontiguousarray(origins_W_m),
+        np.ascontiguousarray(directions_W),
+        areas_m2,
+        *law,
+        thrusts_N,
+        flow.current_W_m_s,
+        flow.unsure_m_s,
+        ends,
+    )
+    return cast("tuple[Array, Array]", found)

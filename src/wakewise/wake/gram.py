@@ -1,0 +1,253 @@
+"""Compiled sums over a region's points: the Gram matrix of D, and its derivatives by the vehicle's pose.
+
+Points are taken in blocks of `BLOCK`, so that everything about a block stays in the processor's first caches and time
+grows linearly with the number of points. Within a block every jet that reaches a point gets a row of speeds (and of
+slopes), zero where it misses; the sums are then products of contiguous rows, which compile to vector instructions.
+Reordered addition (`FAST`) changes only the last bits, and always in the same way on one processor.
+
+Rows: row i of G is thruster i with T > 0, whose jet goes along -axis; row m + i the same with T < 0.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wakewise.core.jit.njit import njit
+from wakewise.wake.kernels import as_tuple, own_constants, speed_and_slope
+
+BLOCK = 256
+FAST = {"reassoc", "contract", "nsz", "arcp"}
+PERPENDICULAR = 1e-14
+"""Cosine under which two jets count as perpendicular: rounding of unit vectors leaves up to some 1e-16."""
+
+
+@njit(apart=True, fastmath=FAST)
+def load_block(points, weights, start, count, block):  # type: ignore[no-untyped-def]
+    """Points x, y, z and roots of weights into rows 0 to 3 of `block`; returns NaN if any of them is not finite."""
+    check = 0.0
+    for j in range(count):
+        x, y, z, w = points[start + j, 0], points[start + j, 1], points[start + j, 2], weights[start + j]
+        block[0, j] = x
+        block[1, j] = y
+        block[2, j] = z
+        block[3, j] = np.sqrt(w)
+        check += 0.0 * (x + y + z + block[3, j])
+    return check
+
+
+@njit(apart=True)
+def check_jets(p, q, origins, axes, areas):  # type: ignore[no-untyped-def]
+    """0 for a sound pose and sound thrusters; NaN if anything is not finite or an area is not more than 0."""
+    check = 0.0
+    for r in range(p.shape[0]):
+        check += 0.0 * p[r]
+    for r in range(q.shape[0]):
+        check += 0.0 * q[r]
+    for i in range(areas.shape[0]):
+        for r in range(3):
+            check += 0.0 * (origins[i, r] + axes[i, r])
+        check += 0.0 / np.sqrt(areas[i])
+    return check
+
+
+@njit(fastmath=FAST)
+def dot(a, b, count):  # type: ignore[no-untyped-def]
+    """Sum of products of the first `count` elements."""
+    total = 0.0
+    for j in range(count):
+        total += a[j] * b[j]
+    return total
+
+
+@njit(apart=True)
+def fill_rows(block, count, origins, axes, own, kind, numbers, slopes, scratch, hits, rows, column):  # type: ignore[no-untyped-def]
+    """Rows of sqrt(w) times f, and if `slopes` alpha and beta, of the jets that reach one of the block's points.
+
+    `rows[0]`, `rows[1]`, `rows[2]`, each of shape (2 m, BLOCK), take f, alpha and beta. Returns how many rows were
+    filled; `column[row]` is i for the jet of T_i > 0 and m + i for that of T_i < 0.
+    """
+    m = origins.shape[0]
+    filled = 0
+    for i in range(m):
+        ox, oy, oz = origins[i, 0], origins[i, 1], origins[i, 2]
+        ax, ay, az = axes[i, 0], axes[i, 1], axes[i, 2]
+        reach0, reach1, reach2 = own[i, 3], own[i, 4], own[i, 5]
+        for j in range(count):
+            ex, ey, ez = block[0, j] - ox, block[1, j] - oy, block[2, j] - oz
+            along = ex * ax + ey * ay + ez * az
+            r2 = ex * ex + ey * ey + ez * ez
+            scratch[0, j] = along
+            scratch[1, j] = r2
+            scratch[2, j] = reach0 + reach1 * abs(along) + reach2 * along * along - r2
+        reached = 0
+        for j in range(count):
+            hits[reached] = j
+            reached += scratch[2, j] >= 0.0 and scratch[0, j] != 0.0
+        ahead, astern = -1, -1
+        for h in range(reached):
+            j = hits[h]
+            x = scratch[0, j]
+            row = ahead if x < 0.0 else astern
+            if row < 0:
+                row = filled
+                filled += 1
+                rows[0, row, :count] = 0.0
+                if slopes:
+                    rows[1, row, :count] = 0.0
+                    rows[2, row, :count] = 0.0
+                if x < 0.0:
+                    ahead = row
+                    column[row] = i
+                else:
+                    astern = row
+                    column[row] = m + i
+            f, by_axis, by_offset = speed_and_slope(
+                kind, numbers, own[i, 0], own[i, 1], own[i, 2], abs(x), scratch[1, j]
+            )
+            rows[0, row, j] = f * block[3, j]
+            if slopes:
+                rows[1, row, j] = by_axis * block[3, j]
+                rows[2, row, j] = by_offset * block[3, j]
+    return filled
+
+
+@njit
+def cosines(axes):  # type: ignore[no-untyped-def]
+    """d_i . d_k of the 2 m jets' directions, shape (2 m, 2 m); zero for what is perpendicular but for rounding."""
+    m = axes.shape[0]
+    table = np.zeros((2 * m, 2 * m))
+    for i in range(m):
+        for k in range(m):
+            dot = axes[i, 0] * axes[k, 0] + axes[i, 1] * axes[k, 1] + axes[i, 2] * axes[k, 2]
+            if abs(dot) > PERPENDICULAR:
+                table[i, k] = dot
+                table[m + i, m + k] = dot
+                # No point is downstream of both jets of one thruster.
+                if i != k:
+                    table[i, m + k] = -dot
+                    table[m + i, k] = -dot
+    return table
+
+
+@njit(fastmath=FAST)
+def gram_sum(points, weights, origins, axes, areas, kind, parameters):  # type: ignore[no-untyped-def]
+    """G, shape (2 m, 2 m), and a number that is NaN if a point or weight is not finite or a weight is negative."""
+    n, m = points.shape[0], origins.shape[0]
+    own, numbers = own_constants(kind, parameters, areas), as_tuple(parameters)
+    table = cosines(axes)
+    G = np.zeros((2 * m, 2 * m))
+    block, scratch, hits = np.empty((4, BLOCK)), np.empty((3, BLOCK)), np.empty(BLOCK + 1, np.int64)
+    rows, column = np.empty((1, 2 * m, BLOCK)), np.empty(2 * m, np.int64)
+    check = check_jets(areas, areas, origins, axes, areas)
+    for start in range(0, n, BLOCK):
+        count = min(BLOCK, n - start)
+        check += load_block(points, weights, start, count, block)
+        filled = fill_rows(block, count, origins, axes, own, kind, numbers, False, scratch, hits, rows, column)
+        for a in range(filled):
+            for c in range(a + 1):
+                cosine = table[column[a], column[c]]
+                if cosine != 0.0:
+                    total = dot(rows[0, a], rows[0, c], count)
+                    G[column[a], column[c]] += cosine * total
+                    if a != c:
+                        G[column[c], column[a]] += cosine * total
+    return G, check
+
+
+@njit(apart=True)
+def place(p, q, positions_B, axes_B):  # type: ignore[no-untyped-def]
+    """(R_WB, origins in W, axes in W) of thrusters on a body at p with unit quaternion q = (w, x, y, z)."""
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    R = np.empty((3, 3))
+    R[0, 0], R[0, 1], R[0, 2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
+    R[1, 0], R[1, 1], R[1, 2] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
+    R[2, 0], R[2, 1], R[2, 2] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+    m = positions_B.shape[0]
+    origins, axes = np.empty((m, 3)), np.empty((m, 3))
+    for i in range(m):
+        for row in range(3):
+            origins[i, row] = (
+                p[row] + R[row, 0] * positions_B[i, 0] + R[row, 1] * positions_B[i, 1] + R[row, 2] * positions_B[i, 2]
+            )
+            axes[i, row] = R[row, 0] * axes_B[i, 0] + R[row, 1] * axes_B[i, 1] + R[row, 2] * axes_B[i, 2]
+    return R, origins, axes
+
+
+@njit(apart=True, fastmath=FAST)
+def pose_slopes(block, count, p, origin, axis, sign, alpha, beta, slope):  # type: ignore[no-untyped-def]
+    """Rows 0 to 5 of `slope`: derivatives of one jet's sqrt(w) f by the vehicle's position and by a turn, both in W.
+
+    A shift of the vehicle moves the point the other way, and a turn theta about the body's origin moves it by
+    -theta x (point - p) as the vehicle sees it, so the derivatives are -g and g x (point - p), g = alpha d + beta e.
+    `sign` is +1 for the jet along the axis and -1 for the one against it.
+    """
+    px, py, pz = p[0], p[1], p[2]
+    ox, oy, oz = origin[0], origin[1], origin[2]
+    dx, dy, dz = sign * axis[0], sign * axis[1], sign * axis[2]
+    for j in range(count):
+        x, y, z = block[0, j], block[1, j], block[2, j]
+        al, be = alpha[j], beta[j]
+        gx, gy, gz = al * dx + be * (x - ox), al * dy + be * (y - oy), al * dz + be * (z - oz)
+        qx, qy, qz = x - px, y - py, z - pz
+        slope[0, j] = -gx
+        slope[1, j] = -gy
+        slope[2, j] = -gz
+        slope[3, j] = gy * qz - gz * qy
+        slope[4, j] = gz * qx - gx * qz
+        slope[5, j] = gx * qy - gy * qx
+
+
+@njit(fastmath=FAST)
+def gram_slope_sum(points, weights, p, q, positions_B, axes_B, areas, kind, parameters):  # type: ignore[no-untyped-def]
+    """G, shape (2 m, 2 m), its derivatives by position in W and rotation vector in B, (6, 2 m, 2 m), and the check."""
+    n, m = points.shape[0], positions_B.shape[0]
+    R, origins, axes = place(p, q, positions_B, axes_B)
+    own, numbers = own_constants(kind, parameters, areas), as_tuple(parameters)
+    table = cosines(axes_B)
+    # Sums over points of f_a f_c and of f_a times the six slopes of f_c, before the factor d_a . d_c.
+    total = np.zeros((2 * m, 2 * m, 7))
+    block, scratch, hits = np.empty((4, BLOCK)), np.empty((3, BLOCK)), np.empty(BLOCK + 1, np.int64)
+    rows, column, slope = np.empty((3, 2 * m, BLOCK)), np.empty(2 * m, np.int64), np.empty((6, BLOCK))
+    check = check_jets(p, q, origins, axes, areas)
+    for start in range(0, n, BLOCK):
+        count = min(BLOCK, n - start)
+        check += load_block(points, weights, start, count, block)
+        filled = fill_rows(block, count, origins, axes, own, kind, numbers, True, scratch, hits, rows, column)
+        for c in range(filled):
+            k = column[c]
+            i = k if k < m else k - m
+            pose_slopes(block, count, p, origins[i], axes[i], 1.0 if k >= m else -1.0, rows[1, c], rows[2, c], slope)
+            for a in range(filled):
+                if table[column[a], k] != 0.0:
+                    s, s0, s1, s2, s3, s4, s5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+                    for j in range(count):
+                        f = rows[0, a, j]
+                        s += f * rows[0, c, j]
+                        s0 += f * slope[0, j]
+                        s1 += f * slope[1, j]
+                        s2 += f * slope[2, j]
+                        s3 += f * slope[3, j]
+                        s4 += f * slope[4, j]
+                        s5 += f * slope[5, j]
+                    sums = total[column[a], k]
+                    sums[0] += s
+                    sums[1] += s0
+                    sums[2] += s1
+                    sums[3] += s2
+                    sums[4] += s3
+                    sums[5] += s4
+                    sums[6] += s5
+    G, dG = np.zeros((2 * m, 2 * m)), np.zeros((6, 2 * m, 2 * m))
+    for a in range(2 * m):
+        for c in range(a + 1):
+            cosine = table[a, c]
+            if cosine != 0.0:
+                # One of the two sums, not each its own, so that G is symmetric to the last bit.
+                G[a, c] = G[c, a] = cosine * total[a, c, 0]
+                for r in range(3):
+                    dG[r, a, c] = dG[r, c, a] = cosine * (total[a, c, 1 + r] + total[c, a, 1 + r])
+                    turn = 0.0
+                    for row in range(3):
+                        turn += R[row, r] * (total[a, c, 4 + row] + total[c, a, 4 + row])
+                    dG[3 + r, a, c] = dG[3 + r, c, a] = cosine * turn
+    return G, dG, check

@@ -1,0 +1,215 @@
+"""What a jet does after it strikes the bed: a wall jet that spreads along it from where the jet's axis meets it.
+
+A round jet that strikes a floor squarely runs outwards on it with u_max = 1.16 sqrt(M) / r and half thickness 0.09 r,
+M = T / rho, r from the strike point (N. Rajaratnam, Turbulent Jets, Elsevier 1976: 1.03 U0 D / r). Like the free jet it
+goes with sqrt(T), so it enters the same quadratic form of D; but its direction differs from point to point.
+
+Three things the law leaves open are closed as follows.
+
+- *A slanting jet* sends most of its water forward. The flux of momentum per angle phi from the forward direction is
+  M / (2 pi) sin^3(psi) / (1 - cos(psi) cos(phi))^2, psi the angle between jet and bed: the inviscid sheet of D. Hasson
+  and R. E. Peck, AIChE J. 10 (1964) 752. Its integral is M and its component along the bed M cos(psi), so momentum
+  along the bed is kept. Speed goes with its root. Jets within 3 deg of level are taken as never landing.
+- *Near the strike point* the water turns and 1 / r cannot go on. With r / (r^2 + r0^2) for 1 / r, the speed is greatest
+  at r0 and vanishes at the strike point; r0 = 1.16 / (2 K) (H^6 + L^6)^(1/6) makes that greatest speed the centreline
+  speed with which a round jet arrives from the distance H (`RoundJet`: K = 6.9, L = K sqrt(A)).
+- *Across the layer* the speed falls as a Gaussian of the height, 1/2 at the half thickness; the thin layer under the
+  maximum, where friction slows the water, is left out.
+
+The free jet is not stopped at the bed: within the last decimetre both terms are there. Not included: what a target in
+the way does to a wall jet, its meeting other wall jets, friction over long ways, and time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wakewise.core.arrays import Array
+from wakewise.core.constants import FRESH_WATER_KG_M3
+from wakewise.core.errors import InputError
+from wakewise.core.jit.njit import njit
+from wakewise.wake.gram import FAST, fill_rows, pose_slopes
+from wakewise.wake.jets import AxialJet, RoundJet
+
+WALL_SPEED = 1.16
+"""u_max r / sqrt(M) of a wall jet (Rajaratnam 1976)."""
+HALF_THICKNESS = 0.09
+"""Height of half the greatest speed over the distance from the strike point (Rajaratnam 1976)."""
+LEAST_SINE = 0.05
+"""Sine of the angle to the bed under which a jet is taken as never landing."""
+ROUND_DECAY = RoundJet().decay
+
+
+@dataclass(frozen=True, kw_only=True)
+class FloorJet:
+    """A free jet and the wall jet that it becomes on the bed; implements `wakewise.core.interfaces.WakeModel`.
+
+    Parameters
+    ----------
+    jet : AxialJet
+        What the jet does on its way.
+    bed_z_m : float
+        The bed is the plane z = bed_z_m of the world (z down). Points below it are taken as on it.
+    """
+
+    jet: AxialJet
+    bed_z_m: float
+    water_density_kg_m3: float = FRESH_WATER_KG_M3
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.bed_z_m):
+            raise InputError(f"floor of wake model {self.jet.name}: bed_z_m {self.bed_z_m:g}, must be finite")
+        if not 900.0 <= self.water_density_kg_m3 <= 1100.0:
+            raise InputError(
+                f"floor of wake model {self.jet.name}: water_density_kg_m3 {self.water_density_kg_m3:g}, "
+                "allowed 900 to 1100"
+            )
+
+    @property
+    def name(self) -> str:
+        """Name used in tables: that of the free jet with `+floor`."""
+        return f"{self.jet.name}+floor"
+
+    @property
+    def numbers(self) -> Array:
+        """Bed and strength for the kernels: z in m, u_max r in m2/s per square root of newton."""
+        return np.array([self.bed_z_m, WALL_SPEED / np.sqrt(self.water_density_kg_m3)])
+
+    def unit_velocity(self, points_W_m: Array, origins_W_m: Array, directions_W: Array, area_m2: Array) -> Array:
+        """Velocity per square root of newton, shape (m, n, 3): see `wakewise.core.interfaces.WakeModel`."""
+        velocity = self.jet.unit_velocity(points_W_m, origins_W_m, directions_W, area_m2)
+        directions = np.ascontiguousarray(directions_W, dtype=np.float64)
+        return np.asarray(velocity + wall_velocity(points_W_m, origins_W_m, directions, area_m2, self.numbers))
+
+
+@njit
+def _strike(origin, dx, dy, dz, area, bed_z):  # type: ignore[no-untyped-def]
+    """(lands, H, strike x, strike y, r0, d r0 / d H) of one jet: how far it goes, and where it meets the bed."""
+    if dz < LEAST_SINE or origin[2] >= bed_z:
+        return False, 0.0, 0.0, 0.0, 0.0, 0.0
+    H = (bed_z - origin[2]) / dz
+    L = ROUND_DECAY * np.sqrt(area)
+    far = (H**6 + L**6) ** (1.0 / 6.0)
+    share = 0.5 * WALL_SPEED / ROUND_DECAY
+    return True, H, origin[0] + H * dx, origin[1] + H * dy, share * far, share * (H / far) ** 5
+
+
+@njit
+def wall_velocity(points, origins, directions, areas, floor):  # type: ignore[no-untyped-def]
+    """Velocity of the wall jets per square root of newton, shape (m, n, 3), of jets along `directions`, (m, 3)."""
+    n, m = points.shape[0], origins.shape[0]
+    velocity = np.zeros((m, n, 3))
+    for i in range(m):
+        d = directions[i]
+        lands, _, strike_x, strike_y, r0, _ = _strike(origins[i], d[0], d[1], d[2], areas[i], floor[0])
+        if lands:
+            strength = floor[1] * d[2] * np.sqrt(d[2])
+            for j in range(n):
+                x, y = points[j, 0] - strike_x, points[j, 1] - strike_y
+                height = max(floor[0] - points[j, 2], 0.0)
+                square = x * x + y * y + r0 * r0
+                forward = (x * d[0] + y * d[1]) / np.sqrt(square)
+                layer = np.exp(-np.log(2.0) * height * height / (HALF_THICKNESS**2 * square))
+                factor = strength * layer / (square * (1.0 - forward))
+                velocity[i, j, 0] = factor * x
+                velocity[i, j, 1] = factor * y
+    return velocity
+
+
+@njit(apart=True)
+def add_wall(block, count, p, origin, dx, dy, dz, area, floor, V, dV):  # type: ignore[no-untyped-def]
+    """Add sqrt(w) u of the wall jet of a jet along (dx, dy, dz) to `V`, (3, BLOCK).
+
+    Its slopes by the body's shift and turn, both in W, go to `dV`, (6, 3, BLOCK).
+    """
+    lands, H, strike_x, strike_y, r0, r0_slope = _strike(origin, dx, dy, dz, area, floor[0])
+    if not lands:
+        return
+    strength = floor[1] * dz * np.sqrt(dz)
+    # What shift and turn do to the direction, to the strike point and to r0: none of it depends on the point.
+    moved = np.zeros((6, 6))
+    arm_x, arm_y, arm_z = origin[0] - p[0], origin[1] - p[1], origin[2] - p[2]
+    for r in range(6):
+        # A shift moves the disk; a turn about axis k moves it by e_k x arm and the direction by e_k x d.
+        ux, uy, uz = 1.0 if r % 3 == 0 else 0.0, 1.0 if r % 3 == 1 else 0.0, 1.0 if r % 3 == 2 else 0.0
+        sx, sy, sz, tx, ty, tz = ux, uy, uz, 0.0, 0.0, 0.0
+        if r >= 3:
+            sx, sy, sz = uy * arm_z - uz * arm_y, uz * arm_x - ux * arm_z, ux * arm_y - uy * arm_x
+            tx, ty, tz = uy * dz - uz * dy, uz * dx - ux * dz, ux * dy - uy * dx
+        longer = (-sz - H * tz) / dz
+        moved[r, 0], moved[r, 1], moved[r, 2] = tx, ty, tz
+        moved[r, 3] = sx + longer * dx + H * tx
+        moved[r, 4] = sy + longer * dy + H * ty
+        moved[r, 5] = r0_slope * longer
+    for j in range(count):
+        x, y = block[0, j] - strike_x, block[1, j] - strike_y
+        height = max(floor[0] - block[2, j], 0.0)
+        square = x * x + y * y + r0 * r0
+        root = np.sqrt(square)
+        forward = (x * dx + y * dy) / root
+        fade = np.log(2.0) * height * height / (HALF_THICKNESS**2 * square)
+        factor = block[3, j] * strength * np.exp(-fade) / (square * (1.0 - forward))
+        V[0, j] += factor * x
+        V[1, j] += factor * y
+        for r in range(6):
+            x_moved, y_moved = -moved[r, 3], -moved[r, 4]
+            square_moved = 2.0 * (x * x_moved + y * y_moved + r0 * moved[r, 5])
+            forward_moved = (
+                x_moved * dx + y_moved * dy + x * moved[r, 0] + y * moved[r, 1]
+            ) / root - 0.5 * forward * square_moved / square
+            grown = 1.5 * moved[r, 2] / dz + (fade - 1.0) * square_moved / square + forward_moved / (1.0 - forward)
+            dV[r, 0, j] += factor * (grown * x + x_moved)
+            dV[r, 1, j] += factor * (grown * y + y_moved)
+
+
+@njit(apart=True, fastmath=FAST)
+def fill_velocities(  # type: ignore[no-untyped-def]
+    block, count, p, origins, axes, areas, own, kind, numbers, floor, scratch, hits, rows, column, slope, V, dV
+):
+    """Velocities of all 2 m jets, free and wall, into `V`, (2 m, 3, BLOCK), slopes into `dV`, (2 m, 6, 3, BLOCK)."""
+    m = origins.shape[0]
+    for k in range(2 * m):
+        for x in range(3):
+            for j in range(count):
+                V[k, x, j] = 0.0
+            for r in range(6):
+                for j in range(count):
+                    dV[k, r, x, j] = 0.0
+    filled = fill_rows(block, count, origins, axes, own, kind, numbers, True, scratch, hits, rows, column)
+    for a in range(filled):
+        k = column[a]
+        i = k if k < m else k - m
+        sign = 1.0 if k >= m else -1.0
+        pose_slopes(block, count, p, origins[i], axes[i], sign, rows[1, a], rows[2, a], slope)
+        for x in range(3):
+            d = sign * axes[i, x]
+            for j in range(count):
+                V[k, x, j] = d * rows[0, a, j]
+            for r in range(6):
+                for j in range(count):
+                    dV[k, r, x, j] = d * slope[r, j]
+        # The direction turns with the body: a turn about axis r moves it by e_r x d.
+        for r in range(3):
+            y, z = (r + 1) % 3, (r + 2) % 3
+            dy, dz = sign * axes[i, y], sign * axes[i, z]
+            for j in range(count):
+                dV[k, 3 + r, y, j] -= dz * rows[0, a, j]
+                dV[k, 3 + r, z, j] += dy * rows[0, a, j]
+    for k in range(2 * m):
+        i = k if k < m else k - m
+        sign = 1.0 if k >= m else -1.0
+        add_wall(
+            block,
+            count,
+            p,
+            origins[i],
+            sign * axes[i, 0],
+            sign * axes[i, 1],
+            sign * axes[i, 2],
+            areas[i],
+            floor,
+            V[k],
+            dV[k],
+        )

@@ -1,0 +1,171 @@
+"""A controller that nobody here has read cannot end a flight or send nonsense: the guard flies on and says why."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import polars as pl
+import pytest
+
+import wakewise as ww
+from wakewise.control import make_controller
+from wakewise.core.errors import StageError
+from wakewise.operation.plugin_adapter import Guarded, described
+
+pytestmark = pytest.mark.usefixtures("fallbacks_fly")
+
+SECONDS = 0.4
+
+
+@cache
+def parts():
+    return ww.Scenario.preset("quick", **{"target.kind": "brain", "target.points": 60}).parts()
+
+
+@dataclass
+class Foreign:
+    """Does what it is told at every step, from the third on."""
+
+    act: object
+    name: str = "theirs"
+
+    def init(self):
+        return 0
+
+    def step(self, state, dt_s, estimate, goal):
+        good = ww.Command(thrusts_N=np.full(8, 0.1), wrench_B=np.zeros(6))
+        return state + 1, good if state < 2 else self.act(good)
+
+
+def raises(_):
+    raise ZeroDivisionError("no such thing")
+
+
+def nan(good):
+    return ww.Command(thrusts_N=np.full(8, np.nan), wrench_B=np.zeros(6))
+
+
+def seven(good):
+    return ww.Command(thrusts_N=np.zeros(7), wrench_B=np.zeros(6))
+
+
+@pytest.mark.parametrize(
+    ("act", "words"),
+    [
+        (raises, "theirs: raised ZeroDivisionError: no such thing (test_plugin_adapter.py:"),
+        (nan, "theirs: raised NotFinite: thrusts_N: holds NaN"),
+        (seven, "theirs: gave 7 thrusts, needs 8"),
+        (lambda good: good.thrusts_N, "theirs: gave ndarray, must be a Command"),
+    ],
+)
+def test_nonsense_is_flown_by_dp_and_counted(act, words):
+    """The flight is whole; each bad step has its reason in one line, and the thrusts flown are finite, one each."""
+    flight = ww.fly(parts().replace(controller=Foreign(act)), duration_s=SECONDS)
+    said = flight.steps["fallback"].to_list()
+    assert len(said) == 20 and said[:2] == ["", ""]
+    assert all(line.startswith(words) and "flown by dp" in line and "\n" not in line for line in said[2:])
+    assert flight.figures["fallbacks"] == 18
+    thrusts = flight.steps.select(pl.selectors.starts_with("command_")).to_numpy()
+    assert thrusts.shape == (20, 8) and np.isfinite(thrusts).all()
+    assert flight.steps["est_x_m"].is_finite().all()
+
+
+def test_thrusts_beyond_the_limits_are_cut_and_counted():
+    """What a thruster cannot give is not sent."""
+    flight = ww.fly(
+        parts().replace(controller=Foreign(lambda _: ww.Command(thrusts_N=np.full(8, 1e6), wrench_B=np.zeros(6)))),
+        duration_s=SECONDS,
+    )
+    most = parts().vehicle.thrust_upper_N
+    assert np.all(flight.steps.select(pl.selectors.starts_with("command_")).to_numpy() <= most + 1e-9)
+    assert "beyond their limits, cut" in flight.steps["fallback"][5]
+
+
+def guarded(clock, patience_s=5.0):
+    vehicle = parts().vehicle
+    return Guarded(
+        name="slow",
+        inner=Foreign(lambda good: good),
+        thrusters=8,
+        lower_N=vehicle.thrust_lower_N,
+        upper_N=vehicle.thrust_upper_N,
+        backup=lambda: make_controller("dp", vehicle, parts().region, parts().wake, parts().control),
+        patience_s=patience_s,
+        clock=clock,
+    )
+
+
+def test_two_seconds_a_step_are_counted_and_after_some_patience_not_asked_for_again():
+    """A simulated world waits, so late thrusts are flown and said; then `dp` flies the rest, said too."""
+    now = iter(np.arange(0.0, 1000.0, 2.0))
+    controller = guarded(lambda: float(next(now)))
+    state, goal = controller.init(), ww.Goal(X_WB=parts().start.X_WB)
+    said = []
+    for _ in range(6):
+        state, command = controller.step(state, 0.02, parts().start, goal)
+        said.append(command.fallback or "")
+    assert said[0] == "", "the first step may compile"
+    assert said[1] == "slow: late, 2000 ms of 20 allowed"
+    assert said[-1].startswith("slow: given up, 6 s late in all, last 2.00 s for 0.02 s; flown by dp")
+
+
+def test_an_init_that_raises_leaves_the_flight_to_dp():
+    """Nothing of the controller is asked after that."""
+    broken = Foreign(raises)
+    broken.init = lambda: 1 / 0
+    flight = ww.fly(parts().replace(controller=broken), duration_s=0.1)
+    assert set(flight.steps["fallback"]) == {
+        line for line in flight.steps["fallback"] if line.startswith("theirs: init raised ZeroDivisionError")
+    }
+
+
+def test_another_part_that_raises_ends_the_flight_in_one_line():
+    """A pilot has no backup: the error names it and the instant."""
+
+    @dataclass
+    class Pilot:
+        name: str = "lost"
+
+        def goal(self, time_s, estimate):
+            if time_s > 0.1:
+                raise RuntimeError("where am I")
+            return ww.Goal(X_WB=parts().start.X_WB)
+
+    with pytest.raises(StageError, match=r"fly: ended after 0\.1 s by RuntimeError: where am I; from outside: pilot"):
+        ww.fly(parts().replace(pilot=Pilot(), method="dp"), duration_s=SECONDS)
+
+
+def test_memory_that_runs_out_is_blamed_on_no_part():
+    """It stays the computer's fault, to be told as such and flown again, though the pilot is from outside."""
+
+    @dataclass
+    class Pilot:
+        name: str = "hungry"
+
+        def goal(self, time_s, estimate):
+            raise MemoryError("Unable to allocate 214 GiB")
+
+    with pytest.raises(MemoryError, match="214 GiB"):
+        ww.fly(parts().replace(pilot=Pilot(), method="dp"), duration_s=SECONDS)
+
+
+def test_a_world_that_does_not_wait_has_the_deadline_enforced():
+    """It says so by `waits`; a world that says nothing waits."""
+
+    class Sea:
+        name, waits = "sea", False
+
+        def begin(self):
+            pytest.fail("nothing is flown")
+
+    own = parts().replace(method="dp")
+    assert own.replace(world=Sea()).flying.inner.enforce and not own.flying.inner.enforce
+
+
+def test_our_own_have_the_guard_of_a_control_step_and_not_that_of_a_stranger():
+    """A controller of this package is trusted with its answers' kind and pace; its guard waits as the tank does."""
+    own = parts().replace(method="dp")
+    assert own.flying.inner.inner is own.controller and not own.flying.inner.enforce
+    assert own.replace(vehicle=own.vehicle.with_ideal_thrusters()).flying.name == own.controller.name
+    assert isinstance(parts().replace(controller=Foreign(nan)).flying.inner, Guarded)
+    assert described(Foreign(nan)) == "theirs (test_foreign.Foreign)"

@@ -1,0 +1,67 @@
+"""What is set and cannot act is said, or refused where it contradicts itself."""
+
+import pytest
+
+import wakewise as ww
+from wakewise.control import METHODS
+from wakewise.core.errors import InputError
+from wakewise.operation.setting_checks import LEVERED, PLANNING, idle_switches
+
+
+def said(method, **changes):
+    scenario = ww.Scenario.preset("quick", world="tank", method=method, **changes)
+    return " | ".join(idle_switches(scenario, scenario.parts().vehicle))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_defaults_leave_nothing_idle(method):
+    """No method is told of a switch that nobody set."""
+    assert said(method) == ""
+
+
+def test_levers_that_need_another_are_named():
+    """With spare off, what lies behind it is idle for a method that plans, and not for one that does not."""
+    off = {"control.levers.spare": False}
+    assert "control.levers.meet, drift, doubt, thrift: nothing without" in said("wake-aware", **off)
+    assert "control.levers.drift:" in said(
+        "wake-aware", **off, **{f"control.levers.{n}": False for n in ("meet", "doubt", "thrift")}
+    )
+    assert said("instant", **off) == ""
+
+
+@pytest.mark.parametrize(
+    ("method", "changes", "words"),
+    [
+        ("dp", {"control.levers.bed": True}, "control.levers.bed: nothing for dp"),
+        ("instant", {"control.obstacles": [[2.0, 2.0, 1.0, 0.1]]}, "control.obstacles: not kept clear of by instant"),
+        ("dp", {"control.plan.w_track": 100.0}, "control.plan: nothing for dp"),
+        ("dp", {"control.person": 3}, "control.person: nobody flies dp by hand"),
+        (
+            "dp",
+            {"control.pulse_s": 0.1, "tank.ideal_thrusters": True},
+            "control.pulse_s: the thrusters of paper hold any",
+        ),
+    ],
+)
+def test_a_setting_without_a_use_is_said(method, changes, words):
+    """With its field and why; where it has a use nothing is said."""
+    assert words in said(method, **changes)
+    used = {"control.person": "manual", "control.levers.bed": "wake-aware"}
+    other = used.get(next(iter(changes)), "wake-aware")
+    if "ideal" not in str(changes):
+        assert said(other, **changes) == ""
+
+
+@pytest.mark.parametrize(
+    "levers",
+    [{"drift": False, "drift_m_s": (0.1, 0.0, 0.0)}, {"drift_m_s": (0.0, 0.0, 0.0)}],
+)
+def test_a_current_that_could_not_act_is_refused(levers):
+    """A stated current beside a lever that is off, or of no speed, contradicts itself."""
+    with pytest.raises(InputError, match="drift_m_s"):
+        ww.Scenario.preset("quick", **{f"control.levers.{name}": value for name, value in levers.items()})
+
+
+def test_methods_of_the_lists_are_methods():
+    """A method that is renamed must be renamed here."""
+    assert set(METHODS) >= PLANNING and set(METHODS) >= LEVERED
